@@ -103,11 +103,11 @@ void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
 
 void declare_part(Arguments& arguments, PartArguments& part, bool every) {
   arguments.option("--from SECONDS", part.from_s,
-                   "Start time after the first image; the recording needs stamps");
-  arguments.option("--to SECONDS", part.to_s, "End time after the first image");
+                   "Skip the first SECONDS of the recording; its images need stamps");
+  arguments.option("--to SECONDS", part.to_s, "Stop SECONDS after the first image");
   if (every) {
     arguments.option("--every N|TIME", part.every,
-                     "Use only every N-th image, or one image per time, for example 0.5s");
+                     "Use only every N-th image, or one image per interval, for example 0.5s");
   }
   arguments.hide_from_help({"--from", "--to"});
   if (every) arguments.hide_from_help({"--every"});
@@ -277,7 +277,7 @@ std::vector<double> trajectory_stamps(const Dataset& run, const std::string& ver
 std::string explain_columns(const std::string& folder, const std::string& columns,
                             const std::string& values) {
   if (recordings::is_recording(folder)) {
-    return "; of a recording odometry is nav_msgs/Odometry or TF, poses are those of /ground_truth";
+    return "; a recording needs odometry (nav_msgs/Odometry or TF) or poses (/ground_truth)";
   }
   const bool described = has_dataset_file(folder);
   const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});

@@ -42,8 +42,8 @@ void declare_record(Arguments& arguments, RunRecordArguments& record) {
 
 void declare_view(Arguments& arguments, RunRecordArguments& record) {
   arguments.option("--view PORT", record.view,
-                   "Show the run in browsers on this computer, at this port (0: a free port); "
-                   "ADDRESS:PORT also shows it to the network of this address");
+                   "Show the run in a browser on this computer, at this port (0: a free port); "
+                   "with ADDRESS:PORT, other computers in this network can also open the page");
 }
 
 RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read,

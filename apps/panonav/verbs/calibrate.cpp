@@ -289,7 +289,7 @@ ExitCode calibrate_lenses(const CalibrateArguments& arguments,
                 format_fixed(degrees(found.residual_rad), 3) + " degrees");
   session.print("azimuths are uncertain by " +
                 format_fixed(degrees(found.azimuth_deviation_rad), 3) +
-                " degrees (standard deviation, far things)");
+                " degrees (standard deviation, distant objects)");
   session.suggest({"panonav", "unwrap", arguments.inputs.front(), "--camera", arguments.out,
                    "--elevation-deg", "-40", "40", "-o", "panorama.png"});
   return ExitCode::done;

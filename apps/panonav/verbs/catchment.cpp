@@ -167,7 +167,7 @@ void check_posed(const RecordedViews& views, const std::string& name) {
     if (views.poses[i] && views.poses[i]->heading_rad) continue;
     throw FileError(name, "image " + views.files[i] + " has no " +
                               (views.poses[i] ? "heading" : "position") +
-                              ", and directions are judged by both; --ahead N needs neither" +
+                              ", and both are needed; with --ahead N they are not needed" +
                               explain_columns(name, pose_columns, pose_values));
   }
 }
@@ -327,7 +327,7 @@ Verb catchment_verb() {
   return {"catchment", "Measure the distances from which the views of a data set lead home",
           "The verb computes the direction home for all pairs of views and simulates drives home "
           "from place to place [S06 section 4]. By default a step is at most twice as long as the "
-          "spacing of the places, and it must end within 0.8 of this spacing from a place. The "
+          "spacing of the places. It must end at most 0.8 times this spacing from a place. The "
           "typical distance of objects is estimated from pairs of near views.",
           "  panonav catchment grid_run --up-to-m 0.3 --turn-randomly 1 --report catchment\n"
           "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"

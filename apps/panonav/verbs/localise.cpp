@@ -205,11 +205,11 @@ Verb localise_verb() {
       "localise",
       "Find the position and heading of a robot from images",
       "An image without a dataset.toml is read with the image type of the memory. Images that "
-      "cannot be read are reported and skipped. For a live source, the newest image is read each "
-      "time, until Ctrl-C. --update uses odometry, or motion computed from the images if there is "
-      "no odometry; panonav undo reverts an update. --route with --add records a route at the "
-      "poses of the recording, at its odometry, or at motion computed from the images. The exit "
-      "code is 1 if no image shows a place of the memory.",
+      "cannot be read are reported and skipped. For a live source, the verb always reads the "
+      "newest image, until Ctrl-C. --update uses odometry; without odometry it computes motion "
+      "from the images. panonav undo reverts an update. --route with --add records the poses of "
+      "the recording, its odometry, or motion computed from the images. The exit code is 1 if no "
+      "image shows a place of the memory.",
       "  panonav localise office.panonav query_run --report answers\n"
       "  panonav localise office.panonav /dev/video0\n"
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"

@@ -131,7 +131,7 @@ Run declare_prune(Arguments& arguments) {
   auto values = std::make_shared<PruneArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.flag("--dry-run", values->dry_run,
-                 "List the views that would be deleted, without a change");
+                 "List the views that would be deleted; do not change the memory");
   arguments.options("prune", values->options);
   arguments.show_in_help({"--max-difference", "--reach-m", "--outdated-within-m"});
   return [values, &arguments](Session& session) { return prune(arguments, *values, session); };

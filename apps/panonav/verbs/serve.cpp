@@ -108,15 +108,16 @@ Run declare_serve(Arguments& arguments) {
       "Memory files, or addresses of memories on a server. The name of a memory for clients is its "
       "file name without .panonav; NAME=FILE sets another name");
   arguments.option("--listen PORT", values->listen,
-                   "Port for programs on this computer (0: a free port); ADDRESS:PORT also answers "
-                   "to the network of this address");
+                   "Port for programs on this computer (0: a free port); with ADDRESS:PORT, other "
+                   "computers in this network can also connect");
   arguments.option("--token-file FILE", values->token_file,
                    "Only answer clients that send the first line of this file as bearer token");
   arguments.option("--max-waiting", values->max_waiting, 1,
                    "Largest number of waiting images; further clients are told to try again");
-  arguments.option("--max-held-views", values->max_held_views, 0,
-                   "A memory on a server with more views than this is not loaded; this needs 350 "
-                   "bytes per view instead of 2700, and more time per image (docs/scale.md)");
+  arguments.option(
+      "--max-held-views", values->max_held_views, 0,
+      "Largest number of views of a memory on a server that is loaded completely; larger memories "
+      "need 350 bytes per view instead of 2700, and more time per image (docs/scale.md)");
   arguments.options("localiser", values->localiser);
   arguments.show_in_help({"--top"});
   return [values, &arguments](Session& session) { return serve(arguments, *values, session); };

@@ -37,7 +37,7 @@ Run declare_undo(Arguments& arguments) {
   auto values = std::make_shared<UndoArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.flag("--dry-run", values->dry_run,
-                 "Print the change that would be reverted, without a change");
+                 "Print the change that would be reverted; do not change the memory");
   return [values](Session& session) { return undo(*values, session); };
 }
 
