@@ -124,7 +124,7 @@ void visit_options(RecordingOptions& options, OptionVisitor& visitor) {
       option<&T::spacing_m>("spacing of the grid, or distance of images along the path", 0.001,
                             1000),
       option<&T::poses>("number of poses of a walk, or number of random poses", 1, 1e7),
-      option<&T::speed_m_s>("speed of the robot; it gives the stamps", 0.001, 100),
+      option<&T::speed_m_s>("speed of the robot; the stamps are computed from it", 0.001, 100),
   };
   table.visit(options, visitor);
 }

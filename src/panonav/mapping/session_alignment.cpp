@@ -219,10 +219,10 @@ void visit_options(SessionAlignmentOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::min_places>("number of common places that must agree before two maps are joined",
                              1, 1000000),
-      option<&T::min_confirmed>("share of the places in the overlap of both maps that must match",
-                                0, 1),
+      option<&T::min_confirmed>("smallest share of matching places where both maps overlap", 0, 1),
       option<&T::distinctness>(
-          "factor by which the second best alignment must have fewer agreeing places", 1, 1e6),
+          "smallest ratio of agreeing places between the best and the second best alignment", 1,
+          1e6),
       option<&T::max_drift>("assumed drift of both maps per metre between two places", 0, 100),
   };
   table.visit(options, visitor);

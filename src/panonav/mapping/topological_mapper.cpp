@@ -62,9 +62,8 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor) {
           "difference from the last stored view above which a view is stored; 0: store every view",
           0, 1),
       option<&T::close_loops>("search for loop closures"),
-      option<&T::bridge_m>("assumed length of a step that neither images nor odometry show; 0: "
-                           "start a new component",
-                           0, 1e6),
+      option<&T::bridge_m>(
+          "assumed length of a step that cannot be computed; 0: start a new component", 0, 1e6),
       option<&T::wheels>("use the odometry for steps, corrected by the rotation from the images"),
       option<&T::step_deviation>("standard deviation of positions from images, per metre", above(0),
                                  10),

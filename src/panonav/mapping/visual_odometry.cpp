@@ -72,8 +72,7 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
   using T = VisualOdometryOptions;
   constexpr OptionTable table{
       choice<&T::rule>("method for the motion between two views", "published", "home_vector"),
-      option<&T::scale_m>("metres per unit of length that is computed from the views", above(0),
-                          1e6),
+      option<&T::scale_m>("metres per unit of length of the visual odometry", above(0), 1e6),
       option<&T::camera_height_m>(
           "height of the camera above level ground; it is used to compute lengths; 0: unknown", 0,
           100),
@@ -84,7 +83,8 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
       option<&T::iterations>("number of refinements of the home vector", 0, 20),
       option<&T::nearer_side>(
           "correct rotations for objects that are nearer on one side of the path"),
-      option<&T::max_residual>("largest unexplained share of the views' energy after a step", 0, 1),
+      option<&T::max_residual>(
+          "largest share of the views' energy that the computed step does not explain", 0, 1),
   };
   table.visit(options, visitor);
 }

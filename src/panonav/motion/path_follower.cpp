@@ -14,7 +14,7 @@ void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::look_ahead_m>("distance along the path to the point to which the robot steers",
                                0.01, 100),
-      option<&T::max_cut_m>("largest distance of the path from the straight line to that point",
+      option<&T::max_cut_m>("largest distance between the path and the straight line to this point",
                             1e-3, 10),
       option<&T::arrived_m>("distance from the end of the path at which the robot arrives", 1e-3,
                             10),

@@ -25,8 +25,9 @@ void visit_options(PlannerOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       options_of<&T::field>(),
       options_of<&T::areas>(),
-      option<&T::gates_per_border>("number of gates between two areas that are used; 0: all", 0,
-                                   1e6),
+      option<&T::gates_per_border>(
+          "number of used gates between two areas; a gate is a view at their border; 0: all", 0,
+          1e6),
   };
   table.visit(options, visitor);
 }

@@ -408,7 +408,7 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::step_m>("length of the longest step", 0.001, 100),
       option<&T::near_links>(
-          "number of edges around the last place within which the next place is searched", 1, 10),
+          "the next place is searched within this number of edges from the last place", 1, 10),
       option<&T::coarse_components>("number of components compared in open space; 0: all", 0, 1000),
       option<&T::views_ahead>("number of views of the next area that are loaded in a step", 0, 1e6),
       options_of<&T::homing>(),

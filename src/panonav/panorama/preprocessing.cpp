@@ -54,8 +54,7 @@ void visit_options(PreprocessingOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::masked_rows_top>("number of rows at the upper edge that are ignored", 0),
       option<&T::masked_rows_bottom>("number of rows at the lower edge that are ignored", 0),
-      option<&T::edge_channel>(
-          "use the length of the brightness gradient instead of the brightness"),
+      option<&T::edge_channel>("replace the brightness by the length of its gradient"),
       option<&T::remove_mean>("subtract the mean brightness of the view"),
       option<&T::normalise_gain>("scale the contrast of every view to the same standard deviation"),
   };

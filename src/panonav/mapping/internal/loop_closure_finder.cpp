@@ -31,21 +31,20 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::candidates>("number of places that are tested for each view", 1, 1000),
       option<&T::min_loop_m>("length of the shortest loop along the path", above(0), 1e6),
-      option<&T::max_residual>("largest unexplained share of the views' energy at a loop closure",
-                               0, 1),
+      option<&T::max_residual>(
+          "largest share of the views' energy that a loop closure does not explain", 0, 1),
       option<&T::max_length>("largest distance between the views of a loop closure in units of R",
                              0, 2),
       option<&T::heading_tolerance_rad>(
-          "largest difference between the angles of compass, forward vector and backward vector", 0,
-          3.2),
-      option<&T::return_tolerance>("largest distance between the start and the end of forward plus "
-                                   "backward vector, in units of R",
-                                   0, 2),
-      option<&T::distinctness>("factor by which other places must match the view less well", 1,
-                               1000),
-      option<&T::reciprocal_rank>("rank at which the search from the candidate must find the view",
-                                  1, 1000),
-      option<&T::sequence>("number of successive views with agreeing loop closures", 1, 1000),
+          "largest difference between the visual compass and the home vectors in both directions",
+          0, 3.2),
+      option<&T::return_tolerance>(
+          "largest length of the sum of the home vectors in both directions, in units of R", 0, 2),
+      option<&T::distinctness>(
+          "factor by which other places must match the view worse than the candidate", 1, 1000),
+      option<&T::reciprocal_rank>(
+          "the search from the candidate must find the view among this number of matches", 1, 1000),
+      option<&T::sequence>("number of successive views whose loop closures must agree", 1, 1000),
       option<&T::spacing_m>("shortest path between two reported loop closures", 0, 1e6),
       option<&T::max_drift>("assumed drift of the odometry per metre since the last loop closure",
                             0, 100),
