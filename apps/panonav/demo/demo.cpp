@@ -147,11 +147,11 @@ void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapL
   const std::string spacing = format_fixed(100.0 * spacing_m, 0) + " cm";
   page.begin_part("Localisation", {format_median(own.errors_m, 100.0, 1, "cm"),
                                    "median error of the position computed from one image"});
-  page.add_text("The robot stored a view every " + spacing + ". Then it was put at " +
+  page.add_text("The robot stored a view every " + spacing + ". Then it was placed at " +
                 std::to_string(queries.size()) +
-                " random places between these views, with random headings. At each place it "
-                "computed its position and heading from one new image. It was also put in another "
-                "room. There, the correct answer is that the place is unknown.");
+                " random positions between these views, with random headings. At each position it "
+                "computed its position and heading from one new image. It was also placed in "
+                "another room. There, the correct answer is that the place is unknown.");
   page.add_figures(
       {{std::to_string(memory.size()), "stored views with a spacing of " + spacing},
        {format_median(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
@@ -160,10 +160,10 @@ void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapL
        {format_percent(own.known), "of the places in the office recognised"},
        {format_percent(foreign.known), "of the images from the other room wrongly recognised"}});
   page.add_text(
-      "The circles on the map are the stored views. The green crosses are the places where the "
-      "robot was put. A line leads from each cross to the position that the robot computed; a "
-      "short line means a small error. With the position of the most similar view as the answer, "
-      "the median error would be " +
+      "The circles on the map are the stored views. The green crosses are the true positions of "
+      "the robot. A line leads from each cross to the position that the robot computed; a short "
+      "line means a small error. If the robot used the position of the most similar view as its "
+      "answer, the median error would be " +
       format_median(own.nearest_errors_m, 100.0, 1, "cm") +
       ". The robot is more accurate because it interpolates between views.");
   page.add_plots(
@@ -189,16 +189,17 @@ viewer::UnfoldingMap add_levels_part(const VisualMemory& memory,
       {first + " to " + last + " m²",
        "area in which the robot may be: from a fast, rough answer to an accurate answer"});
   page.add_text("With one Fourier component, the robot may be anywhere in an area of " + first +
-                " square metres. Each additional component reduces this area, at last to " + last +
+                " square metres. Each additional component reduces this area, down to " + last +
                 " square metres. In open space a rough answer is sufficient and takes less "
                 "computation. At a door the robot needs an accurate answer.");
-  page.add_plots({{areas.map,
-                   "Orange: the area in which the robot may be, for an increasing number of "
-                   "components. Cross: the true position."},
-                  {draw_similarity(memory, spacing_m, view),
-                   "Similarity of each stored view to an image taken at the cross. The nearest "
-                   "view is the most similar one. Similarity decreases with distance in all "
-                   "directions. The areas on the left are computed from these similarities."}});
+  page.add_plots(
+      {{areas.map,
+        "Orange: the area in which the robot may be, for an increasing number of "
+        "components. Cross: the true position."},
+       {draw_similarity(memory, spacing_m, view),
+        "Similarity of each stored view to an image taken at the cross. The nearest view is the "
+        "most similar one. Similarity decreases with distance in all directions. The areas in the "
+        "other plot are computed from these similarities."}});
   return std::move(areas.map);
 }
 

@@ -114,7 +114,7 @@ DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::ui
   page.add_text(
       "The robot has one stored view of a place, its home. It compares the Fourier components of "
       "this view and of its current image, and computes the direction home. It needs no map and "
-      "does not know its heading. In this test the robot was put one metre away from " +
+      "does not know its heading. In this test the robot was placed one metre away from " +
       std::to_string(runs) +
       " places, with random headings. It took an image, drove one step, and repeated this until it "
       "was home. Its odometry and its images contain noise.");

@@ -194,9 +194,9 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
       maps.lattice ? format_centimetres(maps.lattice->truth_from_map.rms_m) : "none";
   page.begin_part("Maps", {arranged, "error of a map that was made from images alone"});
   page.add_text(
-      "This part makes a map from images alone. The robot forgot the order and the positions of "
-      "its views. An algorithm then treats similar views as balls that springs connect, and lets "
-      "the springs move the balls to their positions.");
+      "This part makes a map from images alone, without their order and without positions. The "
+      "algorithm connects similar views with springs. The springs pull the views to their "
+      "positions.");
   page.add_plots(
       {{draw_growth(maps.arranged, office, growth, seed),
         "At first the positions are random. Similar views form groups, and the groups grow until "
@@ -205,7 +205,7 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
         "or a length in metres."},
        {draw_truth(office),
         "The true positions, which the algorithm did not use. Colours change from west to east. If "
-        "the result were perfect, the last step of the left map would look like this map."}});
+        "the result were perfect, the last step of the other map would look like this map."}});
   page.add_text(
       "Below, a robot drives through unknown rooms and makes a map of its path from images, "
       "without odometry. When it passes a place again, it recognises the place and corrects the "

@@ -288,7 +288,7 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
       {std::move(shown.all),
        "All missions at once. The path of a mission that did not reach its goal is orange."},
       {std::move(shown.kidnapped),
-       "This robot was carried away in the middle of its path and put at the purple square. " +
+       "This robot was carried away in the middle of its path to the purple square. " +
            describe_run(navigation.kidnapped, navigation.within_m)}};
   if (shown.screened) {
     maps.push_back({std::move(*shown.screened),

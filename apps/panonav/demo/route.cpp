@@ -118,9 +118,9 @@ DemoRoute demonstrate_route(const simulation::Scene& office, double length_m, st
       "the robot, one byte per degree. The lines also allow it to predict the horizon at positions "
       "beside the route. A robot was driven once along a route of " +
       format_fixed(route.length_m, 0) +
-      " m. Then it was put 0.3 m beside the start, and it did not know this offset. Its odometry "
-      "has an error of 5 %. It drove the route to the end. A second robot drove the route in the "
-      "opposite direction.");
+      " m. Then it was placed 0.3 m beside the start, and it did not know this offset. Its "
+      "odometry has an error of 5 %. It drove the route to the end. A second robot drove the route "
+      "in the opposite direction.");
   page.add_figures(
       {{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
         "runs that reached the end of the route and reported it"},

@@ -95,8 +95,8 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
       "neither its position nor its heading. It starts in one of two narrow crossings. The floor "
       "plan is symmetric, so several places match the first image. Each dot is a particle: a "
       "possible pose of the robot. The odometry, which contains errors, moves the particles. After "
-      "each image only the particles that match it remain. They concentrate in a few places and, "
-      "when enough small differences were seen, in one place.");
+      "each image only the particles that match it remain. They first concentrate in a few places. "
+      "After more images with small differences, they concentrate in one place.");
   page.add_text("After " + std::to_string(kidnapped_after + 1) +
                 " images somebody carries the robot to the other crossing. The robot counts as "
                 "correctly localised if it reports a position with an error of at most " +
@@ -112,9 +112,9 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
         "away"}});
   page.add_run(played);
   page.add_plots({{whole,
-                   "The whole run. Black: the true path, which starts again where the robot was "
-                   "put down. Blue: the estimated path. Both agree except for the images after the "
-                   "robot was carried away."}});
+                   "The whole run. Black: the true path, which starts again at the place to which "
+                   "the robot was carried. Blue: the estimated path. Both agree except for the "
+                   "images after the robot was carried away."}});
 }
 
 }  // namespace
