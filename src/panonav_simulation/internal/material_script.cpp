@@ -62,7 +62,7 @@ std::vector<std::string> read_words(const fs::path& file) {
         spaced += c;
       }
     }
-    for (std::string& word : panonav::read_words(spaced)) words.push_back(std::move(word));
+    for (std::string& word : panonav::split_words(spaced)) words.push_back(std::move(word));
   }
   return words;
 }

@@ -6,6 +6,7 @@
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/internal/database.hpp"
 #include "panonav/storage/internal/memory_tables.hpp"
+#include "panonav/storage/internal/undo_changes.hpp"
 
 namespace panonav {
 
@@ -81,6 +82,10 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> query_texts(const char* sql);
   /// Drops what exceeds the bounds of `MemoryFile::change`.
   void shorten_history();
+  /// Throws FileError on a link that is damaged or lacks a view.
+  void require_whole_links();
+  /// Throws FileError if rows that `undo` changed cannot be read.
+  void require_intact(UndoneRows rows);
 
   std::filesystem::path path_;
   Database database_;

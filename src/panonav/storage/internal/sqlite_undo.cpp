@@ -11,11 +11,16 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
+#include "panonav/storage/internal/route_tables.hpp"
 #include "panonav/storage/internal/sqlite_tables.hpp"
+#include "panonav/storage/internal/undo_changes.hpp"
+#include "panonav/storage/memory_header.hpp"
 
 namespace panonav {
 
@@ -51,11 +56,18 @@ std::span<const std::uint8_t> changes_in(const Statement& row) {
   return row.blob(3);
 }
 
-// The next change, checked.
+// Steps to the next change and checks it, so that only whole changes reach SQLite's reader.
 bool step_checked(Database& database, Statement& row) {
   if (!row.step()) return false;
   if (row.integer(4) != undo_checksum(row.text(1), row.real(2), changes_in(row))) {
     database.fail_damaged("a change that can be undone does not match its checksum");
+  }
+  try {
+    static_cast<void>(read_undo_changes(changes_in(row)));
+  } catch (const FileError&) {
+    throw;
+  } catch (const Error& error) {
+    database.fail_damaged(error.what());
   }
   return true;
 }
@@ -149,13 +161,41 @@ std::vector<MemoryFile::KeptChange> SqliteTables::history() {
   return changes;
 }
 
+void SqliteTables::require_whole_links() {
+  const std::vector<ViewId> all = views();
+  read_links([&](const LinkRow& row) {
+    const Link link = checked(row);
+    if (!std::ranges::binary_search(all, link.a) || !std::ranges::binary_search(all, link.b)) {
+      fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+                   std::to_string(link.b.value) + ", of which one is missing");
+    }
+  });
+}
+
+void SqliteTables::require_intact(UndoneRows rows) {
+  std::ranges::sort(rows.views);
+  rows.views.erase(std::unique(rows.views.begin(), rows.views.end()), rows.views.end());
+  try {
+    const SignatureShape shape = to_header(settings()).shape;
+    RecordBytes scratch;
+    read_available_views(rows.views, [&](const ViewRow& row) { checked(row, shape, scratch); });
+    if (rows.has_links) require_whole_links();
+    for (const std::string& name : rows.maps) static_cast<void>(read_map(*this, name));
+    for (const std::string& name : rows.routes) static_cast<void>(read_route(*this, name));
+  } catch (const ContractError& error) {
+    fail_damaged(std::string("a change that can be undone is not one of panonav: ") + error.what());
+  }
+}
+
 void SqliteTables::undo() {
   std::int64_t id = 0;
+  UndoneRows rows;
   {
     Statement row(database_, select_history);
     if (!step_checked(database_, row) || row.is_null(3)) fail_damaged("table history");
     id = row.integer(0);
     const auto changes = row.blob(3);
+    rows = read_undo_changes(changes);
     SqliteBytes inverse;
     void* data = nullptr;
     int code = sqlite3changeset_invert(static_cast<int>(changes.size()), changes.data(),
@@ -174,6 +214,7 @@ void SqliteTables::undo() {
     if (code != SQLITE_OK) database_.fail(code);
   }
   run_statement(database_, "DELETE FROM history WHERE id = ?", id);
+  require_intact(std::move(rows));
 }
 
 }  // namespace panonav
