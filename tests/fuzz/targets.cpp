@@ -20,6 +20,7 @@
 #include "panonav/mapping/topological_map.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/route/route_panorama.hpp"
+#include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/recorded_dataset.hpp"
 #include "panonav_recordings/recording.hpp"
@@ -210,6 +211,52 @@ void read_memory_sql(Bytes bytes) {
   read_all_of(path);
 }
 
+// A good memory after a change that can be undone.
+std::vector<std::uint8_t> changed_memory() {
+  const fs::path path = new_memory(good_memory());
+  {
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    const std::vector<ViewId> views = file.views();
+    file.change(
+        [&] {
+          file.remove(std::vector<ViewId>{views[2]});
+          file.rename(views[0], "door");
+          file.set_parameter("p", "x");
+        },
+        "all");
+  }
+  return read_file(path, 1U << 24U);
+}
+
+// The bytes are the changes that a file keeps for undo, with a checksum that holds.
+void undo_changes(Bytes bytes) {
+  static const std::vector<std::uint8_t> changed = changed_memory();
+  const fs::path path = new_memory(changed);
+  {
+    sqlite3* raw = nullptr;
+    const int opened = sqlite3_open(path.c_str(), &raw);
+    const std::unique_ptr<sqlite3, int (*)(sqlite3*)> database(raw, sqlite3_close);
+    if (opened != SQLITE_OK) throw std::logic_error("the changed memory cannot be opened");
+    RecordBytes record;
+    record.add(std::string_view("all"));
+    record.add(5.0);
+    sqlite3_stmt* statement = nullptr;
+    sqlite3_prepare_v2(raw,
+                       "UPDATE history SET what = 'all', stamp_s = 5.0, changes = ?, checksum = ?",
+                       -1, &statement, nullptr);
+    sqlite3_bind_blob(statement, 1, bytes.data(), static_cast<int>(bytes.size()), SQLITE_STATIC);
+    sqlite3_bind_int64(statement, 2,
+                       static_cast<std::int64_t>(checksum(bytes, checksum(record.bytes()))));
+    const int done = sqlite3_step(statement);
+    sqlite3_finalize(statement);
+    if (done != SQLITE_DONE) throw std::logic_error("the changes cannot be replaced");
+  }
+  expect_value_or_line([&] { (void)MemoryFile::open(path, Access::read_only).verify(); });
+  expect_value_or_line([&] { (void)MemoryFile::open(path, Access::read_write).undo(); });
+  // It was undone as a whole or not at all.
+  (void)MemoryFile::open(path, Access::read_only).load();
+}
+
 /// The message is what its bytes say: written, it reads as itself.
 template <class Message>
 Message read_ros_message(Bytes bytes, recordings::MessageEncoding encoding) {
@@ -297,6 +344,7 @@ constexpr std::array targets{
     FuzzTarget{"db3", read_recording},
     FuzzTarget{"memory", read_memory},
     FuzzTarget{"memory_sql", read_memory_sql},
+    FuzzTarget{"undo", undo_changes},
     FuzzTarget{"ros_messages", read_ros_bytes},
 #ifdef PANONAV_FUZZ_WORLDS
     FuzzTarget{"world", read_world},
