@@ -37,9 +37,12 @@ class Sketcher {
   explicit Sketcher(SignatureShape shape) : sketches(shape) {}
   /// Adds a row; returns true if a batch was sketched.
   bool add(MemoryTables& tables, const MagnitudesRow& row) {
-    if (row.magnitudes.size() != sketches.shape().size()) {
-      tables.fail_damaged("view " + std::to_string(row.id.value) + " has another shape");
-    }
+    const bool is_accepted = tables.accept_row(row.id, [&] {
+      if (row.magnitudes.size() != sketches.shape().size()) {
+        tables.fail_damaged("view " + std::to_string(row.id.value) + " has another shape");
+      }
+    });
+    if (!is_accepted) return false;
     ids_.push_back(row.id);
     magnitudes_.insert(magnitudes_.end(), row.magnitudes.begin(), row.magnitudes.end());
     areas_.emplace_back(row.id, area_at(row.position));
@@ -329,12 +332,14 @@ struct PlaceSearch::Snapshot::Implementation {
   void read(std::span<const ViewId> views) {
     mark_failed_on_throw([&] {
       tables->read_available_views(views, [&](const ViewRow& row) {
-        const auto bytes = tables->checked(row, search->header.shape, scratch).signature;
-        const auto half = static_cast<std::ptrdiff_t>(search->header.shape.size());
-        cached.insert_or_assign(row.id, CachedView{row.info,
-                                                   {search->header.shape,
-                                                    {bytes.begin(), bytes.begin() + half},
-                                                    {bytes.begin() + half, bytes.end()}}});
+        tables->accept_row(row.id, [&] {
+          const auto bytes = tables->checked(row, search->header.shape, scratch).signature;
+          const auto half = static_cast<std::ptrdiff_t>(search->header.shape.size());
+          cached.insert_or_assign(row.id, CachedView{row.info,
+                                                     {search->header.shape,
+                                                      {bytes.begin(), bytes.begin() + half},
+                                                      {bytes.begin() + half, bytes.end()}}});
+        });
       });
     });
   }

@@ -8,10 +8,15 @@
 #include <algorithm>
 #include <chrono>
 #include <iostream>
+#include <limits>
 
 #include "fleet/synchronised_memory.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/storage/checksum.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/memory_scheme.hpp"
+#include "panonav_fleet/internal/postgresql_connection.hpp"
+#include "panonav_fleet/internal/server_address.hpp"
 #include "support/child_process.hpp"
 
 namespace panonav::fleet {
@@ -61,6 +66,110 @@ TEST_F(SynchronisedMemory, AKillAtAnyMomentLosesAndDoublesNothing) {
   (void)sync("b");
   EXPECT_EQ(names(server("x")), expected);
   EXPECT_TRUE(is_same(content(folder / "a"), content(folder / "b")));
+}
+
+// A contributor of the server inserts rows that no program of ours writes, with right checksums.
+TEST_F(SynchronisedMemory, BadRowsOfOthersAreLeftOutAndNamed) {
+  share({"a", "b"}, 6);
+  PostgresqlConnection connection(parse_server_address(server("x")));
+  const auto insert = [&](const std::string& name, const ReferencePose& pose, int number) {
+    const PostgresqlRows row = connection.run(
+        "UPDATE panonav.memories SET last_view = last_view + 1 WHERE name = $1 "
+        "RETURNING id, last_view",
+        PostgresqlValues().add(std::string_view(memory_name(server("x")))));
+    const ViewId id{static_cast<std::uint32_t>(row.integer(0, 1))};
+    NewView view = numbered(number);
+    view.info.name = name;
+    view.info.pose = pose;
+    std::vector<std::uint8_t> signature = view.signature.magnitudes;
+    signature.insert(signature.end(), view.signature.phases.begin(), view.signature.phases.end());
+    RecordBytes record;
+    record.add(std::int64_t{id.value});
+    record.add(std::string_view(name));
+    record.add(pose.x_m);
+    record.add(pose.y_m);
+    record.add(pose.heading_rad);
+    record.add(view.info.stamp_s);
+    PostgresqlValues values;
+    values.add(row.integer(0, 0)).add(std::int64_t{id.value}).add(std::string_view(name));
+    values.add(std::optional(pose.x_m)).add(std::optional(pose.y_m));
+    values.add(view.info.stamp_s).add(std::span<const std::uint8_t>(signature));
+    values.add(static_cast<std::int64_t>(checksum(signature, checksum(record.bytes()))));
+    (void)connection.run(
+        "INSERT INTO panonav.views(memory, id, name, x_m, y_m, stamp_s, signature, checksum) "
+        "VALUES($1, $2, $3, $4, $5, $6, $7, $8)",
+        values);
+    return id;
+  };
+  const ReferencePose nowhere{std::numeric_limits<double>::quiet_NaN(), 0.0, std::nullopt};
+  const ReferencePose beyond{0.0, 1e9, std::nullopt};
+  // The server's own constraints refuse them; a stranger's server has none.
+  EXPECT_THROW((void)insert("nowhere", nowhere, 901), FileError);
+  EXPECT_THROW((void)insert("beyond", beyond, 902), FileError);
+  connection.execute(
+      "ALTER TABLE panonav.views DROP CONSTRAINT views_x_m_check, DROP CONSTRAINT views_y_m_check");
+  (void)insert("nowhere", nowhere, 901);
+  (void)insert("beyond", beyond, 902);
+  const ViewId good = insert("good", {1.0, 2.0, std::nullopt}, 903);
+  connection.execute(
+      "INSERT INTO panonav.links SELECT id, 1, 3, 0, 5 FROM panonav.memories WHERE name = '" +
+      memory_name(server("x")) + "'");
+
+  std::set<std::string> said;
+  set_left_out_handler([&](const auto&, const MemoryFile::Fault& row) { said.insert(row.what); });
+  open("a").append(numbered(60));
+  for (const char* robot : {"a", "b"}) {
+    said.clear();
+    const SynchronisationReport report = sync(robot);
+    EXPECT_EQ(report.views, 8U);
+    EXPECT_GE(said.size(), 3U);
+    for (const char* part : {"pose x_m is nan", "pose y_m is 1e+09", "the link of views"}) {
+      EXPECT_TRUE(std::ranges::any_of(said, [&](const std::string& line) {
+        return contains(line, part);
+      })) << part;
+    }
+    const MemoryFile file = open(robot);
+    EXPECT_TRUE(file.verify().empty());
+    EXPECT_TRUE(file.load().find("good"));
+    EXPECT_TRUE(file.find("view_60.png"));
+    EXPECT_FALSE(file.find("nowhere"));
+    EXPECT_FALSE(file.find("beyond"));
+  }
+  set_left_out_handler({});
+  // The memory on the server is used without them, and copied; verify names them.
+  const MemoryFile there = on_server();
+  EXPECT_EQ(there.load().size(), 8U);
+  EXPECT_TRUE(there.load().contains(good));
+  EXPECT_GE(there.left_out().size(), 3U);
+  EXPECT_GE(there.verify().size(), 3U);
+  there.copy_to(folder / "copy");
+  EXPECT_EQ(MemoryFile::open(folder / "copy", Access::read_only).load().size(), 8U);
+  EXPECT_TRUE(MemoryFile::open(folder / "copy", Access::read_only).verify().empty());
+  // Others must find the server as it was.
+  connection.execute("DELETE FROM panonav.views WHERE name IN ('nowhere', 'beyond')");
+  connection.execute(
+      "ALTER TABLE panonav.views ADD CHECK (x_m BETWEEN -1e7 AND 1e7), "
+      "ADD CHECK (y_m BETWEEN -1e7 AND 1e7)");
+}
+
+// A curator may write any row that is kept for undo; whoever undoes it may have more rights.
+TEST_F(SynchronisedMemory, UndoChangesNoOtherTableOnTheServer) {
+  share({"a"}, 4);
+  MemoryFile there = on_server();
+  there.change([&] { there.remove(std::vector{ViewId{1}}); }, "forget");
+  PostgresqlConnection connection(parse_server_address(server("x")));
+  connection.execute(
+      "INSERT INTO panonav.undo_rows(memory, relation, before) SELECT id, 'members', "
+      "'(evil,north)' "
+      "FROM panonav.memories WHERE name = '" +
+      memory_name(server("x")) + "'");
+  const std::string message = message_of<FileError>([&] { there.undo(); });
+  EXPECT_TRUE(contains(message, "members")) << message;
+  EXPECT_EQ(
+      connection.run("SELECT count(*) FROM panonav.members WHERE login = 'evil'").integer(0, 0), 0);
+  connection.execute("DELETE FROM panonav.undo_rows WHERE relation = 'members'");
+  there.undo();
+  EXPECT_EQ(there.views().size(), 4U);
 }
 
 // The acknowledgement was lost, and the view changed, or was removed, before the next time.

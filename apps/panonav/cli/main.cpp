@@ -14,6 +14,7 @@
 #include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 
 namespace {
 
@@ -31,6 +32,9 @@ ExitCode run(std::string_view& verb, std::span<const std::string> words) {
   panonav::command::register_outbuildings();
   const auto verbs = panonav::command::all_verbs();
   if (const auto* known = panonav::command::find_verb(verbs, words)) verb = known->name;
+  panonav::set_left_out_handler([&verb](const auto& memory, const auto& row) {
+    report(verb, "warning: " + memory.string() + ": left out: " + row.what);
+  });
   const auto command = panonav::command::parse(verbs, words);
   panonav::command::Session session(command.session);
   session.detail("panonav " PANONAV_VERSION " " + std::string(command.verb) + " on " +

@@ -12,27 +12,18 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/geometry/position_bound.hpp"
 #include "panonav/memory/internal/comparison.hpp"
 #include "panonav/memory/internal/exact_search.hpp"
 #include "panonav/memory/internal/link_set.hpp"
 #include "panonav/memory/internal/sketch_index.hpp"
 #include "panonav/memory/internal/view_store.hpp"
+#include "panonav/memory/reference_validation.hpp"
 
 namespace panonav {
 
 namespace {
 
 using Row = ViewStore::Row;
-
-void require_pose(const std::optional<ReferencePose>& pose) {
-  if (!pose) return;
-  require(is_position(pose->x_m), "pose x_m", pose->x_m, position_range);
-  require(is_position(pose->y_m), "pose y_m", pose->y_m, position_range);
-  if (pose->heading_rad) {
-    require(std::isfinite(*pose->heading_rad), "pose heading_rad", *pose->heading_rad, "finite");
-  }
-}
 
 }  // namespace
 
@@ -161,13 +152,11 @@ ViewId VisualMemory::append(const FourierSignature& signature, ReferenceInfo inf
 void VisualMemory::append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info) {
   Implementation& memory = *implementation_;
   require_signature(signature, memory.shape);
-  if (info.name.empty()) throw ContractError("view name", "empty", "at least one character");
+  validate(info);
   if (memory.names.contains(info.name)) {
     throw ContractError("view name", "\"" + info.name + "\", which the memory already contains",
                         "a name that is unique");
   }
-  require_pose(info.pose);
-  if (info.stamp_s) require(std::isfinite(*info.stamp_s), "stamp_s", *info.stamp_s, "finite");
   require(id.value >= memory.next_id, "view id", id.value,
           ">= " + std::to_string(memory.next_id) + ", ids grow");
 
@@ -220,7 +209,7 @@ const ReferenceInfo& VisualMemory::info(ViewId view) const {
 }
 
 void VisualMemory::set_pose(ViewId view, std::optional<ReferencePose> pose) {
-  require_pose(pose);
+  if (pose) validate(*pose);
   implementation_->records[implementation_->row(view)].pose = pose;
 }
 

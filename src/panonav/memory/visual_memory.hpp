@@ -109,8 +109,8 @@ class VisualMemory {
   /// True if there is no view.
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
 
-  /// Throws ContractError on another shape, an empty or known name, or a pose that is not finite;
-  /// the memory is then unchanged.
+  /// Throws ContractError on another shape, a known name, and as `validate` of
+  /// reference_validation.hpp; the memory is then unchanged.
   ViewId append(const PackedSignature& signature, ReferenceInfo info);
   /// Packs with the memory's full scale, then appends.
   ViewId append(const FourierSignature& signature, ReferenceInfo info);
@@ -127,8 +127,7 @@ class VisualMemory {
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
   /// These throw ContractError when there is no such view.
   [[nodiscard]] const ReferenceInfo& info(ViewId view) const;
-  /// Replaces the pose; nullopt: it is unknown. Throws also on a pose that is not
-  /// finite.
+  /// Replaces the pose; nullopt: it is unknown. Throws also as `validate`.
   void set_pose(ViewId view, std::optional<ReferencePose> pose);
   [[nodiscard]] PackedSignature packed(ViewId view) const;  ///< A copy of the view's bytes.
   /// The view with magnitudes and phases as real numbers, to the precision of the packed form.

@@ -34,6 +34,16 @@ std::shared_ptr<const MemoryScheme> find_registered(const std::filesystem::path&
   return nullptr;
 }
 
+struct RegisteredHandler {
+  std::mutex mutex;
+  LeftOutHandler handler;
+};
+
+RegisteredHandler& left_out_handler() {
+  static RegisteredHandler registered;
+  return registered;
+}
+
 std::atomic<std::chrono::milliseconds> process_reply_timeout{std::chrono::minutes(10)};
 
 }  // namespace
@@ -52,6 +62,18 @@ void set_reply_timeout(std::chrono::milliseconds timeout) {
 
 std::chrono::milliseconds reply_timeout() {
   return process_reply_timeout;
+}
+
+void set_left_out_handler(LeftOutHandler handler) {
+  RegisteredHandler& registered = left_out_handler();
+  const std::lock_guard lock(registered.mutex);
+  registered.handler = std::move(handler);
+}
+
+void report_left_out(const std::filesystem::path& memory, const MemoryFile::Fault& row) {
+  RegisteredHandler& registered = left_out_handler();
+  const std::lock_guard lock(registered.mutex);
+  if (registered.handler) registered.handler(memory, row);
 }
 
 std::shared_ptr<const MemoryScheme> find_memory_scheme(const std::filesystem::path& memory) {

@@ -1,12 +1,12 @@
 #include "panonav/storage/memory_file.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <set>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/reference_validation.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
@@ -26,15 +26,6 @@ Link order_ends(Link link) {
   return link;
 }
 
-void require_finite(const std::optional<ReferencePose>& pose) {
-  if (!pose) return;
-  require(std::isfinite(pose->x_m), "pose x_m", pose->x_m, "finite");
-  require(std::isfinite(pose->y_m), "pose y_m", pose->y_m, "finite");
-  if (pose->heading_rad) {
-    require(std::isfinite(*pose->heading_rad), "pose heading_rad", *pose->heading_rad, "finite");
-  }
-}
-
 void require_view(const NewView& view, SignatureShape shape) {
   if (view.signature.shape != shape || view.signature.magnitudes.size() != shape.size() ||
       view.signature.phases.size() != shape.size()) {
@@ -44,11 +35,7 @@ void require_view(const NewView& view, SignatureShape shape) {
             std::to_string(view.signature.shape.components) + " components",
         std::to_string(shape.rows) + " rows x " + std::to_string(shape.components) + " components");
   }
-  if (view.info.name.empty()) throw ContractError("view name", "empty", "at least one character");
-  require_finite(view.info.pose);
-  if (view.info.stamp_s) {
-    require(std::isfinite(*view.info.stamp_s), "stamp_s", *view.info.stamp_s, "finite");
-  }
+  validate(view.info);
 }
 
 // Throws the ContractError for a `kind` ("map", "route") of a name that the file does not have.
@@ -87,14 +74,36 @@ struct MemoryFile::Implementation {
   [[nodiscard]] VisualMemory make_empty_memory() const {
     return {header.shape, header.full_scale, header.elevations};
   }
-  /// Appends a row to a memory. Throws FileError when it does not match its checksum.
+  /// Appends a row to a memory. Throws DamageError as `checked`, and on a row that repeats another.
   void append_row(const ViewRow& row, VisualMemory& memory) {
     const auto signature = tables->checked(row, header.shape, scratch).signature;
     const auto half = static_cast<std::ptrdiff_t>(header.shape.size());
     packed.shape = header.shape;
     packed.magnitudes.assign(signature.begin(), signature.begin() + half);
     packed.phases.assign(signature.begin() + half, signature.end());
-    memory.append_with_id(row.id, packed, row.info);
+    try {
+      memory.append_with_id(row.id, packed, row.info);
+    } catch (const ContractError& error) {
+      tables->fail_damaged(error.what());
+    }
+  }
+  /// Appends a link to a memory, unless one of its views was left out. Throws as `append_row`.
+  void append_link(const LinkRow& row, VisualMemory& memory) const {
+    if (tables->is_left_out(row.a) || tables->is_left_out(row.b)) return;
+    const Link link = tables->checked(row);
+    if (!memory.contains(link.a) || !memory.contains(link.b)) fail_incomplete(link);
+    memory.link(link);
+  }
+  [[noreturn]] void fail_incomplete(const Link& link) const {
+    tables->fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+                         std::to_string(link.b.value) + ", of which one is missing");
+  }
+  /// Returns the attachment; nullopt also if it was left out as bad.
+  [[nodiscard]] std::optional<Bytes> read_attachment(ViewAttachment table, ViewId view) const {
+    std::optional<Bytes> bytes;
+    // The view itself stays: whoever may add could otherwise hide it by a bad attachment.
+    tables->accept_row(std::nullopt, [&] { bytes = tables->read_checked_bytes(table, view); });
+    return bytes;
   }
   /// Throws as `throw_unknown_view`.
   void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change) {
@@ -144,20 +153,34 @@ void MemoryFile::copy_to(const std::filesystem::path& path) const {
       for (const auto& [key, value] : from.settings()) {
         if (key.starts_with("parameter.")) to.write_setting(key, value);
       }
+      std::set<ViewId> copied;
       constexpr std::size_t views_per_part = 1000;  // some megabytes
       for_each_part(views(), views_per_part, [&](std::span<const ViewId> ids) {
         const VisualMemory memory = load(ids);
         std::vector<NewView> part;
-        for (const ViewId id : ids) {
+        for (const ViewId id : memory.views()) {
           part.push_back({memory.info(id), memory.packed(id), thumbnail(id).value_or(Bytes{}),
                           features(id).value_or(Bytes{})});
         }
-        to.insert(ids, part);
+        to.insert(memory.views(), part);
+        copied.insert(memory.views().begin(), memory.views().end());
       });
-      to.write_links(links());
-      for (const std::string& name : map_names()) write_map(to, name, read_map(from, name).value());
+      std::vector<Link> kept_links;
+      for (const Link& link : links()) {
+        from.accept_row(std::nullopt, [&] {
+          if (!copied.contains(link.a) || !copied.contains(link.b)) {
+            implementation_->fail_incomplete(link);
+          }
+          kept_links.push_back(link);
+        });
+      }
+      to.write_links(kept_links);
+      for (const std::string& name : map_names()) {
+        from.accept_row(std::nullopt, [&] { write_map(to, name, this->map(name).value()); });
+      }
       for (const std::string& name : route_names()) {
-        append_to_route(to, name, read_route(from, name).value());
+        from.accept_row(std::nullopt,
+                        [&] { append_to_route(to, name, read_route(from, name).value()); });
       }
     });
   });
@@ -231,7 +254,7 @@ void MemoryFile::remove(std::span<const ViewId> views) {
 }
 
 void MemoryFile::set_pose(ViewId view, const std::optional<ReferencePose>& pose) {
-  require_finite(pose);
+  if (pose) validate(*pose);
   implementation_->change_info(view, [&](ReferenceInfo& info) { info.pose = pose; });
 }
 
@@ -275,7 +298,7 @@ std::vector<ViewId> MemoryFile::views_with_thumbnail() const {
 }
 
 std::optional<Bytes> MemoryFile::thumbnail(ViewId view) const {
-  return implementation_->tables->read_checked_bytes(ViewAttachment::thumbnails, view);
+  return implementation_->read_attachment(ViewAttachment::thumbnails, view);
 }
 
 bool MemoryFile::has_features() const {
@@ -283,7 +306,7 @@ bool MemoryFile::has_features() const {
 }
 
 std::optional<Bytes> MemoryFile::features(ViewId view) const {
-  return implementation_->tables->read_checked_bytes(ViewAttachment::features, view);
+  return implementation_->read_attachment(ViewAttachment::features, view);
 }
 
 void MemoryFile::set_parameter(std::string_view name, std::string_view value) {
@@ -296,9 +319,13 @@ std::optional<std::string> MemoryFile::parameter(std::string_view name) const {
   const Settings settings = implementation_->tables->settings();
   const auto found = settings.find(make_parameter_key(name));
   if (found == settings.end()) return std::nullopt;
-  const auto* text = std::get_if<std::string>(&found->second);
-  if (text == nullptr) implementation_->tables->fail_damaged("parameter " + std::string(name));
-  return *text;
+  std::optional<std::string> value;
+  implementation_->tables->accept_row(std::nullopt, [&] {
+    const auto* text = std::get_if<std::string>(&found->second);
+    if (text == nullptr) implementation_->tables->fail_damaged("parameter " + std::string(name));
+    value = *text;
+  });
+  return value;
 }
 
 void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
@@ -311,7 +338,11 @@ void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
 }
 
 std::optional<TopologicalMap> MemoryFile::map(std::string_view name) const {
-  return implementation_->read([&](MemoryTables& tables) { return read_map(tables, name); });
+  return implementation_->read([&](MemoryTables& tables) {
+    auto map = read_map(tables, name);
+    if (map) forget_views(*map, tables.left_out_views());
+    return map;
+  });
 }
 
 void MemoryFile::remove_map(std::string_view name) {
@@ -371,12 +402,12 @@ std::vector<std::string> MemoryFile::route_names() const {
 VisualMemory MemoryFile::load() const {
   return implementation_->read([&](MemoryTables& tables) {
     VisualMemory memory = implementation_->make_empty_memory();
-    try {
-      tables.read_views([&](const ViewRow& row) { implementation_->append_row(row, memory); });
-      tables.read_links([&](const LinkRow& row) { memory.link(tables.checked(row)); });
-    } catch (const ContractError& error) {
-      tables.fail_damaged(error.what());
-    }
+    tables.read_views([&](const ViewRow& row) {
+      tables.accept_row(row.id, [&] { implementation_->append_row(row, memory); });
+    });
+    tables.read_links([&](const LinkRow& row) {
+      tables.accept_row(std::nullopt, [&] { implementation_->append_link(row, memory); });
+    });
     return memory;
   });
 }
@@ -388,11 +419,7 @@ VisualMemory MemoryFile::load(std::span<const ViewId> views) const {
   return implementation_->read([&](MemoryTables& tables) {
     VisualMemory memory = implementation_->make_empty_memory();
     tables.read_views(views, [&](const ViewRow& row) {
-      try {
-        implementation_->append_row(row, memory);
-      } catch (const ContractError& error) {
-        tables.fail_damaged(error.what());
-      }
+      tables.accept_row(row.id, [&] { implementation_->append_row(row, memory); });
     });
     return memory;
   });
@@ -413,13 +440,20 @@ std::vector<ViewId> MemoryFile::views_within(const PositionBounds& bounds) const
 std::vector<Link> MemoryFile::links() const {
   return implementation_->read([](MemoryTables& tables) {
     std::vector<Link> links;
-    tables.read_links([&](const LinkRow& row) { links.push_back(tables.checked(row)); });
+    tables.read_links([&](const LinkRow& row) {
+      if (tables.is_left_out(row.a) || tables.is_left_out(row.b)) return;
+      tables.accept_row(std::nullopt, [&] { links.push_back(tables.checked(row)); });
+    });
     return links;
   });
 }
 
 std::vector<MemoryFile::Fault> MemoryFile::verify() const {
   return verify_memory(*implementation_->tables, implementation_->header);
+}
+
+std::vector<MemoryFile::Fault> MemoryFile::left_out() const {
+  return implementation_->tables->left_out();
 }
 
 MemoryFile::Info MemoryFile::info() const {

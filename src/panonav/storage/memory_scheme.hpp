@@ -52,6 +52,16 @@ void set_reply_timeout(std::chrono::milliseconds timeout);
 /// Returns it, for schemes.
 [[nodiscard]] std::chrono::milliseconds reply_timeout();
 
+/// Called with the memory and a row of it that was left out, as it holds what no program of ours
+/// writes; `view` is empty if it is no view. By any thread.
+using LeftOutHandler =
+    std::function<void(const std::filesystem::path& memory, const MemoryFile::Fault& row)>;
+/// Sets who is told of bad rows of memories on servers, of each opened memory the first few; by
+/// default nobody. Any thread may call.
+void set_left_out_handler(LeftOutHandler handler);
+/// Calls the handler, for schemes.
+void report_left_out(const std::filesystem::path& memory, const MemoryFile::Fault& row);
+
 /// Returns the scheme of an address, nullptr for the path of a file. Throws FileError on an address
 /// of a scheme that is not registered.
 [[nodiscard]] std::shared_ptr<const MemoryScheme> find_memory_scheme(

@@ -55,6 +55,7 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] const std::filesystem::path& message_path() const noexcept override {
     return path();
   }
+  [[nodiscard]] bool tolerates_bad_rows() const noexcept override { return true; }
   [[nodiscard]] std::unique_ptr<Transaction> transaction(Kind kind) override;
 
   [[nodiscard]] Settings settings() override;

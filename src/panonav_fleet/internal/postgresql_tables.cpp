@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/position_bound.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav_fleet/internal/postgresql_memory.hpp"
 
@@ -131,10 +132,12 @@ Settings PostgresqlTables::settings() {
     } else {
       value = rows.copy(i, 4);
     }
-    if (rows.integer(i, 5) != setting_checksum(key, value)) {
-      fail_damaged("checksum of setting " + key);
-    }
-    settings.emplace(std::move(key), std::move(value));
+    accept_row(std::nullopt, [&] {
+      if (rows.integer(i, 5) != setting_checksum(key, value)) {
+        fail_damaged("checksum of setting " + key);
+      }
+      settings.emplace(std::move(key), std::move(value));
+    });
   }
   return settings;
 }
@@ -372,7 +375,8 @@ void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t by
     };
     MagnitudesRow row{to_view_id(static_cast<std::int64_t>(number(0))), std::nullopt, {}};
     if (fields[1] && fields[2]) {
-      row.position = Point2{std::bit_cast<double>(number(1)), std::bit_cast<double>(number(2))};
+      const Point2 position{std::bit_cast<double>(number(1)), std::bit_cast<double>(number(2))};
+      if (is_position(position.x_m) && is_position(position.y_m)) row.position = position;
     }
     if (fields[3]) {
       row.magnitudes = {reinterpret_cast<const std::uint8_t*>(fields[3]->data()),

@@ -211,8 +211,10 @@ std::vector<Link> ServerExchange::read_links_in_blocks(const KeptAreas& areas,
           block_of_l + " = ANY(" + (areas ? "$4)" : "$2)"),
       bound.add(blocks));
   for (int i = 0; i < rows.size(); ++i) {
-    links.push_back(tables_.checked(LinkRow{read_view_id(rows, i, 0), read_view_id(rows, i, 1),
-                                            rows.integer(i, 2), rows.integer(i, 3)}));
+    tables_.accept_row(std::nullopt, [&] {
+      links.push_back(tables_.checked(LinkRow{read_view_id(rows, i, 0), read_view_id(rows, i, 1),
+                                              rows.integer(i, 2), rows.integer(i, 3)}));
+    });
   }
   return links;
 }
@@ -230,11 +232,38 @@ std::map<ViewId, std::int64_t> ServerExchange::read_signature_checksums(
   return signatures;
 }
 
-std::vector<FullServerView> ServerExchange::read_full_views(std::span<const ViewId> ids) {
+FullServerView ServerExchange::read_full_view(const PostgresqlRows& rows, const ServerView& found,
+                                              SignatureShape shape) {
+  const auto signature = rows.bytes(0, 7);
+  RecordBytes scratch;
+  static_cast<void>(
+      tables_.checked(ViewRow{found.id, found.info, signature, found.checksum}, shape, scratch));
+  FullServerView whole{found.id, {found.info, {}, {}, {}}, found.checksum};
+  const auto half = static_cast<std::ptrdiff_t>(shape.size());
+  whole.view.signature.shape = shape;
+  whole.view.signature.magnitudes.assign(signature.begin(), signature.begin() + half);
+  whole.view.signature.phases.assign(signature.begin() + half, signature.end());
+  const auto read_attachment = [&](int column, std::vector<std::uint8_t>& bytes, const char* what) {
+    if (rows.is_null(0, column)) return;
+    tables_.accept_row(std::nullopt, [&] {
+      auto stored = rows.copy(0, column);
+      if (rows.integer(0, column + 1) != bytes_checksum(whole.id, stored)) {
+        tables_.fail_damaged(what + std::to_string(found.id.value) +
+                             " does not match its checksum");
+      }
+      bytes = std::move(stored);
+    });
+  };
+  read_attachment(8, whole.view.thumbnail, "the thumbnail of view ");
+  read_attachment(10, whole.view.features, "the local features of view ");
+  return whole;
+}
+
+std::vector<FullServerView> ServerExchange::read_full_views(std::span<const ViewId> ids,
+                                                            SignatureShape shape) {
   std::vector<FullServerView> views;
   if (ids.empty()) return views;
   const auto numbers = to_numbers(ids);
-  RecordBytes scratch;
   connection().stream(
       std::string(server_view_fields) +
           ", v.signature, t.bytes, t.checksum, f.bytes, f.checksum FROM panonav.views v "
@@ -242,28 +271,8 @@ std::vector<FullServerView> ServerExchange::read_full_views(std::span<const View
           "LEFT JOIN panonav.features f ON f.memory = v.memory AND f.view = v.id "
           "WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
       values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
-        ServerView found = read_server_view(rows, 0);
-        const auto signature = rows.bytes(0, 7);
-        const auto fail = [&](const char* what) {
-          tables_.fail_damaged(what + std::to_string(found.id.value) +
-                               " does not match its checksum");
-        };
-        if (signature.size() % 2 != 0 ||
-            found.checksum != view_checksum(scratch, found.id, found.info, signature)) {
-          fail("view ");
-        }
-        FullServerView whole{found.id, {std::move(found.info), {}, {}, {}}, found.checksum};
-        const std::size_t half = signature.size() / 2;
-        whole.view.signature.magnitudes.assign(signature.begin(), signature.begin() + half);
-        whole.view.signature.phases.assign(signature.begin() + half, signature.end());
-        const auto beside = [&](int column, std::vector<std::uint8_t>& bytes, const char* what) {
-          if (rows.is_null(0, column)) return;
-          bytes = rows.copy(0, column);
-          if (rows.integer(0, column + 1) != bytes_checksum(whole.id, bytes)) fail(what);
-        };
-        beside(8, whole.view.thumbnail, "the thumbnail of view ");
-        beside(10, whole.view.features, "what local features view ");
-        views.push_back(std::move(whole));
+        const ServerView found = read_server_view(rows, 0);
+        tables_.accept_row(found.id, [&] { views.push_back(read_full_view(rows, found, shape)); });
       });
   return views;
 }

@@ -93,8 +93,10 @@ class ServerExchange {
   /// Computes `signature_checksum` of those of the views that exist.
   [[nodiscard]] std::map<ViewId, std::int64_t> read_signature_checksums(
       std::span<const ViewId> views);
-  /// Reads those of the views that exist, with thumbnails and features, in one message.
-  [[nodiscard]] std::vector<FullServerView> read_full_views(std::span<const ViewId> views);
+  /// Reads those of the views that exist and are no bad rows (`MemoryTables::accept_row`), with
+  /// thumbnails and features, in one message.
+  [[nodiscard]] std::vector<FullServerView> read_full_views(std::span<const ViewId> views,
+                                                            SignatureShape shape);
 
   // The following functions are one statement each, outside of transactions, so that no other
   // client waits for this one's network.
@@ -145,6 +147,9 @@ class ServerExchange {
   [[nodiscard]] std::vector<Upload> to_uploads(const PostgresqlRows& rows) const;
   [[nodiscard]] ServerView read_server_view(const PostgresqlRows& rows, int row) const;
   [[nodiscard]] std::vector<ServerView> read_server_views(const PostgresqlRows& rows) const;
+  /// Returns the view of the first row, checked; bad attachments are left out. Throws DamageError.
+  [[nodiscard]] FullServerView read_full_view(const PostgresqlRows& rows, const ServerView& found,
+                                              SignatureShape shape);
   [[nodiscard]] std::map<ViewId, std::int64_t> checksums_in(const PostgresqlRows& rows) const;
   [[nodiscard]] ViewId read_view_id(const PostgresqlRows& rows, int row, int column) const {
     return tables_.to_view_id(rows.integer(row, column));

@@ -113,6 +113,8 @@ class Synchronisation {
   static std::vector<std::int64_t> find_differing_blocks(const Blocks& a, const Blocks& b);
   /// Applies changes of others, from one snapshot of the server.
   void download();
+  /// False, and notes it, if the values of a view of the server are out of range.
+  bool is_acceptable(const ServerView& view);
   /// Sorts views whose rows on the server have changed into changed views (`changes`) and ids that
   /// a restored server has given to another view (`reused`).
   void classify_changed_views(const std::vector<ViewId>& changed, std::vector<ServerView>& changes,

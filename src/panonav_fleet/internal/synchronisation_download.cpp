@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/reference_validation.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 
@@ -56,15 +57,16 @@ void Synchronisation::download() {
   std::vector<ServerView> changes;
   std::vector<ViewId> reused;
   classify_changed_views(changed, changes, reused);
-  // Damage is found before a row is matched with another view.
-  static_cast<void>(server_.read_full_views(reused));
+  // Bad rows are left out before a row is matched with another view.
+  static_cast<void>(server_.read_full_views(reused, header_.shape));
+  std::erase_if(reused, [this](ViewId id) { return server_.tables().is_left_out(id); });
   added.insert(added.end(), reused.begin(), reused.end());
   std::ranges::sort(added);
   apply_server_changes(removed, find_lost_views(removed), changes, reused);
 
   transfer_total_ = added.size();
   for_each_part(added, views_per_batch, [&](std::span<const ViewId> part) {
-    add_downloaded_views(server_.read_full_views(part));
+    add_downloaded_views(server_.read_full_views(part, header_.shape));
   });
 
   Blocks local_link_blocks;
@@ -84,12 +86,22 @@ void Synchronisation::classify_changed_views(const std::vector<ViewId>& changed,
   for_each_part(changed, rows_per_query, [&](std::span<const ViewId> part) {
     for (ServerView& view : server_.read_infos(part)) {
       const auto row = read_local_row(local_by_server_id_.at(view.id));
-      if (!row) continue;  // removed from the file
+      if (!row || !is_acceptable(view)) continue;  // removed from the file, or a bad row
       if (view_checksum(scratch_, view.id, view.info, row->signature) == view.checksum) {
         changes.push_back(std::move(view));
       } else {
         reused.push_back(view.id);
       }
+    }
+  });
+}
+
+bool Synchronisation::is_acceptable(const ServerView& view) {
+  return server_.tables().accept_row(view.id, [&] {
+    try {
+      validate(view.info);
+    } catch (const ContractError& error) {
+      server_.tables().fail_damaged("view " + std::to_string(view.id.value) + ": " + error.what());
     }
   });
 }
@@ -216,11 +228,6 @@ void Synchronisation::add_downloaded_views(std::vector<FullServerView> views) {
   for (const FullServerView& whole : views) names.insert(whole.view.info.name);
   for (FullServerView& whole : views) {
     NewView& view = whole.view;
-    if (view.signature.magnitudes.size() != header_.shape.size()) {
-      server_.tables().fail_damaged("view " + std::to_string(whole.id.value) +
-                                    " has a signature of another shape");
-    }
-    view.signature.shape = header_.shape;
     Bytes signature;
     pack_signature(view.signature, signature);
     SynchronisedView next;

@@ -137,7 +137,8 @@ bool Synchronisation::is_synchronised_as(ViewId view, ViewId server_view) const 
 bool Synchronisation::is_same_view(ViewId view, const ServerView& other) {
   if (synchronised_.contains(view) || local_by_server_id_.contains(other.id)) return false;
   const auto row = read_local_row(view);
-  return row && view_checksum(scratch_, other.id, other.info, row->signature) == other.checksum;
+  return row && is_acceptable(other) &&
+         view_checksum(scratch_, other.id, other.info, row->signature) == other.checksum;
 }
 
 SynchronisedView Synchronisation::make_adopted_row(ViewId view, const LocalRow& row,

@@ -131,20 +131,22 @@ bool erase_map(MemoryTables& tables, std::string_view name) {
   return there;
 }
 
+bool forget_views(TopologicalMap& map, const std::set<ViewId>& forgotten) {
+  const auto nodes = std::erase_if(
+      map.nodes, [&](const TopologicalMap::Node& node) { return forgotten.contains(node.view); });
+  if (nodes == 0) return false;
+  std::erase_if(map.edges, [&](const TopologicalMap::Edge& edge) {
+    return forgotten.contains(edge.a) || forgotten.contains(edge.b);
+  });
+  renumber_components(map);
+  return true;
+}
+
 void forget_in_maps(MemoryTables& tables, std::span<const ViewId> views) {
   const std::set<ViewId> forgotten(views.begin(), views.end());
   for (const std::string& name : tables.map_names()) {
     auto map = read_map(tables, name);
-    if (!map) continue;
-    const auto nodes = std::erase_if(map->nodes, [&](const TopologicalMap::Node& node) {
-      return forgotten.contains(node.view);
-    });
-    if (nodes == 0) continue;
-    std::erase_if(map->edges, [&](const TopologicalMap::Edge& edge) {
-      return forgotten.contains(edge.a) || forgotten.contains(edge.b);
-    });
-    renumber_components(*map);
-    write_map(tables, name, *map);
+    if (map && forget_views(*map, forgotten)) write_map(tables, name, *map);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +21,9 @@ void write_map(MemoryTables& tables, std::string_view name, const TopologicalMap
 [[nodiscard]] std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view name);
 /// Returns true if there was one.
 bool erase_map(MemoryTables& tables, std::string_view name);
+/// Removes views from a map, with their edges, and numbers its components again. Returns true if
+/// one was in it.
+bool forget_views(TopologicalMap& map, const std::set<ViewId>& forgotten);
 /// Drops the nodes of these views, and their edges, from all maps.
 void forget_in_maps(MemoryTables& tables, std::span<const ViewId> views);
 /// Passes every map to `check` that may throw; `check` keeps what it threw. `known` says whether a

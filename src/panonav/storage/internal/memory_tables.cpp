@@ -1,10 +1,13 @@
 #include "panonav/storage/internal/memory_tables.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/reference_validation.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 
 namespace panonav {
 
@@ -36,11 +39,37 @@ const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
       row.checksum != view_checksum(scratch, row.id, row.info, row.signature)) {
     fail_damaged("view " + std::to_string(row.id.value) + " does not match its checksum");
   }
+  try {
+    validate(row.info);
+  } catch (const ContractError& error) {
+    fail_damaged("view " + std::to_string(row.id.value) + ": " + error.what());
+  }
   return row;
 }
 
 void MemoryTables::fail_damaged(std::string_view what) const {
-  throw FileError(message_path().string(), "is damaged: " + std::string(what));
+  throw DamageError(message_path().string(), "is damaged: " + std::string(what));
+}
+
+std::string MemoryTables::shorten_message(std::string_view message) const {
+  std::string what(message);
+  for (const std::string& prefix : {message_path().string() + ": ", std::string("is damaged: ")}) {
+    if (what.starts_with(prefix)) what.erase(0, prefix.size());
+  }
+  return what;
+}
+
+void MemoryTables::leave_out(std::optional<ViewId> view, std::string_view what) {
+  constexpr std::size_t max_reported = 10;  // chosen: a screenful, however many rows are bad
+  MemoryFile::Fault fault{view, shorten_message(what)};
+  if (std::ranges::find(left_out_, fault) != left_out_.end()) return;
+  if (view) left_out_views_.insert(*view);
+  if (left_out_.size() < max_reported) {
+    report_left_out(message_path(), fault);
+  } else if (left_out_.size() == max_reported) {
+    report_left_out(message_path(), {std::nullopt, "there are more bad rows; `verify` lists all"});
+  }
+  if (left_out_.size() < max_left_out) left_out_.push_back(std::move(fault));
 }
 
 std::optional<std::vector<std::uint8_t>> MemoryTables::read_checked_bytes(ViewAttachment table,

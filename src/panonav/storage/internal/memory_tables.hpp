@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panonav/core/error.hpp"
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/memory_header.hpp"
@@ -65,6 +66,12 @@ struct StoredBytes {
 /// Tables of bytes that some views have.
 enum class ViewAttachment { thumbnails, features };
 
+/// A row that holds what no program of ours writes; the memory's other rows may be sound.
+class DamageError : public FileError {
+ public:
+  using FileError::FileError;
+};
+
 /// Storage of the rows of one memory: an SQLite file or a PostgreSQL server. `MemoryFile`,
 /// map_tables.hpp and route_tables.hpp decide what the rows mean and what is refused. Everything
 /// that the database refuses is thrown as a FileError of one line that names the memory.
@@ -97,10 +104,42 @@ class MemoryTables {
   [[nodiscard]] virtual const std::filesystem::path& path() const noexcept = 0;
   /// Returns the path that messages of damage name.
   [[nodiscard]] virtual const std::filesystem::path& message_path() const noexcept = 0;
+  /// Throws DamageError.
   [[noreturn]] void fail_damaged(std::string_view what) const;
+  /// True if others than this program's user may write rows, as on a server: a bad row is then left
+  /// out and noted, so that it keeps nobody from the other rows. In a file it is a fault.
+  [[nodiscard]] virtual bool tolerates_bad_rows() const noexcept { return false; }
+  /// Runs `work`, which reads one row. Returns false if it threw DamageError and the row was left
+  /// out; where bad rows are not tolerated, and for other errors, the error is thrown on.
+  template <class Work>
+  bool accept_row(std::optional<ViewId> view, const Work& work) {
+    try {
+      work();
+      return true;
+    } catch (const DamageError& error) {
+      if (!tolerates_bad_rows()) throw;
+      leave_out(view, error.what());
+      return false;
+    }
+  }
+  /// Notes that a row was left out, for the handler of `set_left_out_handler` as well, unless it is
+  /// known. `view`: the one that is missing now, nullopt if it is another row.
+  void leave_out(std::optional<ViewId> view, std::string_view what);
+  /// Largest number of faults that are kept, so that noting one stays cheap. Chosen.
+  static constexpr std::size_t max_left_out = 1000;
+  /// Returns what was left out since the memory was opened, up to `max_left_out` rows.
+  [[nodiscard]] const std::vector<MemoryFile::Fault>& left_out() const noexcept {
+    return left_out_;
+  }
+  /// True if the view itself was left out.
+  [[nodiscard]] bool is_left_out(ViewId view) const { return left_out_views_.contains(view); }
+  [[nodiscard]] const std::set<ViewId>& left_out_views() const noexcept { return left_out_views_; }
+  /// Removes the memory's path and "is damaged: " from the beginning of a message.
+  [[nodiscard]] std::string shorten_message(std::string_view message) const;
   /// Throws FileError on a number that no view has.
   [[nodiscard]] ViewId to_view_id(std::int64_t number) const;
-  /// The row itself. Throws FileError when it does not match its checksum.
+  /// The row itself. Throws DamageError when it does not match its checksum, and on values out of
+  /// range (`validate` of reference_validation.hpp).
   const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
   /// Returns the link of the row. Throws as above, and on values that no link has.
   [[nodiscard]] Link checked(const LinkRow& row) const;
@@ -187,6 +226,10 @@ class MemoryTables {
   /// to read despite faults. Returns the ids of all views found.
   [[nodiscard]] virtual std::set<ViewId> verify_structure(const Check& check) = 0;
   [[nodiscard]] virtual MemoryFile::Info info() = 0;
+
+ private:
+  std::vector<MemoryFile::Fault> left_out_;
+  std::set<ViewId> left_out_views_;
 };
 
 }  // namespace panonav

@@ -1,5 +1,6 @@
 #include "panonav/storage/internal/memory_verification.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <set>
 #include <utility>
@@ -32,6 +33,10 @@ class MemoryVerification {
     check([&] { verify_maps(tables_, is_known, check_part); });
     check([&] { verify_routes(tables_, check_part); });
     check([&] { static_cast<void>(tables_.history()); });
+    // Rows of a server that the functions above left out.
+    for (const MemoryFile::Fault& fault : tables_.left_out()) {
+      if (std::ranges::find(faults_, fault) == faults_.end()) faults_.push_back(fault);
+    }
     return std::move(faults_);
   }
 
@@ -40,12 +45,7 @@ class MemoryVerification {
     try {
       part();
     } catch (const Error& error) {
-      std::string what = error.what();
-      for (const std::string& prefix :
-           {tables_.message_path().string() + ": ", std::string("is damaged: ")}) {
-        if (what.starts_with(prefix)) what.erase(0, prefix.size());
-      }
-      faults_.push_back({view, std::move(what)});
+      faults_.push_back({view, tables_.shorten_message(error.what())});
     }
   }
 

@@ -39,13 +39,16 @@ CREATE TABLE panonav.settings(
   PRIMARY KEY (memory, key),
   CHECK (num_nonnulls(integer_value, real_value, text_value, bytes_value) = 1));
 
+-- A row that breaks a CHECK would be left out by every reader (validate of reference_validation.hpp).
 -- Signatures do not compress and are as long as a quarter of a page: they stay in their row.
 CREATE TABLE panonav.views(
   memory bigint REFERENCES panonav.memories ON DELETE CASCADE,
   id bigint CHECK (id BETWEEN 1 AND 4294967295),
-  name text COLLATE "C" NOT NULL,
-  x_m double precision, y_m double precision, heading_rad double precision,
-  stamp_s double precision,
+  name text COLLATE "C" NOT NULL CHECK (octet_length(name) BETWEEN 1 AND 4096),
+  x_m double precision CHECK (x_m BETWEEN -1e7 AND 1e7),
+  y_m double precision CHECK (y_m BETWEEN -1e7 AND 1e7),
+  heading_rad double precision CHECK (heading_rad BETWEEN -1e300 AND 1e300),
+  stamp_s double precision CHECK (stamp_s BETWEEN -1e12 AND 1e12),
   session bigint,
   signature bytea NOT NULL,
   checksum bigint NOT NULL,
@@ -68,7 +71,8 @@ CREATE TABLE panonav.features(
 ALTER TABLE panonav.features ALTER bytes SET STORAGE EXTERNAL;
 CREATE TABLE panonav.links(
   memory bigint REFERENCES panonav.memories ON DELETE CASCADE,
-  a bigint, b bigint, kind bigint NOT NULL, checksum bigint NOT NULL,
+  a bigint CHECK (a > 0), b bigint CHECK (b BETWEEN a + 1 AND 4294967295),
+  kind bigint NOT NULL CHECK (kind BETWEEN 0 AND 2), checksum bigint NOT NULL,
   PRIMARY KEY (memory, a, b));
 CREATE INDEX links_by_b ON panonav.links(memory, b);
 CREATE TABLE panonav.maps(

@@ -14,11 +14,13 @@ BEGIN
   RETURN NULL;
 END $$;
 -- Returns null, or the table in which a row is not as the change left it. Settings are notes on the
--- views, which are checked when they are used: newer ones stay.
+-- views, which are checked when they are used: newer ones stay. Fails on rows of other tables or
+-- memories: a curator may write any, and whoever undoes them may have more rights.
 CREATE FUNCTION panonav.undo(memory_id bigint) RETURNS text LANGUAGE plpgsql AS $$
 DECLARE
   change record;
   key text;
+  row_memory bigint;
   changed_rows bigint;
 BEGIN
   FOR change IN SELECT * FROM panonav.undo_rows WHERE memory = memory_id ORDER BY number DESC LOOP
@@ -26,6 +28,17 @@ BEGIN
       WHEN 'features' THEN 'view' WHEN 'links' THEN 'a, b' WHEN 'maps' THEN 'name'
       WHEN 'routes' THEN 'name' WHEN 'route_blocks' THEN 'route, number' WHEN 'settings' THEN 'key'
       END;
+    IF key IS NULL THEN
+      RAISE data_corrupted USING MESSAGE =
+        format('a row kept for undo is of the table %s, which undo does not change', change.relation);
+    END IF;
+    IF change.before IS NOT NULL THEN
+      EXECUTE format('SELECT ($1::panonav.%I).memory', change.relation) INTO row_memory
+        USING change.before;
+      IF row_memory IS DISTINCT FROM memory_id THEN
+        RAISE data_corrupted USING MESSAGE = 'a row kept for undo is of another memory';
+      END IF;
+    END IF;
     IF change.after IS NOT NULL THEN
       EXECUTE format('DELETE FROM panonav.%1$I t WHERE memory = $2 AND (%2$s) = '
         '(SELECT %2$s FROM (SELECT ($1::panonav.%1$I).*) k) AND t::text = $1',
