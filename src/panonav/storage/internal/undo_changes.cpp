@@ -82,9 +82,9 @@ class ChangeReader {
 
   std::span<const std::uint8_t> take(std::size_t count) {
     if (count > rest_.size()) fail("it is cut");
-    const auto taken = rest_.first(count);
+    const auto bytes = rest_.first(count);
     rest_ = rest_.subspan(count);
-    return taken;
+    return bytes;
   }
   std::uint8_t take_byte() { return take(1).front(); }
 
