@@ -208,7 +208,7 @@ class LargeFile {
 void first_answer(benchmark::State& state, bool kept) {
   const LargeFile large(static_cast<int>(state.range(0)));
   MemoryFile file = MemoryFile::open(large.path(), Access::read_write);
-  if (kept) keep_models(file);
+  if (kept) learn_and_store_models(file);
   const Image picture(128, 20);
   for (auto _ : state) {
     const PlaceRecogniser recogniser(large.path());

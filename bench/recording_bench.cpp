@@ -59,7 +59,7 @@ void read(benchmark::State& state) {
     std::uint64_t sum = 0;
     recordings::Recording::open(bench_path())
         ->for_each(topics, {},
-                   [&](const recordings::MessagePlace&, auto bytes) { sum += bytes.size(); });
+                   [&](const recordings::MessageLocation&, auto bytes) { sum += bytes.size(); });
     if (sum != pictures * picture_bytes) state.SkipWithError("messages are missing");
   }
   set_speed(state);

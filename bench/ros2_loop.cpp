@@ -155,7 +155,7 @@ std::vector<Point2> drive_of(const std::vector<Point2>& places, double length_m,
 recordings::ros::PoseStamped in_map(const Pose2& pose) {
   recordings::ros::PoseStamped message;
   message.header.frame_id = "map";
-  message.pose = recordings::ros::pose_of(pose);
+  message.pose = recordings::ros::to_pose(pose);
   return message;
 }
 
@@ -164,16 +164,16 @@ struct Judge {
       : participant({.node = "judge"}, [](const std::string& line) { puts(line.c_str()); }) {
     hear<recordings::ros::PoseStamped>(
         "ground_truth", [this](const recordings::ros::PoseStamped& message) {
-          truth = recordings::ros::planar(message.pose);
+          truth = recordings::ros::to_pose2(message.pose);
           now_s = 1e-9 * static_cast<double>(message.header.stamp_ns);
           seen = true;
         });
     hear<recordings::ros::TFMessage>("/tf", [this](const recordings::ros::TFMessage& message) {
       for (const auto& each : message.transforms) {
         if (each.child_frame_id == "base_link")
-          odom_from_base = recordings::ros::planar(each.transform);
+          odom_from_base = recordings::ros::to_pose2(each.transform);
         if (each.child_frame_id != "odom") continue;
-        map_from_odom = recordings::ros::planar(each.transform);
+        map_from_odom = recordings::ros::to_pose2(each.transform);
         if (last_transform_s > 0.0) gaps_ms.push_back(1e3 * (wall_s() - last_transform_s));
         last_transform_s = wall_s();
       }

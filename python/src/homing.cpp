@@ -192,7 +192,7 @@ void bind_catchment(py::module_& m) {
           [](const NamedSurvey& s, std::size_t goal, double accepted_m) {
             require(goal < s.survey.goals.size(), "goal", static_cast<double>(goal),
                     "0 to " + std::to_string(s.survey.goals.size() - 1));
-            return count_catchment(s, goal, accepted_m);
+            return count_places_in_catchment(s, goal, accepted_m);
           },
           py::arg("goal"), py::arg("accepted_m"),
           "Number of places from which runs to this goal end so near.");
@@ -288,7 +288,7 @@ void bind_homing(py::module_& m) {
             const py::gil_scoped_release free;
             InterruptibleExecutor executor(threads);
             std::vector<NamedWay> ways;
-            make_in_order(
+            process_in_order(
                 dataset.entries.size(), executor,
                 [&](std::size_t i) {
                   return way_from(guide, read_observation(dataset.entries[i]));

@@ -101,7 +101,7 @@ std::vector<NamedPlace> localise_all(const SharedRecogniser& recogniser, const D
   return recogniser.read([&](const PlaceRecogniser& r) {
     InterruptibleExecutor executor(threads);
     std::vector<NamedPlace> places;
-    make_in_order(
+    process_in_order(
         recording.entries.size(), executor,
         [&](std::size_t i) {
           const DatasetEntry& entry = recording.entries[i];
@@ -217,14 +217,15 @@ std::vector<NamedEstimate> track_recording(Tracker& tracker, Dataset run, std::s
   }
   std::vector<NamedEstimate> estimates;
   std::size_t moved = 0;
-  make_in_order((run.entries.size() + every - 1) / every, executor,
-                [&](std::size_t i) {
-                  return tracker.encoder().packed(read_observation(run.entries[i * every]));
-                },
-                [&](std::size_t i, PackedSignature&& view) {
-                  for (; moved <= i * every; ++moved) tracker.move_to(*run.entries[moved].odometry);
-                  estimates.push_back({tracker.observe(view), run.entries[i * every].file});
-                });
+  process_in_order((run.entries.size() + every - 1) / every, executor,
+                   [&](std::size_t i) {
+                     return tracker.encoder().packed(read_observation(run.entries[i * every]));
+                   },
+                   [&](std::size_t i, PackedSignature&& view) {
+                     for (; moved <= i * every; ++moved)
+                       tracker.move_to(*run.entries[moved].odometry);
+                     estimates.push_back({tracker.observe(view), run.entries[i * every].file});
+                   });
   return estimates;
 }
 

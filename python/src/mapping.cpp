@@ -43,7 +43,7 @@ Mapper::Result make_map(const Dataset& recording, const std::filesystem::path& p
   const bool there = memory_exists(path);
   Mapper mapper(there ? MemoryFile::open(path, Access::read_write)
                       : MemoryFile::create(
-                            path, make_header_of_recording(recording, signature, {}, executor)),
+                            path, make_header_from_recording(recording, signature, {}, executor)),
                 recording.source, options);
   if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), executor);
   return mapper.map(recording, executor);

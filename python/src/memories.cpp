@@ -368,7 +368,8 @@ void bind_memory_file(py::module_& m) {
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.route_names(); }); },
           "Of the routes in the file, ascending.")
       .def(
-          "keep_models", [](SharedFile& s) { s.change([](MemoryFile& f) { keep_models(f); }); },
+          "keep_models",
+          [](SharedFile& s) { s.change([](MemoryFile& f) { learn_and_store_models(f); }); },
           "Learns what localisation needs of the views and keeps it in the file; to be called "
           "when views or poses have changed.")
       .def("__repr__", [](const SharedFile& s) {

@@ -10,7 +10,7 @@ RobotNavigatorOptions navigator_options(const std::optional<std::string>& edges,
                                         const py::kwargs& keywords) {
   RobotNavigatorOptions options{.route = route};
   if (edges) {
-    options.edges = find_graph_origin(*edges);
+    options.edges = parse_graph_origin(*edges);
     if (!options.edges) {
       throw ContractError("edges", "'" + *edges + "'", "map, lattice, links, arrangement");
     }

@@ -112,7 +112,7 @@ void bind_following(py::module_& m) {
         RouteFollower follower(MemoryFile::open(memory, Access::read_only), dataset.source,
                                options);
         std::vector<NamedStep> steps;
-        make_in_order(
+        process_in_order(
             dataset.entries.size(), executor,
             [&](std::size_t i) { return follower.encode(read_observation(dataset.entries[i])); },
             [&](std::size_t i, std::vector<float>&& line) {
@@ -141,7 +141,7 @@ RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesyst
   RouteRecorder recorder(
       memory_exists(memory)
           ? MemoryFile::open(memory, Access::read_write)
-          : MemoryFile::create(memory, make_header_of_recording(dataset, {}, {}, executor)),
+          : MemoryFile::create(memory, make_header_from_recording(dataset, {}, {}, executor)),
       dataset.source, options);
   return recorder.record(dataset, poses, executor);
 }

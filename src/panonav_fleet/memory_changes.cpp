@@ -10,7 +10,7 @@
 
 namespace panonav::fleet {
 
-MemoryArea area_of(double x_m, double y_m) {
+MemoryArea to_memory_area(double x_m, double y_m) {
   return {std::floor(x_m / memory_area_side_m), std::floor(y_m / memory_area_side_m)};
 }
 

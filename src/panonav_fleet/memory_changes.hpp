@@ -20,7 +20,7 @@ struct MemoryArea {
 inline constexpr double memory_area_side_m = 10.0;
 
 /// Returns the area of a position.
-[[nodiscard]] MemoryArea area_of(double x_m, double y_m);
+[[nodiscard]] MemoryArea to_memory_area(double x_m, double y_m);
 
 /// A change that somebody made in a memory on a server.
 struct MemoryChange {

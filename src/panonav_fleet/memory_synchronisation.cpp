@@ -18,8 +18,8 @@ std::vector<MemoryArea> areas_around(double x_m, double y_m, double radius_m) {
   require(std::isfinite(x_m), "x_m", x_m, "finite");
   require(std::isfinite(y_m), "y_m", y_m, "finite");
   require(std::isfinite(radius_m) && radius_m >= 0.0, "radius_m", radius_m, ">= 0, finite");
-  const MemoryArea low = area_of(x_m - radius_m, y_m - radius_m);
-  const MemoryArea high = area_of(x_m + radius_m, y_m + radius_m);
+  const MemoryArea low = to_memory_area(x_m - radius_m, y_m - radius_m);
+  const MemoryArea high = to_memory_area(x_m + radius_m, y_m + radius_m);
   constexpr double max_areas = 1e6;
   const double areas = (high.column - low.column + 1.0) * (high.row - low.row + 1.0);
   require(areas <= max_areas, "areas within radius_m", areas, "up to a million");
@@ -53,8 +53,8 @@ void require_path_and_address(const std::filesystem::path& file,
 namespace {
 
 /// The memory on the server, made like the file where there is none.
-std::unique_ptr<ServerExchange> connect_or_make(const ServerAddress& address,
-                                                const MemoryHeader& header) {
+std::unique_ptr<ServerExchange> connect_or_create_memory(const ServerAddress& address,
+                                                         const MemoryHeader& header) {
   if (auto found = ServerExchange::connect(address)) return found;
   try {
     create_postgresql_memory(address, header, {});
@@ -84,7 +84,7 @@ SynchronisationReport synchronise_memory(const std::filesystem::path& file,
     create_memory_tables(file, to_header(exchange->tables().settings()), {});
   }
   OpenedMemory opened = open_memory_tables(file, Access::read_write);
-  if (!exchange) exchange = connect_or_make(address, opened.header);
+  if (!exchange) exchange = connect_or_create_memory(address, opened.header);
   Synchronisation synchronisation(static_cast<SqliteTables&>(*opened.tables),
                                   std::move(opened.header), *exchange, options, advance);
   SynchronisationReport report = synchronisation.run();

@@ -26,9 +26,9 @@ namespace panonav::fleet {
 
 namespace {
 
-std::optional<MemoryArea> area_at(const std::optional<Point2>& position) {
+std::optional<MemoryArea> to_memory_area_if_known(const std::optional<Point2>& position) {
   if (!position) return std::nullopt;
-  return area_of(position->x_m, position->y_m);
+  return to_memory_area(position->x_m, position->y_m);
 }
 
 /// Views that are being sketched.
@@ -45,7 +45,7 @@ class Sketcher {
     if (!is_accepted) return false;
     ids_.push_back(row.id);
     magnitudes_.insert(magnitudes_.end(), row.magnitudes.begin(), row.magnitudes.end());
-    areas_.emplace_back(row.id, area_at(row.position));
+    areas_.emplace_back(row.id, to_memory_area_if_known(row.position));
     if (ids_.size() < views_per_batch) return false;
     flush();
     return true;
@@ -55,7 +55,7 @@ class Sketcher {
     ids_.clear();
     magnitudes_.clear();
   }
-  void note_areas(AreasOfViews& areas) {
+  void store_areas(AreasOfViews& areas) {
     for (const auto& [view, area] : areas_) areas.set(view, area);
     areas_.clear();
   }
@@ -83,7 +83,7 @@ struct PlaceSearch::Implementation {
     OpenedMemory opened = open_memory_tables(path, Access::read_only);
     header = std::move(opened.header);
     own = std::move(opened.tables);
-    read_all();
+    sketch_all_views();
   }
 
   [[nodiscard]] std::unique_ptr<MemoryTables> connect() const {
@@ -92,7 +92,7 @@ struct PlaceSearch::Implementation {
 
   /// The range of ids is cut into a part for each connection; a part is in the order of the ids,
   /// which is mostly the order of recording.
-  void read_all() {
+  void sketch_all_views() {
     const std::uint32_t last = own->last_id();
     const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
     const std::size_t parts = last < 100000 ? 1 : std::min<std::size_t>(cores, 16);
@@ -103,9 +103,9 @@ struct PlaceSearch::Implementation {
         return static_cast<std::uint32_t>(std::uint64_t{last} * i / parts);
       };
       const auto reading = tables.transaction(MemoryTables::Kind::reading);
-      const auto note_areas = [&] {
+      const auto store_areas = [&] {
         const std::lock_guard lock(mutex);
-        sketchers[part].note_areas(areas);
+        sketchers[part].store_areas(areas);
       };
       // A limited number of ids at a time, so that a server uses its index and does not sort them
       // all.
@@ -114,12 +114,12 @@ struct PlaceSearch::Implementation {
         const std::uint32_t end = before + std::min(at_a_time, border(part + 1) - before);
         tables.read_magnitudes({before + 1}, {end}, header.shape.size(),
                                [&](const MagnitudesRow& row) {
-                                 if (sketchers[part].add(tables, row)) note_areas();
+                                 if (sketchers[part].add(tables, row)) store_areas();
                                });
         before = end;
       }
       sketchers[part].flush();
-      note_areas();
+      store_areas();
     };
     std::vector<std::thread> threads;
     for (std::size_t part = 1; part < parts; ++part) {
@@ -234,7 +234,7 @@ struct PlaceSearch::Implementation {
         const double y_m = area.row * memory_area_side_m;
         for (const PositionRow& row :
              own->views_within({x_m, x_m + memory_area_side_m, y_m, y_m + memory_area_side_m})) {
-          if (area_of(row.pose.x_m, row.pose.y_m) != area) continue;
+          if (to_memory_area(row.pose.x_m, row.pose.y_m) != area) continue;
           there.push_back(row.id);
           if (areas.has(row.id)) areas.set(row.id, area);  // it may have moved
         }
@@ -253,7 +253,8 @@ struct PlaceSearch::Implementation {
       own->read_available_views(removed, [&](const ViewRow& row) {
         elsewhere.push_back(row.id);
         const auto& pose = row.info.pose;
-        areas.set(row.id, area_at(pose ? std::optional(pose->position()) : std::nullopt));
+        areas.set(row.id,
+                  to_memory_area_if_known(pose ? std::optional(pose->position()) : std::nullopt));
       });
       std::ranges::sort(elsewhere);
       std::erase_if(removed,
@@ -274,7 +275,7 @@ struct PlaceSearch::Implementation {
     next.erase(removed);
     next.insert(sketcher.sketches);
     for (const ViewId view : removed) areas.erase(view);
-    sketcher.note_areas(areas);
+    sketcher.store_areas(areas);
     publish(std::move(next));
     return true;
   }

@@ -20,7 +20,7 @@ constexpr std::uint8_t start_of_image = 0xd8;
 constexpr std::uint8_t end_of_image = 0xd9;
 
 /// Stand alone, without a length: fill bytes, stuffed zeros, TEM and restart markers.
-bool has_no_length(std::uint8_t kind) {
+bool is_marker_without_length(std::uint8_t kind) {
   return kind == 0x00 || kind == 0x01 || (kind >= 0xd0 && kind <= 0xd7);
 }
 
@@ -117,7 +117,7 @@ std::optional<std::vector<std::uint8_t>> JpegStream::next() {
     const std::uint8_t kind = buffer_[walked_ + 1];
     if (kind == marker) {
       ++walked_;
-    } else if (has_no_length(kind)) {
+    } else if (is_marker_without_length(kind)) {
       walked_ += 2;
     } else if (kind == end_of_image) {
       const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(walked_ + 2);

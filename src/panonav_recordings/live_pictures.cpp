@@ -115,9 +115,10 @@ class AddressInput final : public Input {
         std::exchange(is_first_, false) ? 3.0 * max_silence_s_ : max_silence_s_;
     auto frame = video_.next(std::chrono::milliseconds(static_cast<int>(1000.0 * max_wait_s)));
     if (frame) return RawPicture{std::move(frame->picture), now_s(), Steady::now(), 0};
-    throw FileError(address_,
-                    "was interrupted" +
-                        (video_.trouble().empty() ? "" : ": " + mask_passwords(video_.trouble())));
+    throw FileError(
+        address_,
+        "was interrupted" +
+            (video_.last_error().empty() ? "" : ": " + mask_passwords(video_.last_error())));
   }
   void stop() noexcept override { video_.stop(); }
 
@@ -163,7 +164,7 @@ struct LivePictures::Implementation {
   }
 
   /// Takes pictures until the input ends.
-  void take_all() {
+  void receive_all() {
     while (auto picture = input->take()) {
       std::unique_lock lock(mutex);
       counts.dropped += picture->lost;
@@ -180,7 +181,7 @@ struct LivePictures::Implementation {
   void work() {
     while (!stopped) {
       try {
-        take_all();
+        receive_all();
         break;
       } catch (const Error& error) {
         const std::lock_guard lock(mutex);

@@ -86,6 +86,6 @@ struct CameraFormat {
 };
 
 /// Lists the formats and sizes that a camera (V4L2) offers. Throws FileError when there is none.
-[[nodiscard]] std::vector<CameraFormat> camera_formats(const std::filesystem::path& device);
+[[nodiscard]] std::vector<CameraFormat> list_camera_formats(const std::filesystem::path& device);
 
 }  // namespace panonav::recordings

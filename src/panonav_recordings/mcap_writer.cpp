@@ -118,7 +118,7 @@ struct McapWriter::State {
     if (descriptor >= 0) ::close(std::exchange(descriptor, -1));
   }
 
-  void put_chunk() {
+  void write_chunk() {
     if (chunk.empty()) return;
     const std::uint32_t chunk_sum = compute_crc(chunk);
     std::span<const std::uint8_t> stored = chunk;
@@ -171,7 +171,7 @@ struct McapWriter::State {
     chunk_time = {};
   }
 
-  void put_summary() {
+  void write_summary() {
     put(Bytes().record(McapRecord::data_end, Bytes().number(sum)));
     Bytes counts;
     for (std::size_t i = 0; i < channels.size(); ++i) {
@@ -294,20 +294,20 @@ void McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns,
   s.time.add(time);
   ++used.messages;
   ++s.messages;
-  if (s.chunk.size() >= s.options.chunk_bytes) s.put_chunk();
+  if (s.chunk.size() >= s.options.chunk_bytes) s.write_chunk();
 }
 
 void McapWriter::flush() {
   state_->require_open();
-  state_->put_chunk();
+  state_->write_chunk();
 }
 
 void McapWriter::close() {
   State& s = *state_;
   if (s.has_failed) s.require_open();
   if (s.descriptor < 0) return;
-  s.put_chunk();
-  s.put_summary();
+  s.write_chunk();
+  s.write_summary();
   if (::fsync(s.descriptor) != 0 && errno != EINVAL && errno != EROFS && errno != ENOTSUP) s.fail();
   if (::close(std::exchange(s.descriptor, -1)) != 0) s.fail();
 }

@@ -21,7 +21,7 @@ using MessageBytes = std::span<const std::uint8_t>;
 
 constexpr std::int64_t second_ns = 1'000'000'000;
 
-std::string name_by_stamp(std::int64_t ns) {
+std::string make_name_from_stamp(std::int64_t ns) {
   const std::string fraction =
       std::to_string(second_ns + ((ns % second_ns) + second_ns) % second_ns);
   const std::int64_t seconds = ns / second_ns - (ns % second_ns < 0 ? 1 : 0);
@@ -39,22 +39,22 @@ class RecordedPictures : public PictureStore {
  public:
   /// `places` are those of messages of the types sensor_msgs/Image and CompressedImage.
   RecordedPictures(fs::path path, std::shared_ptr<const Recording> recording,
-                   std::vector<MessagePlace> places);
+                   std::vector<MessageLocation> places);
   [[nodiscard]] Image read(std::size_t index) const override;
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> encoded(std::size_t index) const override;
 
  private:
   fs::path path_;
   std::shared_ptr<const Recording> recording_;
-  std::vector<MessagePlace> places_;
+  std::vector<MessageLocation> places_;
 };
 
 RecordedPictures::RecordedPictures(fs::path path, std::shared_ptr<const Recording> recording,
-                                   std::vector<MessagePlace> places)
+                                   std::vector<MessageLocation> places)
     : path_(std::move(path)), recording_(std::move(recording)), places_(std::move(places)) {}
 
 Image RecordedPictures::read(std::size_t index) const {
-  const MessagePlace& place = places_.at(index);
+  const MessageLocation& place = places_.at(index);
   const RecordedTopic& topic = recording_->topics()[place.topic];
   const auto bytes = recording_->read(place);
   const std::string name =
@@ -70,7 +70,7 @@ Image RecordedPictures::read(std::size_t index) const {
 }
 
 std::optional<std::vector<std::uint8_t>> RecordedPictures::encoded(std::size_t index) const {
-  const MessagePlace& place = places_.at(index);
+  const MessageLocation& place = places_.at(index);
   const RecordedTopic& topic = recording_->topics()[place.topic];
   if (topic.type == ros::Image::type) return std::nullopt;
   const auto bytes = recording_->read(place);
@@ -132,9 +132,9 @@ class EntryMaker {
 
  private:
   [[nodiscard]] std::string make_unique_name(std::int64_t ns) {
-    std::string name = name_by_stamp(ns);
+    std::string name = make_name_from_stamp(ns);
     for (int copy = 2; !names_.insert(name).second; ++copy) {
-      name = name_by_stamp(ns) + "_" + std::to_string(copy);
+      name = make_name_from_stamp(ns) + "_" + std::to_string(copy);
     }
     return name;
   }
@@ -202,7 +202,7 @@ Dataset read_recording(std::shared_ptr<const Recording> recording, const fs::pat
   RecordedMessages messages =
       collect_messages(path, *recording, choose_topics(*recording, path, topics, source));
   const bool by_log = messages.sort();
-  std::vector<MessagePlace> places;
+  std::vector<MessageLocation> places;
   for (const RecordedPicture& picture : messages.pictures) places.push_back(picture.place);
   const auto store = std::make_shared<const RecordedPictures>(path, recording, std::move(places));
 

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 using Files = std::vector<std::unique_ptr<const RecordingFile>>;
 
-bool is_earlier(const MessagePlace& a, const MessagePlace& b) {
+bool is_earlier(const MessageLocation& a, const MessageLocation& b) {
   return std::tie(a.time_ns, a.file, a.block, a.offset) <
          std::tie(b.time_ns, b.file, b.block, b.offset);
 }
@@ -70,27 +70,27 @@ class FilesRecording : public Recording {
     return lines;
   }
 
-  [[nodiscard]] std::vector<MessagePlace> places(std::span<const std::uint32_t> topics,
-                                                 std::optional<TimeSpan> within) const override {
+  [[nodiscard]] std::vector<MessageLocation> places(std::span<const std::uint32_t> topics,
+                                                    std::optional<TimeSpan> within) const override {
     const Filter filter = make_filter(topics, within);
-    std::vector<MessagePlace> places;
+    std::vector<MessageLocation> places;
     for (const Block& block : blocks_) list(block, filter, places);
     std::ranges::sort(places, is_earlier);
     return places;
   }
 
-  [[nodiscard]] std::vector<std::uint8_t> read(const MessagePlace& place) const override {
+  [[nodiscard]] std::vector<std::uint8_t> read(const MessageLocation& place) const override {
     const RecordedMessage message = message_at(place);
     return {message.bytes.begin(), message.bytes.end()};
   }
 
   void for_each(std::span<const std::uint32_t> topics, std::optional<TimeSpan> within,
-                const std::function<void(const MessagePlace&, std::span<const std::uint8_t>)>& use)
-      const override {
+                const std::function<void(const MessageLocation&, std::span<const std::uint8_t>)>&
+                    use) const override {
     const Filter filter = make_filter(topics, within);
     // The remaining messages of a block. Blocks are opened as time reaches them.
     struct Open {
-      std::vector<MessagePlace> places;
+      std::vector<MessageLocation> places;
       std::size_t next = 0;
     };
     const auto is_later = [](const Open& a, const Open& b) {
@@ -115,7 +115,7 @@ class FilesRecording : public Recording {
       if (open.empty()) return;
       std::ranges::pop_heap(open, is_later);
       Open& first = open.back();
-      const MessagePlace place = first.places[first.next++];
+      const MessageLocation place = first.places[first.next++];
       if (first.next == first.places.size()) {
         listed -= first.places.size();
         open.pop_back();
@@ -165,7 +165,7 @@ class FilesRecording : public Recording {
   }
 
   // Appends; `listed`: number of places in addition to `places`.
-  void list(const Block& block, const Filter& filter, std::vector<MessagePlace>& places,
+  void list(const Block& block, const Filter& filter, std::vector<MessageLocation>& places,
             std::size_t listed = 0) const {
     if (block.time.begin_ns > filter.within.end_ns || block.time.end_ns < filter.within.begin_ns) {
       return;
@@ -184,7 +184,7 @@ class FilesRecording : public Recording {
     }
   }
 
-  [[nodiscard]] RecordedMessage message_at(const MessagePlace& place) const {
+  [[nodiscard]] RecordedMessage message_at(const MessageLocation& place) const {
     require(place.file < files_.size(), "file of a message", place.file,
             "less than " + std::to_string(files_.size()));
     const RecordingFile& file = *files_[place.file];

@@ -31,13 +31,13 @@ struct RecordedTopic {
 };
 
 /// Position of a message in its recording.
-struct MessagePlace {
+struct MessageLocation {
   std::int64_t time_ns = 0;  ///< time of recording (log time)
   std::uint32_t topic = 0;   ///< index into `Recording::topics()`
   std::uint32_t file = 0;    ///< these three are internal to the recording
   std::uint64_t block = 0;   ///< number of a chunk in its file; 0 without chunks
   std::uint64_t offset = 0;  ///< of the message within it, or its row
-  friend bool operator==(const MessagePlace&, const MessagePlace&) = default;
+  friend bool operator==(const MessageLocation&, const MessageLocation&) = default;
 };
 
 /// A span of time, both ends included.
@@ -83,19 +83,19 @@ class Recording {
   /// Returns the places of the messages of these topics within the span, by time; of one time, in
   /// the order of the files. Throws FileError when there are more than the limit, ContractError on
   /// an unknown topic. Chunks outside of the span are not read.
-  [[nodiscard]] virtual std::vector<MessagePlace> places(
+  [[nodiscard]] virtual std::vector<MessageLocation> places(
       std::span<const std::uint32_t> topics, std::optional<TimeSpan> within = {}) const = 0;
 
   /// Returns the bytes of a message. Several threads may call at a time; fastest in the order of
   /// `places`. Throws FileError when the message is in a damaged chunk.
-  [[nodiscard]] virtual std::vector<std::uint8_t> read(const MessagePlace& place) const = 0;
+  [[nodiscard]] virtual std::vector<std::uint8_t> read(const MessageLocation& place) const = 0;
 
   /// Passes the messages that `places` would list to `use`, in that order. Bytes are valid until
   /// `use` returns. Damaged chunks are left out, with a warning. Needs no list of all messages:
   /// only of those chunks that overlap in time.
   virtual void for_each(
       std::span<const std::uint32_t> topics, std::optional<TimeSpan> within,
-      const std::function<void(const MessagePlace& place, std::span<const std::uint8_t> bytes)>&
+      const std::function<void(const MessageLocation& place, std::span<const std::uint8_t> bytes)>&
           use) const = 0;
 };
 

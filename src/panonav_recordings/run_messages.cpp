@@ -13,13 +13,13 @@ void PointValues::add(const Point2& point, double value) {
 }
 
 ros::PointCloud2 PointValues::message(std::int64_t stamp_ns, const std::string& frame,
-                                      const std::string& fourth) const {
+                                      const std::string& value_name) const {
   static_assert(std::endian::native == std::endian::little);
   constexpr std::uint32_t step = 16;
   ros::PointCloud2 cloud;
   cloud.header = {stamp_ns, frame};
   cloud.width = static_cast<std::uint32_t>(values.size() / 4);
-  cloud.fields = {{"x", 0, 7, 1}, {"y", 4, 7, 1}, {"z", 8, 7, 1}, {fourth, 12, 7, 1}};
+  cloud.fields = {{"x", 0, 7, 1}, {"y", 4, 7, 1}, {"z", 8, 7, 1}, {value_name, 12, 7, 1}};
   cloud.point_step = step;
   cloud.row_step = step * cloud.width;
   cloud.data = std::span(reinterpret_cast<const std::uint8_t*>(values.data()),

@@ -31,9 +31,9 @@ struct PointValues {
 
   /// Appends a point at z = 0 with its fourth value.
   void add(const Point2& point, double value);
-  /// Returns a cloud of the fields x, y, z and `fourth`.
+  /// Returns a cloud of the fields x, y, z and `value_name`.
   [[nodiscard]] ros::PointCloud2 message(std::int64_t stamp_ns, const std::string& frame,
-                                         const std::string& fourth) const;
+                                         const std::string& value_name) const;
 };
 
 /// Draws `count` particles evenly by weight, without randomness; all of them if there are fewer.

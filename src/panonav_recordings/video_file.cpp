@@ -142,7 +142,7 @@ class VideoStore final : public PictureStore {
       start(number, sought);
       if (auto picture = decode_up_to(stamp_to_find)) return std::move(*picture);
     }
-    const std::string why = frames_->trouble();
+    const std::string why = frames_->last_error();
     frames_.reset();
     throw FileError(file_, "the image at " + format_number(seconds(stamp_to_find)) +
                                " s cannot be decoded" +

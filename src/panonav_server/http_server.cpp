@@ -72,7 +72,7 @@ struct Connection {
     due = heard + std::chrono::seconds(is_pause ? idle_timeout_s : request_timeout_s);
   }
   /// Gives a body the time for `bytes` more; time is not saved up by who was quick.
-  void extend_by(std::size_t bytes) {
+  void extend_deadline(std::size_t bytes) {
     heard = Clock::now();
     due = std::min(due + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
                              static_cast<double>(bytes) / min_body_bytes_per_s)),
@@ -160,7 +160,7 @@ MHD_Result put(Connection& one, HttpAnswer answer, std::string_view headers) {
 
 }  // namespace
 
-bool is_own_page(const HttpRequest& request) {
+bool is_same_origin(const HttpRequest& request) {
   const std::string name = request.host.substr(0, request.host.rfind(':'));
   in_addr ignored{};
   return (name == "localhost" || inet_pton(AF_INET, name.c_str(), &ignored) == 1) &&
@@ -233,7 +233,7 @@ struct HttpServer::Implementation {
     const int events = MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
     std::optional<Clock::time_point> last;  // when the last answers are to be sent
     Clock::time_point ticked{};
-    while (!last || (Clock::now() < *last && has_last_answers())) {
+    while (!last || (Clock::now() < *last && is_sending_answers())) {
       std::array<pollfd, 2> waiting{pollfd{wake, POLLIN, 0}, pollfd{events, POLLIN, 0}};
       MHD_UNSIGNED_LONG_LONG due_ms = 0;
       const bool is_due = MHD_get_timeout(daemon, &due_ms) == MHD_YES && due_ms == 0;
@@ -284,7 +284,7 @@ struct HttpServer::Implementation {
   }
 
   /// True while answers other than streams are being sent.
-  bool has_last_answers() const {
+  bool is_sending_answers() const {
     return std::ranges::any_of(connections, [](const Connection& one) {
       return !one.evicted && one.stage == Stage::answering && !one.more;
     });
@@ -337,9 +337,9 @@ struct HttpServer::Implementation {
     auto& server = *static_cast<Implementation*>(self);
     Connection& one = get_connection(handle);
     if (one.evicted) return MHD_NO;
-    if (!one.has_head) return server.take_head(one, path, method, version);
+    if (!one.has_head) return server.handle_head(one, path, method, version);
     if (*size > 0) {
-      server.take_piece(one, {data, std::exchange(*size, 0)});
+      server.append_body_part(one, {data, std::exchange(*size, 0)});
       return MHD_YES;
     }
     if (one.refused_body != 0) {
@@ -353,13 +353,14 @@ struct HttpServer::Implementation {
     return MHD_YES;
   }
 
-  MHD_Result take_head(Connection& one, const char* path, const char* method, const char* version) {
+  MHD_Result handle_head(Connection& one, const char* path, const char* method,
+                         const char* version) {
     one.has_head = true;
     one.request = {.method = method, .path = path};
     if (one.stage == Stage::idle) one.enter(Stage::reading);
     MHD_set_connection_option(one.handle, MHD_CONNECTION_OPTION_TIMEOUT, request_timeout_s);
     HttpHead head = read_http_head(one.handle, method, version, options.max_body, one.request);
-    if (head.status == 0 && head.body_bytes > 0 && has_full_bodies(0)) head.status = 503;
+    if (head.status == 0 && head.body_bytes > 0 && exceeds_body_limit(0)) head.status = 503;
     if (head.status != 0) return put(one, {.status = head.status}, options.headers);
     HeadVerdict verdict = judge(one.request);
     one.trusted = one.trusted || verdict.is_trusted;
@@ -377,16 +378,16 @@ struct HttpServer::Implementation {
   }
 
   /// True if the received bytes of all bodies and `more` bytes exceed the limit.
-  [[nodiscard]] bool has_full_bodies(std::size_t more) const {
+  [[nodiscard]] bool exceeds_body_limit(std::size_t more) const {
     std::size_t bytes = more;
     for (const Connection& one : connections) bytes += one.request.body.size();
     return bytes >= std::max(options.max_bodies, options.max_body) + (more > 0 ? 1 : 0);
   }
 
-  void take_piece(Connection& one, std::string_view piece) const {
-    one.extend_by(piece.size());
+  void append_body_part(Connection& one, std::string_view piece) const {
+    one.extend_deadline(piece.size());
     if (one.refused_body != 0) return;
-    if (has_full_bodies(piece.size())) {
+    if (exceeds_body_limit(piece.size())) {
       one.refused_body = 503;
       one.request.body = {};
       return;

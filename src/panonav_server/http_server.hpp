@@ -56,7 +56,7 @@ struct HttpServerOptions {
 
 /// True if a request went to a number or to "localhost", and no page of another origin made it:
 /// then no foreign name server can have led a browser here (DNS rebinding).
-[[nodiscard]] bool is_own_page(const HttpRequest& request);
+[[nodiscard]] bool is_same_origin(const HttpRequest& request);
 
 /// True if the two are equal; takes the same time wherever they differ.
 [[nodiscard]] bool is_same_secret(std::string_view sent, std::string_view secret);

@@ -42,7 +42,7 @@ constexpr std::chrono::seconds time_for_last_answers(5);
 constexpr ImageLimits picture_limits{
     .side_px = 16384, .area_px = 33'554'432, .scanned_px = std::int64_t{16} * 33'554'432};
 
-bool is_name(std::string_view name) {
+bool is_valid_memory_name(std::string_view name) {
   return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
            c == '_' || c == '.';
@@ -72,7 +72,7 @@ HttpAnswer make_json_answer(const ordered_json& document, int status = 200) {
           .content = document.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n"};
 }
 
-HttpAnswer make_refusal(int status, std::string_view why) {
+HttpAnswer make_error(int status, std::string_view why) {
   return make_json_answer({{"error", to_readable_line(std::string(why))}}, status);
 }
 
@@ -107,7 +107,7 @@ struct LocalisationServer::Implementation {
             "0 .. 1024");
     require(options.max_waiting >= 1, "max_waiting", 0, "at least 1");
     for (const ServedMemory& memory : memories) {
-      if (!is_name(memory.name)) {
+      if (!is_valid_memory_name(memory.name)) {
         throw ContractError("name of a memory", to_readable_line(memory.name),
                             "1 to 64 letters, digits, '-', '_' and '.'");
       }
@@ -163,7 +163,7 @@ struct LocalisationServer::Implementation {
   // ---- on the thread that speaks HTTP
 
   HttpAnswer answer(HttpRequest request) {
-    HttpAnswer result = answer_to(std::move(request));
+    HttpAnswer result = dispatch(std::move(request));
     if (result.status >= 400) {
       const std::lock_guard lock(mutex);
       ++refused[result.status];
@@ -176,17 +176,17 @@ struct LocalisationServer::Implementation {
     if (head.path == "/health") return {};
     std::optional<HttpAnswer> refusal;
     if (options.token.empty()) {
-      if (!is_own_page(head)) {
-        refusal = make_refusal(403,
-                               "without a token this server answers programs that call it by its "
-                               "number or as localhost");
+      if (!is_same_origin(head)) {
+        refusal = make_error(403,
+                             "without a token this server answers programs that call it by its "
+                             "number or as localhost");
       }
     } else {
       constexpr std::string_view bearer = "Bearer ";
       const std::string_view sent = head.authorization;
       if (!sent.starts_with(bearer) || !is_same_secret(sent.substr(bearer.size()), options.token)) {
         refusal =
-            make_refusal(401, "the token of this server is missing: Authorization: Bearer TOKEN");
+            make_error(401, "the token of this server is missing: Authorization: Bearer TOKEN");
       }
     }
     if (!refusal) return {.is_trusted = true};
@@ -195,22 +195,22 @@ struct LocalisationServer::Implementation {
     return {.refusal = std::move(refusal)};
   }
 
-  HttpAnswer answer_to(HttpRequest request) {
+  HttpAnswer dispatch(HttpRequest request) {
     constexpr std::string_view memories = "/v1/memories";
     const std::string_view path = request.path;
     if (path == "/health") {
-      if (request.method != "GET") return make_refusal(405, "allowed: GET");
+      if (request.method != "GET") return make_error(405, "allowed: GET");
       const std::lock_guard lock(mutex);
       return make_json_answer({{"status", ending ? "ending" : "ok"}}, ending ? 503 : 200);
     }
     if (path == "/metrics" || path == memories || path == "/") {
-      if (request.method != "GET") return make_refusal(405, "allowed: GET");
+      if (request.method != "GET") return make_error(405, "allowed: GET");
       if (path == "/metrics") return metrics();
       return list();
     }
     if (!path.starts_with(memories) || path.size() < memories.size() + 2 ||
         path[memories.size()] != '/') {
-      return make_refusal(404, "no such path; GET /v1/memories lists what there is");
+      return make_error(404, "no such path; GET /v1/memories lists what there is");
     }
     const std::string_view rest = path.substr(memories.size() + 1);
     const std::size_t slash = std::min(rest.find('/'), rest.size());
@@ -219,17 +219,16 @@ struct LocalisationServer::Implementation {
     {
       const std::lock_guard lock(mutex);
       if (!served.contains(name)) {
-        return make_refusal(404,
-                            "no memory " + name + "; GET /v1/memories lists those that there are");
+        return make_error(404,
+                          "no memory " + name + "; GET /v1/memories lists those that there are");
       }
     }
     if (below == "/localise") {
-      if (request.method != "POST") return make_refusal(405, "allowed: POST, with a PNG or JPEG");
-      if (request.body.empty())
-        return make_refusal(422, "the body is empty; allowed: a PNG or JPEG");
+      if (request.method != "POST") return make_error(405, "allowed: POST, with a PNG or JPEG");
+      if (request.body.empty()) return make_error(422, "the body is empty; allowed: a PNG or JPEG");
       return enqueue(name, std::move(request.body), "");
     }
-    if (request.method != "GET") return make_refusal(405, "allowed: GET");
+    if (request.method != "GET") return make_error(405, "allowed: GET");
     if (below.empty()) return make_json_answer(describe(name));
     constexpr std::string_view views = "/views/";
     constexpr std::string_view picture = "/picture";
@@ -239,7 +238,7 @@ struct LocalisationServer::Implementation {
           name, "",
           decode_percent(below.substr(views.size(), below.size() - views.size() - picture.size())));
     }
-    return make_refusal(404, "no such path; allowed: localise and views/NAME/picture");
+    return make_error(404, "no such path; allowed: localise and views/NAME/picture");
   }
 
   HttpAnswer enqueue(const std::string& name, std::string picture, std::string view) {
@@ -253,7 +252,7 @@ struct LocalisationServer::Implementation {
       const std::lock_guard lock(mutex);
       if (ending || lane.waiting.size() >= options.max_waiting ||
           lane.waiting_bytes + bytes > max_waiting_bytes) {
-        return make_refusal(
+        return make_error(
             503, ending ? "the server is ending" : "too many images wait; try again in a moment");
       }
       lane.waiting_bytes += bytes;
@@ -263,7 +262,7 @@ struct LocalisationServer::Implementation {
     return {.later = [job]() -> std::optional<HttpAnswer> {
       if (job->answered) return std::move(job->answer);
       if (Clock::now() < job->came + request_deadline) return std::nullopt;
-      return make_refusal(503, "there was no answer in time; try again in a moment");
+      return make_error(503, "there was no answer in time; try again in a moment");
     }};
   }
 
@@ -336,10 +335,10 @@ struct LocalisationServer::Implementation {
       bool known = false;
       HttpAnswer answer;
       if (ending && from > last_answer) {
-        answer = make_refusal(503, "the server is ending");
+        answer = make_error(503, "the server is ending");
       } else if (job->came < one.failed) {
         // Each would wait for a server that is silent.
-        answer = make_refusal(503, describe_unreadable(job->memory));
+        answer = make_error(503, describe_unreadable(job->memory));
       } else {
         if (is_picture) queueing.add(from - job->came);
         const std::shared_ptr<LoadedMemory> memory = one.loaded;
@@ -366,9 +365,9 @@ struct LocalisationServer::Implementation {
       observation.emplace(
           decode_image(std::span(bytes, job.picture.size()), "the image", picture_limits));
     } catch (const Error& error) {
-      return make_refusal(422, error.what());
+      return make_error(422, error.what());
     } catch (const std::exception&) {
-      return make_refusal(500, "the image cannot be decoded");
+      return make_error(500, "the image cannot be decoded");
     }
     try {
       const Place place = memory.recogniser.localise(*observation);
@@ -377,11 +376,11 @@ struct LocalisationServer::Implementation {
       json.update(place_json(place));
       return make_json_answer(json);
     } catch (const FileError& error) {
-      return make_memory_refusal(503, job.memory, error);
+      return make_memory_error(503, job.memory, error);
     } catch (const Error& error) {
-      return make_refusal(422, error.what());
+      return make_error(422, error.what());
     } catch (const std::exception& error) {
-      return make_memory_refusal(500, job.memory, error);
+      return make_memory_error(500, job.memory, error);
     }
   }
 
@@ -390,23 +389,23 @@ struct LocalisationServer::Implementation {
     try {
       const auto picture = memory.thumbnail(job.view);
       is_silent = false;
-      if (!picture) return make_refusal(404, "the memory has no view of that name with an image");
+      if (!picture) return make_error(404, "the memory has no view of that name with an image");
       const bool jpeg = image_format(*picture, "the image") == ImageFormat::jpeg;
       return {.type = jpeg ? "image/jpeg" : "image/png",
               .content = std::string(picture->begin(), picture->end())};
     } catch (const std::exception& error) {
-      return make_memory_refusal(is_silent ? 503 : 500, job.memory, error);
+      return make_memory_error(is_silent ? 503 : 500, job.memory, error);
     }
   }
 
   /// Reports the fault to the operator of the server: it may hold addresses, which clients must not
   /// see.
-  HttpAnswer make_memory_refusal(int status, const std::string& name, const std::exception& error) {
+  HttpAnswer make_memory_error(int status, const std::string& name, const std::exception& error) {
     report_loss(name, to_readable_line(error.what()));
     const std::lock_guard lock(mutex);
     // One picture that cannot be answered says nothing about the others.
     if (status == 503) served.at(name).failed = Clock::now();
-    return make_refusal(status, describe_unreadable(name));
+    return make_error(status, describe_unreadable(name));
   }
   static std::string describe_unreadable(const std::string& name) {
     return "the memory " + name + " cannot be read now; try again in a moment";

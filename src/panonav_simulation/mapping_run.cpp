@@ -23,7 +23,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-float largest_structure(const MappingRecording& recording, int components) {
+float largest_nonconstant_magnitude(const MappingRecording& recording, int components) {
   float largest = 0.0F;
   const std::size_t every = std::max<std::size_t>(1, recording.views.size() / 32);
   for (std::size_t i = 0; i < recording.views.size(); i += every) {
@@ -105,7 +105,7 @@ MappedRecording map_recording(const MappingRecording& recording, const MappingRu
   require(!recording.views.empty(), "views of a recording", 0.0, ">= 1");
   MappedRecording result;
   const SignatureShape shape{recording.views.front().rows(), options.components};
-  VisualMemory memory(shape, largest_structure(recording, options.components),
+  VisualMemory memory(shape, largest_nonconstant_magnitude(recording, options.components),
                       recording.views.front().elevations());
   TopologicalMapper mapper(memory, options.mapping, options.odometry, options.closure);
   double total_s = 0.0;

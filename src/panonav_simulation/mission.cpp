@@ -29,9 +29,9 @@ constexpr double room_m = 0.2;
 // Largest distance between the lines of a route.
 constexpr double line_spacing_m = 0.1;
 
-std::vector<FourierSignature> render_signatures(const MissionPlace& place,
-                                                const std::vector<Pose2>& poses, std::uint64_t seed,
-                                                Executor& executor) {
+std::vector<FourierSignature> sense_views(const MissionPlace& place,
+                                          const std::vector<Pose2>& poses, std::uint64_t seed,
+                                          Executor& executor) {
   return make_each(executor, poses.size(), [&](std::size_t i) {
     return sense_view(place, poses[i], Random(seed, i).next());
   });
@@ -130,7 +130,7 @@ RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m, std::
     if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
     poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
   }
-  const auto views = render_signatures(place, poses, seed, executor);
+  const auto views = sense_views(place, poses, seed, executor);
   VisualMemory memory = make_empty_memory(views);
   for (std::size_t i = 0; i < views.size(); ++i) {
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
@@ -148,7 +148,7 @@ RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m, std::
 RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
                                const OdometryNoise& wheels, std::uint64_t seed,
                                Executor& executor) {
-  const auto views = render_signatures(place, poses, seed, executor);
+  const auto views = sense_views(place, poses, seed, executor);
   const auto odometry = simulate_odometry(poses, wheels, seed);
   VisualMemory memory = make_empty_memory(views);
   TopologicalMapper mapper(memory);

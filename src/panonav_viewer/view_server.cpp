@@ -141,7 +141,7 @@ struct ViewServer::Implementation {
 
   /// Refuses strangers, who do not know the token.
   [[nodiscard]] server::HeadVerdict judge(const server::HttpRequest& head) const {
-    if (head.path.starts_with('/') && server::is_own_page(head) &&
+    if (head.path.starts_with('/') && server::is_same_origin(head) &&
         server::is_same_secret(std::string_view(head.path).substr(1, token.size()), token)) {
       return {.is_trusted = true};
     }

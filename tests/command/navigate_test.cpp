@@ -153,12 +153,13 @@ TEST_F(Navigate, ARecordHoldsTheGoalThePlanAndTheDirections) {
                  {"/references", {"sensor_msgs/PointCloud2", 1}},
                  {"/visited", {"nav_msgs/OccupancyGrid", 1}}});
   Pose2 goal;
-  for_each_message<recordings::ros::PoseStamped>(
-      record, "/goal",
-      [&](const recordings::ros::PoseStamped& pose) { goal = recordings::ros::planar(pose.pose); });
+  for_each_message<recordings::ros::PoseStamped>(record, "/goal",
+                                                 [&](const recordings::ros::PoseStamped& pose) {
+                                                   goal = recordings::ros::to_pose2(pose.pose);
+                                                 });
   for_each_message<recordings::ros::Path>(record, "/plan", [&](const recordings::ros::Path& way) {
     ASSERT_FALSE(way.poses.empty());
-    EXPECT_NEAR(recordings::ros::planar(way.poses.back().pose).x_m, goal.x_m, 1e-9);
+    EXPECT_NEAR(recordings::ros::to_pose2(way.poses.back().pose).x_m, goal.x_m, 1e-9);
   });
 }
 

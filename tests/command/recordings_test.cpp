@@ -64,7 +64,8 @@ void repack(const fs::path& from, const fs::path& to, recordings::McapCompressio
                                              recordings::ros::ros2_schema(topic.type))));
   }
   recording->for_each(
-      topics, {}, [&](const recordings::MessagePlace& place, std::span<const std::uint8_t> bytes) {
+      topics, {},
+      [&](const recordings::MessageLocation& place, std::span<const std::uint8_t> bytes) {
         writer.write(channels[place.topic], place.time_ns, place.time_ns, bytes);
       });
   writer.close();
@@ -110,7 +111,8 @@ void write_bag(const fs::path& from, const fs::path& to) {
     topics.push_back(static_cast<std::uint32_t>(topics.size()));
   }
   recording->for_each(
-      topics, {}, [&](const recordings::MessagePlace& place, std::span<const std::uint8_t> bytes) {
+      topics, {},
+      [&](const recordings::MessageLocation& place, std::span<const std::uint8_t> bytes) {
         const std::string& type = recording->topics()[place.topic].type;
         const std::string data = type == recordings::ros::CompressedImage::type
                                      ? as_ros1<recordings::ros::CompressedImage>(bytes)
@@ -165,7 +167,8 @@ void write_rosbag2(const fs::path& from, const fs::path& folder) {
             "', '" + recordings::ros::ros2_type_name(topic.type) + "', 'cdr', '')");
   }
   recording->for_each(
-      topics, {}, [&](const recordings::MessagePlace& place, std::span<const std::uint8_t> bytes) {
+      topics, {},
+      [&](const recordings::MessageLocation& place, std::span<const std::uint8_t> bytes) {
         execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(" +
                     std::to_string(place.topic + 1) + ", " + std::to_string(place.time_ns) + ", ?)",
                 bytes);

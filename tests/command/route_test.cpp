@@ -185,7 +185,7 @@ TEST_F(RouteVerbs, ARecordHoldsTheRouteAndTheFixes) {
   for_each_message<recordings::ros::PoseWithCovarianceStamped>(
       file, "/pose", [&](const recordings::ros::PoseWithCovarianceStamped& pose) {
         EXPECT_GT(pose.pose.covariance[0], 0.0);
-        poses.push_back(recordings::ros::planar(pose.pose.pose));
+        poses.push_back(recordings::ros::to_pose2(pose.pose.pose));
       });
   std::size_t fixes = 0;
   for (const json& answer : answers) {

@@ -214,7 +214,7 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
   for_each_message<recordings::ros::PoseWithCovarianceStamped>(
       path("run.mcap"), "/pose", [&](const recordings::ros::PoseWithCovarianceStamped& pose) {
         EXPECT_EQ(pose.header.frame_id, "map");
-        poses.push_back(recordings::ros::planar(pose.pose.pose));
+        poses.push_back(recordings::ros::to_pose2(pose.pose.pose));
       });
   std::size_t at = 0;
   for (const auto& answer : answers) {

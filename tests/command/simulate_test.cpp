@@ -94,8 +94,8 @@ TEST_F(Simulate, ARecordOfASimulatedRunIsTheDataSetAgain) {
   for_each_message<recordings::ros::TFMessage>(
       record, "/tf", [&](const recordings::ros::TFMessage& tf) {
         ASSERT_EQ(tf.transforms.size(), 4U);
-        const Pose2 map_from_base = recordings::ros::planar(tf.transforms[2].transform) *
-                                    recordings::ros::planar(tf.transforms[1].transform);
+        const Pose2 map_from_base = recordings::ros::to_pose2(tf.transforms[2].transform) *
+                                    recordings::ros::to_pose2(tf.transforms[1].transform);
         EXPECT_NEAR(map_from_base.x_m, written.entries[moments++].pose->x_m, 1e-9);
       });
 }

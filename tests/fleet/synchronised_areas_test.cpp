@@ -23,8 +23,8 @@ TEST(MemoryAreas, AroundAPositionAreThoseThatTouchTheCircle) {
       const double angle_rad = random.uniform(0.0, 6.28);
       const double distance_m = radius_m * random.uniform();
       EXPECT_TRUE(std::ranges::binary_search(
-          areas,
-          area_of(x_m + distance_m * std::cos(angle_rad), y_m + distance_m * std::sin(angle_rad))));
+          areas, to_memory_area(x_m + distance_m * std::cos(angle_rad),
+                                y_m + distance_m * std::sin(angle_rad))));
     }
     // And none lies wholly beyond it.
     for (const MemoryArea& area : areas) {

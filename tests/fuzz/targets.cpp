@@ -118,14 +118,14 @@ void read_recording(Bytes bytes) {
     std::vector<std::uint32_t> topics;
     for (std::uint32_t i = 0; i < recording->topics().size(); ++i) topics.push_back(i);
     std::size_t read = 0;
-    recording->for_each(topics, {}, [&](const recordings::MessagePlace&, Bytes message) {
+    recording->for_each(topics, {}, [&](const recordings::MessageLocation&, Bytes message) {
       read += message.size();
     });
     const auto places = recording->places(topics);
-    if (!std::ranges::is_sorted(places, {}, &recordings::MessagePlace::time_ns)) {
+    if (!std::ranges::is_sorted(places, {}, &recordings::MessageLocation::time_ns)) {
       throw std::logic_error("places are not in order of time");
     }
-    for (const recordings::MessagePlace& place : places) {
+    for (const recordings::MessageLocation& place : places) {
       expect_value_or_line([&] { read += recording->read(place).size(); });
     }
     if (read > 0 && topics.empty()) throw std::logic_error("messages without a topic");

@@ -58,10 +58,10 @@ class KeptModels : public ::testing::Test {
 
 TEST_F(KeptModels, ComeBackFromTheFileToTheBit) {
   MemoryFile file = make_file();
-  EXPECT_EQ(load_kept_models(file, file.load()), std::nullopt);
-  keep_models(file);
+  EXPECT_EQ(load_stored_models(file, file.load()), std::nullopt);
+  learn_and_store_models(file);
   const VisualMemory memory = file.load();
-  const auto kept = load_kept_models(MemoryFile::open(path(), Access::read_only), memory);
+  const auto kept = load_stored_models(MemoryFile::open(path(), Access::read_only), memory);
   ASSERT_TRUE(kept);
   EXPECT_EQ(*kept, learn_models(memory));
   EXPECT_TRUE(kept->place.learnt);
@@ -72,19 +72,19 @@ TEST_F(KeptModels, ComeBackFromTheFileToTheBit) {
 
 TEST_F(KeptModels, AreTheSameInAProgramWithDecimalCommas) {
   MemoryFile file = make_file();
-  keep_models(file);
+  learn_and_store_models(file);
   const auto text = file.parameter("learnt models");
   ASSERT_TRUE(text);
   PANONAV_REQUIRE_COMMA_LOCALE(locale);
-  EXPECT_EQ(load_kept_models(file, file.load()), learn_models(file.load()));
+  EXPECT_EQ(load_stored_models(file, file.load()), learn_models(file.load()));
   file.set_parameter("learnt models", "");
-  keep_models(file);
+  learn_and_store_models(file);
   EXPECT_EQ(file.parameter("learnt models"), text);
 }
 
 TEST_F(KeptModels, OfAStrangerHoldNoNumberThatDoesNotFit) {
   MemoryFile file = make_file();
-  keep_models(file);
+  learn_and_store_models(file);
   const auto words = split_words(file.parameter("learnt models").value());
   for (const char* wrong : {"1e308", "0x1p+900", "1.5", "-", "99999999999"}) {
     std::string text;
@@ -93,26 +93,26 @@ TEST_F(KeptModels, OfAStrangerHoldNoNumberThatDoesNotFit) {
       text += (i == number_of_views ? wrong : words[i]) + std::string(" ");
     }
     file.set_parameter("learnt models", text);
-    EXPECT_EQ(load_kept_models(file), std::nullopt) << wrong;
+    EXPECT_EQ(load_stored_models(file), std::nullopt) << wrong;
   }
 }
 
 TEST_F(KeptModels, OfOtherViewsAreNotUsed) {
   MemoryFile file = make_file();
-  keep_models(file);
-  const auto outdated = [&] { return !load_kept_models(file, file.load()); };
+  learn_and_store_models(file);
+  const auto outdated = [&] { return !load_stored_models(file, file.load()); };
   EXPECT_FALSE(outdated());
   const ViewId last = file.append(view_at(99, 9.0, 9.0));
   EXPECT_TRUE(outdated());
-  keep_models(file);
+  learn_and_store_models(file);
   EXPECT_FALSE(outdated());
   file.set_pose(last, ReferencePose{9.0, 9.5, 0.3});
   EXPECT_TRUE(outdated());
-  keep_models(file);
+  learn_and_store_models(file);
   file.remove(std::vector{last});
   EXPECT_TRUE(outdated());
-  keep_models(file);
-  EXPECT_EQ(load_kept_models(file, file.load()).value(), learn_models(file.load()));
+  learn_and_store_models(file);
+  EXPECT_EQ(load_stored_models(file, file.load()).value(), learn_models(file.load()));
   file.set_parameter("learnt models", "1 nonsense");
   EXPECT_TRUE(outdated());
 }
@@ -121,7 +121,7 @@ TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {
   MemoryFile file = make_file();
   const PlaceRecogniser relearnt(file);
   Tracker tracker_anew(file);
-  keep_models(file);
+  learn_and_store_models(file);
   const PlaceRecogniser kept(file);
   Tracker tracker(file);
   EXPECT_EQ(kept.localiser().place_model(), relearnt.localiser().place_model());
@@ -148,8 +148,8 @@ TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {
 
 TEST_F(KeptModels, ASmallMemoryKeepsWhatItHas) {
   MemoryFile file = make_file(3);
-  keep_models(file);
-  const auto kept = load_kept_models(file, file.load());
+  learn_and_store_models(file);
+  const auto kept = load_stored_models(file, file.load());
   ASSERT_TRUE(kept);
   EXPECT_FALSE(kept->place.learnt);
   EXPECT_FALSE(kept->observation);
@@ -158,7 +158,7 @@ TEST_F(KeptModels, ASmallMemoryKeepsWhatItHas) {
 
 TEST_F(KeptModels, ARecogniserNeedsViewsAndFittingOptions) {
   MemoryFile file = make_file(0);
-  keep_models(file);
+  learn_and_store_models(file);
   EXPECT_THROW(PlaceRecogniser{file}, FileError);
   file.append(view_at(1, 0.0, 0.0));
   EXPECT_THROW(PlaceRecogniser(file, {.localiser = {.components = 7}}), ContractError);
@@ -184,7 +184,7 @@ TEST_F(KeptModels, AViewThatSomebodyForgetsMeanwhileHasNoFeatures) {
     view.features = pack(features);
     views.push_back(file.append(view));
   }
-  keep_models(file);  // or the recogniser reads them all to learn
+  learn_and_store_models(file);  // or the recogniser reads them all to learn
   const PlaceRecogniser recogniser(path());
   file.remove(views);
   int doubtful = 0;

@@ -68,7 +68,7 @@ TEST_F(Memorising, InBatchesOfAnySizeTheSameViewsAreStored) {
     headers.push_back(made.header());
     headers.back().created_s.reset();
     thumbnails.push_back(made.thumbnail(memories.back().views().back()).value());
-    EXPECT_TRUE(load_kept_models(made, memories.back()));
+    EXPECT_TRUE(load_stored_models(made, memories.back()));
   }
   for (std::size_t m = 1; m < memories.size(); ++m) {
     EXPECT_EQ(headers[m], headers[0]);

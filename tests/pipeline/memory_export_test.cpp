@@ -26,7 +26,7 @@ class Export : public MemoryFileTest {
       view.info.name = name;
       Panorama panorama(header.shape.rows, header.panorama_columns, header.elevations);
       for (float& value : panorama.values()) value = static_cast<float>(random.uniform(0.0, 1.0));
-      view.thumbnail = thumbnail_png(panorama);
+      view.thumbnail = encode_thumbnail(panorama);
       file.append(view);
     }
     return file;
@@ -113,7 +113,7 @@ TEST_F(Export, ThumbnailsOfWidePanoramasShowTheSameDirections) {
   for (int y = 0; y < 8; ++y) {
     for (int c = 100; c < 140; ++c) panorama.at(y, c) = y < 4 ? 1.0F : 0.5F;
   }
-  const auto back = thumbnail_panorama(thumbnail_png(panorama), header);
+  const auto back = panorama_from_thumbnail(encode_thumbnail(panorama), header);
   ASSERT_TRUE(back);
   EXPECT_EQ(back->elevations(), panorama.elevations());
   double along = 0.0;
@@ -124,9 +124,9 @@ TEST_F(Export, ThumbnailsOfWidePanoramasShowTheSameDirections) {
   }
   EXPECT_NEAR(along / weight, 119.5, 0.05) << "turned against the panorama";
   EXPECT_NEAR(back->at(6, 120), 0.5, 0.01);
-  EXPECT_FALSE(thumbnail_panorama(std::vector<std::uint8_t>{1, 2, 3}, header));
+  EXPECT_FALSE(panorama_from_thumbnail(std::vector<std::uint8_t>{1, 2, 3}, header));
   header.panorama_columns = 90;
-  EXPECT_FALSE(thumbnail_panorama(thumbnail_png(panorama), header)) << "of another size";
+  EXPECT_FALSE(panorama_from_thumbnail(encode_thumbnail(panorama), header)) << "of another size";
 }
 
 }  // namespace

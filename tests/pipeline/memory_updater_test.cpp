@@ -269,7 +269,7 @@ TEST_F(MemoryUpdating, AKillWhileARunIsStoredLeavesTheFileAsBeforeOrAfterIt) {
     const Remembered left = remembered();
     EXPECT_TRUE(left == learnt || (!stored && left == untouched));
     EXPECT_EQ(file().history().size(), left == learnt ? 1U : 0U);
-    EXPECT_TRUE(load_kept_models(file(), file().load())) << "the models are of other views";
+    EXPECT_TRUE(load_stored_models(file(), file().load())) << "the models are of other views";
   }
 }
 

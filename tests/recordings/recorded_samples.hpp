@@ -34,7 +34,7 @@ inline std::vector<std::uint32_t> all_topics(const Recording& recording) {
 
 inline Messages in_sequence(const Recording& recording, std::optional<TimeSpan> within = {}) {
   Messages messages;
-  recording.for_each(all_topics(recording), within, [&](const MessagePlace& place, auto bytes) {
+  recording.for_each(all_topics(recording), within, [&](const MessageLocation& place, auto bytes) {
     messages.push_back(
         {recording.topics()[place.topic].name, place.time_ns, {bytes.begin(), bytes.end()}});
   });

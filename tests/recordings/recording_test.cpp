@@ -173,7 +173,7 @@ TEST_F(RecordingTest, ADamagedChunkIsLeftOutAndNamed) {
   std::string bytes = bytes_of(written.path);
   // Within the bytes of the last message of the second chunk.
   const auto places = Recording::open(written.path)->places(std::array<std::uint32_t, 3>{0, 1, 2});
-  const auto in_second = std::ranges::find(places, 1U, &MessagePlace::block);
+  const auto in_second = std::ranges::find(places, 1U, &MessageLocation::block);
   ASSERT_NE(in_second, places.end());
   const auto& victim = *in_second;
   const auto content = Recording::open(written.path)->read(victim);

@@ -34,7 +34,7 @@ class RecordedMessages : public recordings::Recording {
       found = topics_.end() - 1;
     }
     ++found->messages;
-    recordings::MessagePlace place;
+    recordings::MessageLocation place;
     place.time_ns = log_ns;
     place.topic = static_cast<std::uint32_t>(found - topics_.begin());
     place.offset = messages_.size();
@@ -49,22 +49,22 @@ class RecordedMessages : public recordings::Recording {
     return std::nullopt;
   }
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
-  [[nodiscard]] std::vector<recordings::MessagePlace> places(
+  [[nodiscard]] std::vector<recordings::MessageLocation> places(
       std::span<const std::uint32_t> topics,
       std::optional<recordings::TimeSpan> /*within*/) const override {
-    std::vector<recordings::MessagePlace> found;
+    std::vector<recordings::MessageLocation> found;
     for (const auto& place : places_) {
       if (std::ranges::find(topics, place.topic) != topics.end()) found.push_back(place);
     }
-    std::ranges::stable_sort(found, {}, &recordings::MessagePlace::time_ns);
+    std::ranges::stable_sort(found, {}, &recordings::MessageLocation::time_ns);
     return found;
   }
   [[nodiscard]] std::vector<std::uint8_t> read(
-      const recordings::MessagePlace& place) const override {
+      const recordings::MessageLocation& place) const override {
     return messages_.at(place.offset);
   }
   void for_each(std::span<const std::uint32_t> topics, std::optional<recordings::TimeSpan> within,
-                const std::function<void(const recordings::MessagePlace&,
+                const std::function<void(const recordings::MessageLocation&,
                                          std::span<const std::uint8_t>)>& use) const override {
     for (const auto& place : places(topics, within)) use(place, messages_.at(place.offset));
   }
@@ -72,7 +72,7 @@ class RecordedMessages : public recordings::Recording {
  private:
   recordings::MessageEncoding encoding_;
   std::vector<recordings::RecordedTopic> topics_;
-  std::vector<recordings::MessagePlace> places_;
+  std::vector<recordings::MessageLocation> places_;
   std::vector<std::vector<std::uint8_t>> messages_;
 };
 
@@ -97,7 +97,7 @@ void for_each_message(const std::string& file, const std::string& topic, const U
     EXPECT_EQ(recording->topics()[i].type, Message::type);
     recording->for_each(
         std::array{i}, {},
-        [&](const recordings::MessagePlace&, std::span<const std::uint8_t> bytes) {
+        [&](const recordings::MessageLocation&, std::span<const std::uint8_t> bytes) {
           use(recordings::ros::read_message<Message>(bytes, recordings::MessageEncoding::cdr));
         });
   }

@@ -117,7 +117,7 @@ struct RememberedWorld {
   RememberedWorld(const ToyWorld& world, Point2 high, double spacing, std::uint64_t seed)
       : spacing_m(spacing), poses(), memory(remember(world, high, seed)) {}
 
-  [[nodiscard]] const Pose2& to_pose(ViewId view) const { return poses.at(view.value); }
+  [[nodiscard]] const Pose2& pose_of(ViewId view) const { return poses.at(view.value); }
 
  private:
   [[nodiscard]] VisualMemory remember(const ToyWorld& world, Point2 high, std::uint64_t seed) {

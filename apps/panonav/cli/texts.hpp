@@ -27,13 +27,13 @@ struct ExitMeaning {
 /// "Highest speed (default 0.3; > 0 and <= 100)".
 [[nodiscard]] std::string format_help_line(const ArgumentInfo& argument);
 /// "-o, --out FILE".
-[[nodiscard]] std::string forms(const ArgumentInfo& argument);
+[[nodiscard]] std::string format_forms(const ArgumentInfo& argument);
 /// "[OPTIONS] -o FILE IMAGE..."
 [[nodiscard]] std::string usage(const Description& description);
 /// The title above the arguments of its group in full texts: "Options of [localiser]".
 [[nodiscard]] std::string get_group_title(const ArgumentInfo& argument);
 /// Lines of at most 80 characters behind `indent` blanks; the first one begins at `column`.
-[[nodiscard]] std::string wrapped(std::string_view text, std::size_t indent, std::size_t column);
+[[nodiscard]] std::string wrap_text(std::string_view text, std::size_t indent, std::size_t column);
 
 /// Returns the text of `panonav VERB --help`, or of `--help-all`.
 [[nodiscard]] std::string format_help(const Description& description, bool all);

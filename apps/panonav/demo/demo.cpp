@@ -87,7 +87,7 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
 std::vector<LocalisedView> localise_all(const Localiser& localiser, const ViewEncoder& pipeline,
                                         const Dataset& queries, Executor& executor) {
   std::vector<std::optional<LocalisedView>> answers(queries.entries.size());
-  for_each_entry(executor, queries.entries.size(), [&](std::size_t i) {
+  parallel_for(executor, queries.entries.size(), [&](std::size_t i) {
     const auto& entry = queries.entries[i];
     PackedSignature signature = pipeline.packed(pipeline.read(entry));
     Place found = localiser.localise(signature);

@@ -124,7 +124,7 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
   const double accepted_m = result.spacing_m;
   const auto count = static_cast<double>(result.survey.places.size());
   auto sizes = rasterise(result.survey.goals, result.spacing_m, [&](std::size_t g) {
-    return 100.0 * static_cast<double>(count_catchment(result, g, accepted_m)) / count;
+    return 100.0 * static_cast<double>(count_places_in_catchment(result, g, accepted_m)) / count;
   });
   sizes.title = "Catchment area of the view at each place";
   sizes.value_label = "share of all places [%]";

@@ -40,48 +40,48 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
     std::optional<recordings::RunMoment> moment;
   };
   const auto every = static_cast<std::size_t>(every_nth);
-  make_in_order((run.entries.size() + every - 1) / every, executor,
-                [&](std::size_t i) {
-                  StageClock clock;
-                  const Observation observation = read_observation(run.entries[i * every]);
-                  clock.stage("reading");
-                  Seen seen{follower.encode(observation), std::nullopt};
-                  clock.stage("scanline");
-                  if (recorded == nullptr) return seen;
-                  seen.moment = recordings::make_moment(observation, i * every);
-                  seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
-                                                            observation.tilt.value_or(Tilt{}));
-                  clock.stage("for viewers");
-                  clock.add_to(*seen.moment);
-                  return seen;
-                },
-                [&](std::size_t i, Seen&& seen) {
-                  const std::size_t index = i * every;
-                  const DatasetEntry& entry = run.entries[index];
-                  StageClock clock;
-                  RouteFollower::Step step = follower.step(std::move(seen.line), entry.odometry);
-                  clock.stage("matching");
-                  if (seen.moment) clock.add_to(*seen.moment);
-                  FollowedImage image{index,
-                                      entry.file,
-                                      entry.stamp_s,
-                                      std::move(step.line),
-                                      std::move(step.fix),
-                                      std::move(step.changed),
-                                      std::nullopt,
-                                      std::nullopt,
-                                      std::move(seen.moment)};
-                  const auto& route = follower.tracker().lines().poses();
-                  if (!truth.empty()) {
-                    image.truth = truth[index];
-                    image.true_place = project_onto_route(route, truth[index].position());
-                  }
-                  if (image.moment) {
-                    describe(*image.moment, image);
-                    if (i == 0) image.moment->plan.assign(route.begin(), route.end());
-                  }
-                  report(std::move(image));
-                });
+  process_in_order((run.entries.size() + every - 1) / every, executor,
+                   [&](std::size_t i) {
+                     StageClock clock;
+                     const Observation observation = read_observation(run.entries[i * every]);
+                     clock.stage("reading");
+                     Seen seen{follower.encode(observation), std::nullopt};
+                     clock.stage("scanline");
+                     if (recorded == nullptr) return seen;
+                     seen.moment = recordings::make_moment(observation, i * every);
+                     seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
+                                                               observation.tilt.value_or(Tilt{}));
+                     clock.stage("for viewers");
+                     clock.add_to(*seen.moment);
+                     return seen;
+                   },
+                   [&](std::size_t i, Seen&& seen) {
+                     const std::size_t index = i * every;
+                     const DatasetEntry& entry = run.entries[index];
+                     StageClock clock;
+                     RouteFollower::Step step = follower.step(std::move(seen.line), entry.odometry);
+                     clock.stage("matching");
+                     if (seen.moment) clock.add_to(*seen.moment);
+                     FollowedImage image{index,
+                                         entry.file,
+                                         entry.stamp_s,
+                                         std::move(step.line),
+                                         std::move(step.fix),
+                                         std::move(step.changed),
+                                         std::nullopt,
+                                         std::nullopt,
+                                         std::move(seen.moment)};
+                     const auto& route = follower.tracker().lines().poses();
+                     if (!truth.empty()) {
+                       image.truth = truth[index];
+                       image.true_place = project_onto_route(route, truth[index].position());
+                     }
+                     if (image.moment) {
+                       describe(*image.moment, image);
+                       if (i == 0) image.moment->plan.assign(route.begin(), route.end());
+                     }
+                     report(std::move(image));
+                   });
 }
 
 FollowSummary summarise_follow(const std::vector<FollowedImage>& images, bool headings_known) {

@@ -102,7 +102,7 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
     const std::size_t count = std::min(batch, image_count - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
     std::vector<std::optional<recordings::RunMoment>> moments(count);
-    for_each_entry(executor, count, [&](std::size_t i) {
+    parallel_for(executor, count, [&](std::size_t i) {
       const std::size_t index = (begin + i) * every;
       StageClock clock;
       Observation observation = read_observation(entries[index]);

@@ -19,7 +19,7 @@ struct ViewSelection {
 void declare_selection(Arguments& arguments, ViewSelection& selection);
 
 /// Throws UsageError on values that are not understood.
-[[nodiscard]] std::vector<ViewRecord> selected(std::vector<ViewRecord> views,
-                                               const ViewSelection& selection);
+[[nodiscard]] std::vector<ViewRecord> select_views(std::vector<ViewRecord> views,
+                                                   const ViewSelection& selection);
 
 }  // namespace panonav::command

@@ -76,8 +76,8 @@ ordered_json to_json(const CatchmentArguments& arguments, const RecordedViews& g
   json["catchment_areas"] = std::move(areas);
   auto views = ordered_json::array();
   for (std::size_t g = 0; g < goals.files.size(); ++g) {
-    views.push_back(
-        {{"file", goals.files[g]}, {"places", count_catchment(result, g, result.spacing_m)}});
+    views.push_back({{"file", goals.files[g]},
+                     {"places", count_places_in_catchment(result, g, result.spacing_m)}});
   }
   json["views"] = std::move(views);
   return json;

@@ -35,7 +35,7 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
         [&] {
           forget_recordings(memory);
           memory.remove(find_all());
-          keep_models(memory);
+          learn_and_store_models(memory);
         },
         "forget: " + std::to_string(views.size()) + " views deleted");
   }

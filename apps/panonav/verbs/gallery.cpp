@@ -105,7 +105,7 @@ std::string make_caption(const ViewRecord& view, bool pictured) {
 
 ExitCode gallery(const GalleryArguments& arguments, Session& session) {
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
-  auto views = selected(list_views(memory), arguments.selection);
+  auto views = select_views(list_views(memory), arguments.selection);
   if (views.empty()) throw FileError(arguments.memory, "contains no such view");
   const std::size_t found = views.size();
   const auto pictured =

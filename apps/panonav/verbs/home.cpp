@@ -79,7 +79,7 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
   std::vector<HomeAnswer> answers;
   std::size_t pointing = 0;
   Progress progress(session, "homing", total);
-  make_in_order(
+  process_in_order(
       total, session.executor(),
       [&](std::size_t i) {
         const DatasetEntry& entry = recording.entries[i];
@@ -125,7 +125,7 @@ ExitCode home_from_memory(const Arguments& declared, const HomeArguments& argume
                           arguments.homing.views.horizon);
   reject_unused_rise(declared, guide.goal(), *arguments.memory);
   const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
-                  arguments.report ? thumbnail_panorama(file, view) : std::nullopt};
+                  arguments.report ? panorama_from_thumbnail(file, view) : std::nullopt};
   return answer_all(arguments, guide, goal, recording, session);
 }
 

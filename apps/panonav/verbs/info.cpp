@@ -175,7 +175,7 @@ ExitCode print_recording(const std::string& path, Session& session) {
 }
 
 ExitCode print_camera(const std::string& path, Session& session) {
-  const auto formats = recordings::camera_formats(path);
+  const auto formats = recordings::list_camera_formats(path);
   auto listed = ordered_json::array();
   for (const recordings::CameraFormat& format : formats) {
     auto sizes = ordered_json::array();

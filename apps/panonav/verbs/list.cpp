@@ -92,10 +92,10 @@ ExitCode list(const ListArguments& arguments, Session& session) {
   if (arguments.csv && session.json()) throw UsageError("--csv and --json cannot be combined");
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   const auto all = list_views(memory);
-  const auto views = selected(all, arguments.selection);
+  const auto views = select_views(all, arguments.selection);
   const ExitCode code = views.empty() ? ExitCode::no_answer : ExitCode::done;
   if (arguments.csv) {
-    std::string table = view_table(views);
+    std::string table = format_view_table(views);
     table.pop_back();
     session.print(table);
     return code;

@@ -56,7 +56,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
   std::vector<LocalisedQuery> answers;
   std::size_t printed = 0;
   std::exception_ptr failure;
-  make_in_order(
+  process_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) -> Answer {
         const DatasetEntry& entry = recording.entries[i];

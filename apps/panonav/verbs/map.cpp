@@ -177,7 +177,7 @@ Mapper::Result map_in_view(const MapArguments& arguments, const Dataset& recordi
   GrowingMap shown;
   std::optional<recordings::RunMoment> last;  // waits for what comes of it
   Progress progress(session, "mapping", recording.entries.size());
-  make_in_order(
+  process_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
         StageClock clock;
@@ -197,7 +197,7 @@ Mapper::Result map_in_view(const MapArguments& arguments, const Dataset& recordi
         const bool is_node = mapper.add(std::move(seen.view));
         clock.stage("mapping");
         clock.add_to(seen.moment);
-        shown.add_to(seen.moment, mapper.map_so_far(), is_node, seen.name);
+        shown.add_to(seen.moment, mapper.current_map(), is_node, seen.name);
         last = std::move(seen.moment);
         progress.advance();
       });
@@ -224,7 +224,7 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
     names.push_back(recording.entries[run.observations[i]].file);
   }
   Progress progress(session, "recording", recording.entries.size());
-  make_in_order(
+  process_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
         const Observation observation = read_observation(recording.entries[i]);
@@ -294,7 +294,7 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
     reject_options_without_effect(declared, arguments, recording, memory->header());
   } else {
     const MemoryHeader header =
-        make_header_of_recording(recording, arguments.signature, {}, session.executor());
+        make_header_from_recording(recording, arguments.signature, {}, session.executor());
     reject_options_without_effect(declared, arguments, recording, header);
     memory = MemoryFile::create(arguments.memory, header);
   }

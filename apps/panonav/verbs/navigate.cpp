@@ -267,7 +267,7 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
                                 .base = arguments.mission.base,
                                 .route = arguments.route,
                                 .known_route = arguments.known_route};
-  if (arguments.edges) options.edges = find_graph_origin(*arguments.edges);
+  if (arguments.edges) options.edges = parse_graph_origin(*arguments.edges);
   RobotNavigator robot(arguments.memory, arguments.goal, options, std::nullopt,
                        &session.executor());
   if (robot.memory().header().source.kind != PictureKind::mirror) {

@@ -99,7 +99,7 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
           file.remove(dropped);
           file.link(contract_links(memory.links(), selection));
           for (const auto& [name, map] : maps) file.save_map(name, map);
-          keep_models(file);
+          learn_and_store_models(file);
         },
         "prune: " + std::to_string(dropped.size()) + " views deleted");
   }

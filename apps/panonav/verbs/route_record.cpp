@@ -129,7 +129,7 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   RouteRecorder recorder(
       memory ? std::move(*memory)
              : MemoryFile::create(arguments.memory,
-                                  make_header_of_recording(dataset, {}, {}, session.executor())),
+                                  make_header_from_recording(dataset, {}, {}, session.executor())),
       dataset.source, options);
   std::optional<Progress> bar;
   const auto recorded = recorder.record(dataset, poses, session.executor(), [&](std::size_t lines) {

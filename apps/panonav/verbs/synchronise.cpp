@@ -67,7 +67,7 @@ ExitCode synchronise(const SynchroniseArguments& arguments, Session& session) {
   }();
   {
     MemoryFile file = MemoryFile::open(arguments.memory, Access::read_write);
-    keep_models(file);
+    learn_and_store_models(file);
   }
   if (session.json()) {
     session.print(json_line(ordered_json{{"memory", arguments.memory},

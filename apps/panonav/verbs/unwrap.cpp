@@ -63,7 +63,7 @@ ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recordin
                               {arguments.unwarper.rows, arguments.unwarper.columns});
   Progress progress(session, "unwrapping", recording.entries.size());
   std::optional<Panorama> last;
-  make_in_order(
+  process_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
         const Observation observation = read_observation(recording.entries[i]);

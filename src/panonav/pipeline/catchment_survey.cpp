@@ -140,7 +140,7 @@ RecordedViews read_views(const Dataset& recording, const HomingViewOptions& opti
   RecordedViews result;
   result.rotation_rad.resize(total);
   if (progress) progress("reading", 0, total);
-  make_in_order(
+  process_in_order(
       total, executor,
       [&](std::size_t index) {
         Panorama panorama = encoder.panorama(read_observation(recording.entries[index]));
@@ -221,7 +221,8 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
   return result;
 }
 
-std::size_t count_catchment(const CatchmentResult& result, std::size_t goal, double accepted_m) {
+std::size_t count_places_in_catchment(const CatchmentResult& result, std::size_t goal,
+                                      double accepted_m) {
   const std::size_t count = result.survey.places.size();
   const auto ends = std::span(result.final_m).subspan(goal * count, count);
   return static_cast<std::size_t>(std::ranges::count_if(

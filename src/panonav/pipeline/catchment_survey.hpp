@@ -85,7 +85,7 @@ struct CatchmentResult {
                                                const WorkProgress& progress = {});
 
 /// Counts the places from which runs to this goal end within `accepted_m`.
-[[nodiscard]] std::size_t count_catchment(const CatchmentResult& result, std::size_t goal,
-                                          double accepted_m);
+[[nodiscard]] std::size_t count_places_in_catchment(const CatchmentResult& result, std::size_t goal,
+                                                    double accepted_m);
 
 }  // namespace panonav

@@ -30,8 +30,8 @@ VisualMemory load_goal_view(const MemoryFile& memory, const std::string& goal) {
 
 HomingEncoder::HomingEncoder(const PictureSource& source, const HomingViewOptions& options)
     : pictures_(
-          OwnPictures{PanoramaReader(source, choose_panorama_shape(source, options.signature)),
-                      options.preprocessing}),
+          StandaloneReader{PanoramaReader(source, choose_panorama_shape(source, options.signature)),
+                           options.preprocessing}),
       components_(options.signature.components),
       horizon_(options.horizon) {}
 
@@ -41,7 +41,8 @@ HomingEncoder::HomingEncoder(const MemoryHeader& header, const PictureSource& so
       components_(check_components(header.shape, components)),
       horizon_(horizon) {}
 
-Panorama HomingEncoder::own_panorama(const OwnPictures& own, const Observation& observation) const {
+Panorama HomingEncoder::make_standalone_panorama(const StandaloneReader& own,
+                                                 const Observation& observation) const {
   const Tilt tilt = observation.tilt.value_or(Tilt{});
   const auto* ready = std::get_if<Panorama>(&observation.picture);
   Panorama panorama = ready ? level_panorama(*ready, tilt)
@@ -63,15 +64,16 @@ Panorama HomingEncoder::panorama(const Observation& observation) const {
   if (const auto* memory = std::get_if<ViewEncoder>(&pictures_)) {
     return memory->panorama(observation);
   }
-  return rethrow_with_file_name(
-      observation, [&] { return own_panorama(std::get<OwnPictures>(pictures_), observation); });
+  return rethrow_with_file_name(observation, [&] {
+    return make_standalone_panorama(std::get<StandaloneReader>(pictures_), observation);
+  });
 }
 
 HomingView HomingEncoder::view(const Panorama& panorama) const {
   if (const auto* memory = std::get_if<ViewEncoder>(&pictures_)) {
     return view(memory->signature(panorama));
   }
-  const auto& own = std::get<OwnPictures>(pictures_);
+  const auto& own = std::get<StandaloneReader>(pictures_);
   return view(compute_signature(preprocess(panorama, own.preprocessing), components_));
 }
 
@@ -133,7 +135,7 @@ HomingResult HomingGuide::home(const Observation& observation) const {
     const bool known = match.is_beyond_chance();
     return HomingResult{
         known,
-        known && points_home(found) ? std::optional(found.direction_rad()) : std::nullopt,
+        known && has_home_direction(found) ? std::optional(found.direction_rad()) : std::nullopt,
         found.length(),
         wrap_angle(-found.heading_rad),
         match.direction_probability(),

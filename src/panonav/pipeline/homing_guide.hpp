@@ -45,20 +45,21 @@ class HomingEncoder {
   [[nodiscard]] HomingView view(const FourierSignature& signature) const;
 
  private:
-  struct OwnPictures {
+  struct StandaloneReader {
     PanoramaReader reader;
     PreprocessingOptions preprocessing;
   };
-  [[nodiscard]] Panorama own_panorama(const OwnPictures& own, const Observation& observation) const;
+  [[nodiscard]] Panorama make_standalone_panorama(const StandaloneReader& own,
+                                                  const Observation& observation) const;
 
-  std::variant<OwnPictures, ViewEncoder> pictures_;
+  std::variant<StandaloneReader, ViewEncoder> pictures_;
   int components_;
   bool horizon_;
 };
 
 /// True if the vector has a direction: its length is at least its own standard deviation, so that
 /// it is more than its residual alone would make of it.
-[[nodiscard]] inline bool points_home(const HomeVector& found) noexcept {
+[[nodiscard]] inline bool has_home_direction(const HomeVector& found) noexcept {
   return found.length() > 0.0 && found.confidence >= 0.5;
 }
 
@@ -69,7 +70,7 @@ struct HomingResult {
   /// nothing.
   bool known = false;
   /// Direction of the goal in the robot's current frame, counter-clockwise from straight ahead.
-  /// Empty if nothing is known, and at the goal itself (`points_home`).
+  /// Empty if nothing is known, and at the goal itself (`has_home_direction`).
   std::optional<double> direction_rad;
   double distance_r = 0.0;  ///< in units of R, the typical distance of the surroundings
   double turn_rad = 0.0;    ///< rotation of the robot since it was at the goal

@@ -76,7 +76,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
   for (std::size_t begin = 0; begin < known.size(); begin += batch) {
     const std::size_t count = std::min(batch, known.size() - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
-    for_each_entry(executor, count, [&](std::size_t i) {
+    parallel_for(executor, count, [&](std::size_t i) {
       signatures[i] = encoder.packed(read_observation(*known[begin + i]));
     });
     for (std::size_t i = 0; i < count; ++i) {

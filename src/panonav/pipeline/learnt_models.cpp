@@ -172,9 +172,9 @@ LearntModels learn_models(const VisualMemory& memory, const FeatureSource& featu
   return models;
 }
 
-void keep_models(MemoryFile& file) {
+void learn_and_store_models(MemoryFile& file) {
   const VisualMemory memory = file.load();
-  if (memory.empty() || load_kept_models(file, memory)) return;
+  if (memory.empty() || load_stored_models(file, memory)) return;
   const LearntModels models = learn_models(memory, make_feature_source(file));
   Writer writer;
   writer.word(learning_version);
@@ -188,11 +188,11 @@ void keep_models(MemoryFile& file) {
   file.set_parameter(parameter_name, writer.text());
 }
 
-std::optional<LearntModels> load_kept_models(const MemoryFile& file, const VisualMemory& memory) {
+std::optional<LearntModels> load_stored_models(const MemoryFile& file, const VisualMemory& memory) {
   return read_models(file, &memory);
 }
 
-std::optional<LearntModels> load_kept_models(const MemoryFile& file) {
+std::optional<LearntModels> load_stored_models(const MemoryFile& file) {
   return read_models(file, nullptr);
 }
 

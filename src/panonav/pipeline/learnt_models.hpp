@@ -8,6 +8,6 @@ namespace panonav {
 /// positions between views, how views differ with distance), and keeps it in the file with a
 /// fingerprint of the views; does nothing where the file has it. To be called when views or poses
 /// have changed. Cost: loading, and up to some seconds of learning.
-void keep_models(MemoryFile& file);
+void learn_and_store_models(MemoryFile& file);
 
 }  // namespace panonav

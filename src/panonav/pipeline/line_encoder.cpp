@@ -17,13 +17,13 @@ std::string make_parameter_name(const std::string& name) {
 }
 
 /// A cylinder no higher than the line needs, as finely sampled as a usual camera sees the horizon.
-PanoramaShape line_panorama_shape(const PictureSource& pictures, const RouteSource& route) {
+PanoramaShape choose_line_panorama_shape(const PictureSource& pictures, const RouteSource& route) {
   if (pictures.kind == PictureKind::panorama) return {};
   constexpr int rows = 5;
   return {rows, std::min(4 * route.line.columns, 4096)};
 }
 
-PictureSource cut_to_horizon(PictureSource pictures, const RouteSource& route) {
+PictureSource crop_to_horizon(PictureSource pictures, const RouteSource& route) {
   if (pictures.kind == PictureKind::panorama) return pictures;
   const double half_rad = std::max(route.line.half_band_rad, radians(0.1));
   pictures.layout.kept_elevations = ElevationBand{-half_rad, half_rad};
@@ -74,7 +74,7 @@ void store_route_source(MemoryFile& memory, const std::string& name, const Route
 
 LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route)
     : route_(route),
-      reader_(cut_to_horizon(pictures, route), line_panorama_shape(pictures, route)) {
+      reader_(crop_to_horizon(pictures, route), choose_line_panorama_shape(pictures, route)) {
   if (route.horizon_rows &&
       (pictures.kind != PictureKind::panorama || pictures.layout.elevations)) {
     throw ContractError(
@@ -87,12 +87,12 @@ std::vector<float> LineEncoder::line(const Observation& observation) const {
   return rethrow_with_file_name(observation, [&] {
     const Tilt tilt = observation.tilt.value_or(Tilt{});
     if (const auto* ready = std::get_if<Panorama>(&observation.picture))
-      return line_of(level_panorama(*ready, tilt));
-    return line_of(reader_.convert(std::get<Image>(observation.picture).view(), tilt));
+      return make_line(level_panorama(*ready, tilt));
+    return make_line(reader_.convert(std::get<Image>(observation.picture).view(), tilt));
   });
 }
 
-std::vector<float> LineEncoder::line_of(const Panorama& panorama) const {
+std::vector<float> LineEncoder::make_line(const Panorama& panorama) const {
   if (!route_.horizon_rows) return horizon_scanline(panorama, route_.line);
   const auto [first, last] = *route_.horizon_rows;
   if (last >= panorama.rows()) {

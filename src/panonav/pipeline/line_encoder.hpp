@@ -42,7 +42,7 @@ class LineEncoder {
   [[nodiscard]] std::vector<float> line(const Observation& observation) const;
 
  private:
-  [[nodiscard]] std::vector<float> line_of(const Panorama& panorama) const;
+  [[nodiscard]] std::vector<float> make_line(const Panorama& panorama) const;
 
   RouteSource route_;
   PanoramaReader reader_;

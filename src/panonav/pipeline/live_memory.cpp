@@ -98,7 +98,7 @@ class Storer {
 };
 
 /// Returns the observation with its levelled panorama in place of the image.
-Observation with_panorama(const Observation& observation, Panorama panorama) {
+Observation copy_with_panorama(const Observation& observation, Panorama panorama) {
   Observation same(std::move(panorama));
   same.name = observation.name;
   same.file = observation.file;
@@ -198,7 +198,7 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
     self.panorama = self.recogniser->encoder().panorama(observation);
     answer.unwrapping = std::chrono::steady_clock::now() - before;
     self.answered = observation.name;
-    answer.place = self.recogniser->localise(with_panorama(observation, *self.panorama));
+    answer.place = self.recogniser->localise(copy_with_panorama(observation, *self.panorama));
   }
   bool is_placed_later = false;
   if (self.updater && answer.place && observation.odometry) {
@@ -234,7 +234,7 @@ void LiveMemory::add(Observation observation) {
     }
     ReferenceInfo info{observation.name, observation.pose, observation.stamp_s};
     PackedSignature signature = encoder.packed(*self.panorama);
-    store(with_panorama(observation, *std::exchange(self.panorama, std::nullopt)));
+    store(copy_with_panorama(observation, *std::exchange(self.panorama, std::nullopt)));
     self.recogniser->append(info, signature);
     self.added.emplace_back(std::move(info), std::move(signature));
   } else {

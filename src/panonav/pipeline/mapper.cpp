@@ -49,7 +49,7 @@ Mapper::EncodedView Mapper::encode(const Observation& observation) const {
     return {encoder_.signature(observation), info, observation.odometry, {}};
   }
   const Panorama panorama = encoder_.panorama(observation);
-  return {encoder_.signature(panorama), info, observation.odometry, thumbnail_png(panorama)};
+  return {encoder_.signature(panorama), info, observation.odometry, encode_thumbnail(panorama)};
 }
 
 bool Mapper::add(EncodedView encoded) {
@@ -86,7 +86,7 @@ bool Mapper::add(EncodedView encoded) {
 
 Mapper::Result Mapper::map(const Dataset& recording, Executor& executor,
                            const std::function<void()>& mapped) {
-  make_in_order(
+  process_in_order(
       recording.entries.size(), executor,
       [&](std::size_t i) { return encode(read_observation(recording.entries[i])); },
       [&](std::size_t, EncodedView&& encoded) {
@@ -117,7 +117,7 @@ Mapper::Result Mapper::finish() {
                        ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
       }
     }
-    keep_models(file_);
+    learn_and_store_models(file_);
   });
   return run_;
 }

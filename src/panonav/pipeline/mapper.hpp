@@ -82,7 +82,7 @@ class Mapper {
   Result finish();
 
   /// Returns the map so far, for display: `finish` still moves nodes. Cost: a copy.
-  [[nodiscard]] TopologicalMap map_so_far() const { return mapper_.map(); }
+  [[nodiscard]] TopologicalMap current_map() const { return mapper_.map(); }
   /// Returns the file that views are appended to.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
   /// Returns the encoder that makes views of pictures.

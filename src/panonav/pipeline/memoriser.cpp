@@ -29,8 +29,8 @@ std::string describe_observation(const Observation& observation) {
   return observation.file.empty() ? observation.name : observation.file.string();
 }
 
-Panorama first_panorama(const Observation& first, const PictureSource& source,
-                        const SignatureOptions& signature) {
+Panorama make_first_panorama(const Observation& first, const PictureSource& source,
+                             const SignatureOptions& signature) {
   if (const auto* ready = std::get_if<Panorama>(&first.picture)) return *ready;
   const PanoramaReader reader(source, choose_panorama_shape(source, signature));
   try {
@@ -51,7 +51,7 @@ MemoryHeader make_memory_header(std::span<const Observation> first, const Pictur
   header.source = source;
   header.preprocessing = preprocessing;
   header.created_s = now_s();
-  const Panorama panorama = first_panorama(first.front(), source, signature);
+  const Panorama panorama = make_first_panorama(first.front(), source, signature);
   header.shape = {panorama.rows(), signature.components};
   header.panorama_columns = panorama.columns();
   header.elevations = panorama.elevations();
@@ -67,8 +67,8 @@ MemoryHeader make_memory_header(std::span<const Observation> first, const Pictur
   }
   const ViewEncoder encoder(header, source);
   std::vector<float> largest(first.size(), 0.0F);
-  for_each_entry(executor, first.size(), [&](std::size_t i) {
-    largest[i] = largest_structure(encoder.signature(first[i]));
+  parallel_for(executor, first.size(), [&](std::size_t i) {
+    largest[i] = largest_nonconstant_magnitude(encoder.signature(first[i]));
   });
   header.full_scale = *std::ranges::max_element(largest);
   constexpr float rounding = 1e-6F;  // of the transform, for values of 0 .. 1
@@ -80,13 +80,13 @@ MemoryHeader make_memory_header(std::span<const Observation> first, const Pictur
   return header;
 }
 
-MemoryHeader make_header_of_recording(const Dataset& recording, const SignatureOptions& signature,
-                                      const PreprocessingOptions& preprocessing,
-                                      Executor& executor) {
+MemoryHeader make_header_from_recording(const Dataset& recording, const SignatureOptions& signature,
+                                        const PreprocessingOptions& preprocessing,
+                                        Executor& executor) {
   const std::size_t count = std::min(Memoriser::scale_views, recording.entries.size());
   std::vector<Observation> first(count, Observation(Image(1, 1)));
-  for_each_entry(executor, count,
-                 [&](std::size_t i) { first[i] = read_observation(recording.entries[i]); });
+  parallel_for(executor, count,
+               [&](std::size_t i) { first[i] = read_observation(recording.entries[i]); });
   return make_memory_header(first, recording.source, signature, preprocessing, executor);
 }
 
@@ -115,7 +115,7 @@ void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
 }
 
 // If one of the first images has another size, the most frequent size decides.
-MemoryHeader Memoriser::header_of_waiting(Executor& executor) const {
+MemoryHeader Memoriser::make_header_from_waiting(Executor& executor) const {
   const auto first = std::span(waiting_).first(std::min(scale_views, waiting_.size()));
   const auto header_of = [&](std::span<const Observation> some) {
     return make_memory_header(some, *options_.source, options_.signature, options_.preprocessing,
@@ -139,7 +139,7 @@ MemoryHeader Memoriser::header_of_waiting(Executor& executor) const {
 }
 
 void Memoriser::make_file(Executor& executor) {
-  file_ = MemoryFile::create(path_, header_of_waiting(executor));
+  file_ = MemoryFile::create(path_, make_header_from_waiting(executor));
   encoder_.emplace(file_->header(), *options_.source);
   store(std::exchange(waiting_, {}), executor);
 }
@@ -147,7 +147,7 @@ void Memoriser::make_file(Executor& executor) {
 void Memoriser::store(std::span<const Observation> observations, Executor& executor) {
   std::vector<NewView> views(observations.size());
   std::vector<std::exception_ptr> failures(observations.size());
-  for_each_entry(executor, observations.size(), [&](std::size_t i) {
+  parallel_for(executor, observations.size(), [&](std::size_t i) {
     const Observation& observation = observations[i];
     try {
       views[i].info = {observation.name, observation.pose, observation.stamp_s};
@@ -155,7 +155,7 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
       if (options_.thumbnails || features) {
         const Panorama panorama = encoder_->panorama(observation);
         views[i].signature = encoder_->packed(panorama);
-        if (options_.thumbnails) views[i].thumbnail = thumbnail_png(panorama);
+        if (options_.thumbnails) views[i].thumbnail = encode_thumbnail(panorama);
         if (features) views[i].features = pack(encoder_->features(panorama).value());
       } else {
         views[i].signature = encoder_->packed(observation);
@@ -214,7 +214,7 @@ Memoriser::Counts Memoriser::finish() {
 
 Memoriser::Counts Memoriser::finish(Executor& executor) {
   if (!file_) make_file(executor);
-  keep_models(*file_);
+  learn_and_store_models(*file_);
   return counts_;
 }
 

@@ -40,10 +40,10 @@ struct MemoriserOptions {
 
 /// Makes the header of a new memory from the first views of a recording, so that nothing about
 /// light or scene need be known beforehand. Throws FileError also on pictures that cannot be read.
-[[nodiscard]] MemoryHeader make_header_of_recording(const Dataset& recording,
-                                                    const SignatureOptions& signature,
-                                                    const PreprocessingOptions& preprocessing,
-                                                    Executor& executor);
+[[nodiscard]] MemoryHeader make_header_from_recording(const Dataset& recording,
+                                                      const SignatureOptions& signature,
+                                                      const PreprocessingOptions& preprocessing,
+                                                      Executor& executor);
 
 /// Appends observations to a memory file, which is made where there is none:
 ///   panonav::Memoriser memoriser("office.panonav", {.source = source});
@@ -75,8 +75,8 @@ class Memoriser {
     std::size_t known_before = 0;  ///< observations whose views were there
   };
   /// Writes observations that wait for a new file's full scale, and stores the models learnt of the
-  /// views (`keep_models`). More may be added afterwards. Throws FileError; ContractError when
-  /// nothing was ever added.
+  /// views (`learn_and_store_models`). More may be added afterwards. Throws FileError;
+  /// ContractError when nothing was ever added.
   Counts finish();
   Counts finish(Executor& executor);  ///< Finishes on all threads.
 
@@ -89,7 +89,7 @@ class Memoriser {
 
  private:
   void make_file(Executor& executor);
-  [[nodiscard]] MemoryHeader header_of_waiting(Executor& executor) const;
+  [[nodiscard]] MemoryHeader make_header_from_waiting(Executor& executor) const;
   void store(std::span<const Observation> observations, Executor& executor);
   void require_same_view(const Observation& observation, const PackedSignature& signature,
                          ViewId view);

@@ -140,7 +140,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto& [view, info, links, thumbnail, component] = views[i];
     ids.push_back(view);
-    if (const auto panorama = large_enough ? thumbnail_panorama(memory, view) : std::nullopt) {
+    if (const auto panorama = large_enough ? panorama_from_thumbnail(memory, view) : std::nullopt) {
       const fs::path path = out / files[i];
       std::error_code error;
       fs::create_directories(path.parent_path(), error);
@@ -155,7 +155,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   }
   done.pictures = dataset.entries.size();
 
-  write_file(out / "views.csv", std::string_view(view_table(views, files)));
+  write_file(out / "views.csv", std::string_view(format_view_table(views, files)));
   write_file(out / "signatures.npy", make_npy_array(memory.load(ids)));
   OptionText options;
   options.text = "[signature]\ncomponents = ";  // rows and columns are those of the pictures

@@ -351,7 +351,7 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
   MemoryFile file = MemoryFile::create(unfinished.path(), a.header());
   Merge merge(a, b, alignment, graph);
   file.change([&] { result = merge.write(file, advance); });
-  keep_models(file);
+  learn_and_store_models(file);
   file.copy_to(memory);
   return result;
 }

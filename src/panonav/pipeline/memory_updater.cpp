@@ -72,7 +72,7 @@ ObservationModel make_model(const MemoryFile& file, const ColumnRanking& ranking
                         " views with position and heading; allowed where views are updated: " +
                         std::to_string(ObservationModel::min_views) + " or more");
   }
-  const auto models = load_kept_models(file, memory);
+  const auto models = load_stored_models(file, memory);
   if (models && models->observation) return *models->observation;
   try {
     return learn_observation_model(ranking);
@@ -133,7 +133,7 @@ void MemoryUpdater::observe(const Observation& observation, const Panorama& pano
   std::erase_if(self.kept,
                 [&](const auto& one) { return !self.update.can_become_view(one.first); });
   if (!self.update.can_become_view(number)) return;
-  view.thumbnail = thumbnail_png(panorama);
+  view.thumbnail = encode_thumbnail(panorama);
   if (const auto features = self.encoder.features(panorama)) view.features = pack(*features);
   self.kept.emplace(number, std::move(view));
 }
@@ -178,7 +178,7 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
         changes.views = there.size() - dropped.size() + added.size();
         planned.use.size = static_cast<int>(changes.views);
         self.file.set_parameter(use_parameter, to_parameter(planned.use));
-        if (!added.empty() || !dropped.empty()) keep_models(self.file);
+        if (!added.empty() || !dropped.empty()) learn_and_store_models(self.file);
       },
       what + ": " + summarise(changes));
   return changes;

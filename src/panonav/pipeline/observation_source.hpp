@@ -27,7 +27,7 @@ namespace panonav {
 /// Calls `make(i)` for 0 .. count - 1 on all threads, and `use(i, made)` in order on this one. An
 /// exception of `make` is thrown when all before it were used.
 template <class Make, class Use>
-void make_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
+void process_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
   constexpr std::size_t batch = 32;
   for (std::size_t begin = 0; begin < count; begin += batch) {
     const std::size_t some = std::min(batch, count - begin);

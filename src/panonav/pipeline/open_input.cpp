@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns the first names, and how many more there are.
-std::string list_names(const std::vector<std::string>& names) {
+std::string join_names(const std::vector<std::string>& names) {
   constexpr std::size_t max_listed = 8;
   std::string text;
   for (std::size_t i = 0; i < std::min(max_listed, names.size()); ++i) {
@@ -38,10 +38,10 @@ void add_warning_of_skipped_files(Dataset& opened) {
     (name.ends_with('/') ? folders : files).push_back(name);
   }
   if (!files.empty()) {
-    opened.warnings.push_back("left out, no PNG or JPEG by name: " + list_names(files));
+    opened.warnings.push_back("left out, no PNG or JPEG by name: " + join_names(files));
   }
   if (!folders.empty()) {
-    opened.warnings.push_back("left out, folders within: " + list_names(folders));
+    opened.warnings.push_back("left out, folders within: " + join_names(folders));
   }
 }
 
@@ -58,7 +58,7 @@ std::optional<ImageSize> read_first_picture_size(const Dataset& dataset) {
 
 /// Radians in the place of degrees make a band that is far lower than the rows of its pictures; a
 /// data set of a few rows, as a route's may be, has a low band by right.
-void warn_of_low_band(Dataset& opened) {
+void add_warning_of_low_band(Dataset& opened) {
   constexpr double min_band_deg = 5.0;  // pi radians, taken for degrees, are less
   constexpr double max_stretch = 8.0;   // of pixels; radians stretch them 57 times
   const PictureLayout& layout = opened.source.layout;
@@ -77,7 +77,7 @@ void warn_of_low_band(Dataset& opened) {
 
 /// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
 /// likelihood: as a panorama of square pixels it would reach from pole to pole.
-void add_warning_of_other_kind(Dataset& opened) {
+void add_warning_of_wrong_kind(Dataset& opened) {
   constexpr double max_band_deg = 170.0;  // from here on the band is nearly the sphere's
   if (opened.source.kind != PictureKind::panorama) return;
   const auto& band = opened.source.layout.elevations;
@@ -133,8 +133,8 @@ const PictureSource& choose_source(const fs::path& path, const InputOptions& opt
   throw FileError(path.string(), std::string(why) + " with 'source' (a PictureSource)");
 }
 
-Dataset open_registered(const fs::path& path, const DatasetReader& reader,
-                        const InputOptions& options) {
+Dataset open_with_reader(const fs::path& path, const DatasetReader& reader,
+                         const InputOptions& options) {
   if (!reader.has_topics) reject_topics(path, options.topics);
   if (options.topics.odometry && options.topics.odometry_frames) {
     throw OptionError(
@@ -147,11 +147,11 @@ Dataset open_registered(const fs::path& path, const DatasetReader& reader,
   }
   Dataset opened = reader.read(path, source, options);
   for (std::string& warning : opened.warnings) warning = path.string() + ": " + warning;
-  if (options.source) add_warning_of_other_kind(opened);
+  if (options.source) add_warning_of_wrong_kind(opened);
   return opened;
 }
 
-Dataset open_described(const fs::path& folder, const InputOptions& options) {
+Dataset open_dataset_folder(const fs::path& folder, const InputOptions& options) {
   if (options.source) {
     throw OptionError(
         folder.string() +
@@ -163,8 +163,8 @@ Dataset open_described(const fs::path& folder, const InputOptions& options) {
         " has a dataset.toml, which names its images; leave out the option recursive");
   }
   Dataset opened = read_dataset(folder);
-  warn_of_low_band(opened);
-  add_warning_of_other_kind(opened);
+  add_warning_of_low_band(opened);
+  add_warning_of_wrong_kind(opened);
   return opened;
 }
 
@@ -188,7 +188,7 @@ Dataset open_pictures(const fs::path& path, const InputOptions& options) {
     opened = read_single_picture(path, source);
   }
   add_warning_of_skipped_files(opened);
-  if (options.source) add_warning_of_other_kind(opened);
+  if (options.source) add_warning_of_wrong_kind(opened);
   return opened;
 }
 
@@ -200,14 +200,15 @@ bool has_dataset_file(const fs::path& folder) {
 }
 
 Dataset open_input(const fs::path& path, const InputOptions& options) {
-  if (const auto reader = find_dataset_reader(path)) return open_registered(path, *reader, options);
+  if (const auto reader = find_dataset_reader(path))
+    return open_with_reader(path, *reader, options);
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     throw FileError(path.string(), "there is no such file or folder");
   }
   reject_topics(path, options.topics);
   Dataset opened =
-      has_dataset_file(path) ? open_described(path, options) : open_pictures(path, options);
+      has_dataset_file(path) ? open_dataset_folder(path, options) : open_pictures(path, options);
   select_pictures(opened, options.selection);
   return opened;
 }

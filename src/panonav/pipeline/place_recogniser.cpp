@@ -104,7 +104,7 @@ struct PlaceRecogniser::Implementation {
 
   void learn_from_held_views(const MemoryFile& file) {
     const FeatureSource source = get_or_create_features(file, std::ranges::max(memory->views()));
-    if (can_use_kept_models()) models = load_kept_models(file, *memory);
+    if (can_use_kept_models()) models = load_stored_models(file, *memory);
     if (!models) models = learn_place_models(*memory, source, options.localiser.components);
     Localiser localiser(*memory, models->place, models->position, options.localiser,
                         models->spacing_m);
@@ -135,7 +135,7 @@ struct PlaceRecogniser::Implementation {
     std::optional<VisualMemory> all;
     if (is_small) all.emplace(index.load(views));
     if (can_use_kept_models())
-      found = is_small ? load_kept_models(file, *all) : load_kept_models(file);
+      found = is_small ? load_stored_models(file, *all) : load_stored_models(file);
     if (!found && !is_small) found = models;
     if (found) return *found;
     if (!is_small) all = load_learning_sample(index, views, drawn, options.max_learnt_views);

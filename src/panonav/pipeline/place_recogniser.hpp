@@ -42,8 +42,8 @@ struct PlaceRecogniserOptions {
 ///   auto place = recogniser.localise(panonav::read_image("view.jpg"));
 ///   if (place.known) std::cout << place.position->x_m << ' ' << place.position->y_m << '\n';
 /// (`position` is empty only for memories whose views have no poses.) Models that no longer fit the
-/// views of the file (`keep_models`) are learnt again, which takes seconds in a large memory.
-/// Several threads may use one object.
+/// views of the file (`learn_and_store_models`) are learnt again, which takes seconds in a large
+/// memory. Several threads may use one object.
 ///
 /// Holds the whole memory, or of a large one on a server only an index: the answers are the same
 /// bits but for `bytes_read`. A memory that is not held and has more than `max_learnt_views` uses

@@ -113,7 +113,7 @@ std::string_view name_of(RobotNavigatorOptions::GraphOrigin origin) {
   return origin_names.at(static_cast<std::size_t>(origin));
 }
 
-std::optional<RobotNavigatorOptions::GraphOrigin> find_graph_origin(std::string_view name) {
+std::optional<RobotNavigatorOptions::GraphOrigin> parse_graph_origin(std::string_view name) {
   const auto found = std::ranges::find(origin_names, name);
   if (found == origin_names.end()) return std::nullopt;
   return static_cast<RobotNavigatorOptions::GraphOrigin>(found - origin_names.begin());

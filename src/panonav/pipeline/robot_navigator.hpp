@@ -39,7 +39,7 @@ struct RobotNavigatorOptions {
 /// Returns "map", "lattice", "links" or "arrangement".
 [[nodiscard]] std::string_view name_of(RobotNavigatorOptions::GraphOrigin origin);
 /// Returns the origin of that name; empty if there is none.
-[[nodiscard]] std::optional<RobotNavigatorOptions::GraphOrigin> find_graph_origin(
+[[nodiscard]] std::optional<RobotNavigatorOptions::GraphOrigin> parse_graph_origin(
     std::string_view name);
 
 /// Drives a robot to a remembered view by its pictures: a picture in, a velocity out. Views are

@@ -158,7 +158,7 @@ RouteRecorder::Recorded RouteRecorder::record(
     due_poses.push_back(poses[i]);
   }
   const std::size_t first = skip_recorded(due_poses);
-  make_in_order(
+  process_in_order(
       chosen.size() - first, executor,
       [&](std::size_t i) {
         Observation observation = read_observation(drive.entries[chosen[first + i]]);

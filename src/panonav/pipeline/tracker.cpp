@@ -27,7 +27,7 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& m
   try {
     // The filter's seed is that of learning, too; what is kept was learnt with the default one.
     if (options.filter.seed == LearningOptions{}.seed) {
-      if (const auto models = load_kept_models(file, memory); models && models->observation) {
+      if (const auto models = load_stored_models(file, memory); models && models->observation) {
         return {std::make_shared<const ColumnRanking>(memory), *models->observation, options.filter,
                 options.odometry};
       }

@@ -24,8 +24,8 @@ struct TrackerOptions {
 ///   const auto estimate = tracker.observe(observation);
 ///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
 /// Pictures become signatures as the file says, and the observation model is that of the file
-/// (`keep_models`); one that does not fit the views any more is learnt again. Holds the whole
-/// memory; the file is not needed afterwards. Same file, options and observations: same bits.
+/// (`learn_and_store_models`); one that does not fit the views any more is learnt again. Holds the
+/// whole memory; the file is not needed afterwards. Same file, options and observations: same bits.
 class Tracker {
  public:
   /// The robot starts anywhere in the memorised area. Throws FileError on a file that is missing or

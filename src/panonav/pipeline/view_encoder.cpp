@@ -21,7 +21,7 @@ constexpr PanoramaShape default_shape{80, 512};  // [M04 section 2.1]
 
 /// Pictures that are resampled anyway are cut to the memory's band; ready-made panoramas stay as
 /// they are.
-PictureSource cut_to_band(const MemoryHeader& header, PictureSource source) {
+PictureSource crop_to_band(const MemoryHeader& header, PictureSource source) {
   if (source.kind != PictureKind::panorama) source.layout.kept_elevations = header.elevations;
   return source;
 }
@@ -99,7 +99,7 @@ class ViewEncoder::Workspaces {
 
 ViewEncoder::ViewEncoder(const MemoryHeader& header, const PictureSource& source)
     : header_(header),
-      reader_(cut_to_band(header, source), choose_resampled_shape(header, source)),
+      reader_(crop_to_band(header, source), choose_resampled_shape(header, source)),
       extractor_({header.shape.rows, header.panorama_columns}, header.shape.components,
                  header.preprocessing),
       workspaces_(std::make_unique<Workspaces>()) {
@@ -218,13 +218,13 @@ void visit_options(SignatureOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-float largest_structure(const FourierSignature& signature) {
+float largest_nonconstant_magnitude(const FourierSignature& signature) {
   const auto structure = signature.magnitudes().subspan(static_cast<std::size_t>(signature.rows()));
   return structure.empty() ? signature.magnitudes().front()
                            : *std::max_element(structure.begin(), structure.end());
 }
 
-std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
+std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama) {
   const Image picture = to_picture(panorama);
   const int step = compute_thumbnail_step(picture.width());
   if (step == 1) return encode_png(picture.view());
@@ -242,8 +242,8 @@ std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
   return encode_png(small.view());
 }
 
-std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbnail,
-                                           const MemoryHeader& header) {
+std::optional<Panorama> panorama_from_thumbnail(std::span<const std::uint8_t> thumbnail,
+                                                const MemoryHeader& header) {
   const PanoramaShape shape{header.shape.rows, header.panorama_columns};
   const int step = compute_thumbnail_step(shape.columns);
   const int width = shape.columns / step;
@@ -259,17 +259,17 @@ std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbna
   }
 }
 
-std::optional<Panorama> thumbnail_panorama(const MemoryFile& file, ViewId view) {
+std::optional<Panorama> panorama_from_thumbnail(const MemoryFile& file, ViewId view) {
   const auto thumbnail = file.thumbnail(view);
-  return thumbnail ? thumbnail_panorama(*thumbnail, file.header()) : std::nullopt;
+  return thumbnail ? panorama_from_thumbnail(*thumbnail, file.header()) : std::nullopt;
 }
 
 int thumbnail_columns(const MemoryHeader& header) noexcept {
   return header.panorama_columns / compute_thumbnail_step(header.panorama_columns);
 }
 
-void for_each_entry(Executor& executor, std::size_t count,
-                    const std::function<void(std::size_t)>& body) {
+void parallel_for(Executor& executor, std::size_t count,
+                  const std::function<void(std::size_t)>& body) {
   executor.for_chunks(count, 1, [&](std::size_t begin, std::size_t, std::size_t) { body(begin); });
 }
 

@@ -90,24 +90,24 @@ class ViewEncoder {
 
 /// Returns the largest magnitude of k >= 1. The mean brightness, k = 0, is much larger than the
 /// rest and depends more on the light than on the place, so it may saturate.
-[[nodiscard]] float largest_structure(const FourierSignature& signature);
+[[nodiscard]] float largest_nonconstant_magnitude(const FourierSignature& signature);
 
 /// Returns a small picture of the view for people, as PNG.
-[[nodiscard]] std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama);
+[[nodiscard]] std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama);
 
-/// Restores the panorama of a thumbnail of `thumbnail_png`: of the memory's size, enlarged where
+/// Restores the panorama of a thumbnail of `encode_thumbnail`: of the memory's size, enlarged where
 /// the thumbnail is smaller. Columns and rows that did not fill a pixel of the thumbnail are
 /// missing; the rest is stretched over them, by less than one pixel. Empty when the picture cannot
 /// be decoded or is of another size than thumbnails of this memory.
-[[nodiscard]] std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbnail,
-                                                         const MemoryHeader& header);
+[[nodiscard]] std::optional<Panorama> panorama_from_thumbnail(
+    std::span<const std::uint8_t> thumbnail, const MemoryHeader& header);
 /// Restores the panorama of a view's thumbnail; empty if it has none.
-[[nodiscard]] std::optional<Panorama> thumbnail_panorama(const MemoryFile& file, ViewId view);
+[[nodiscard]] std::optional<Panorama> panorama_from_thumbnail(const MemoryFile& file, ViewId view);
 /// Returns the columns of a memory's thumbnails: its own up to 256.
 [[nodiscard]] int thumbnail_columns(const MemoryHeader& header) noexcept;
 
 /// Calls body(i) for 0 .. count - 1 on all threads.
-void for_each_entry(Executor& executor, std::size_t count,
-                    const std::function<void(std::size_t)>& body);
+void parallel_for(Executor& executor, std::size_t count,
+                  const std::function<void(std::size_t)>& body);
 
 }  // namespace panonav

@@ -47,7 +47,8 @@ std::vector<ViewRecord> list_views(const MemoryFile& file) {
   return views;
 }
 
-std::string view_table(std::span<const ViewRecord> views, std::span<const std::string> pictures) {
+std::string format_view_table(std::span<const ViewRecord> views,
+                              std::span<const std::string> pictures) {
   require(pictures.empty() || pictures.size() == views.size(), "pictures",
           static_cast<double>(pictures.size()), "none, or as many as views");
   std::string table = "id,name,x_m,y_m,heading_deg,stamp_s,links,component,thumbnail";

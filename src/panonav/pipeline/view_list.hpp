@@ -29,8 +29,8 @@ struct ViewRecord {
 /// Returns the table of docs/formats.md, section "Tables of views": a header and one line for each
 /// view. `pictures`: empty, or for each view the file that holds its picture, empty where none
 /// does.
-[[nodiscard]] std::string view_table(std::span<const ViewRecord> views,
-                                     std::span<const std::string> pictures = {});
+[[nodiscard]] std::string format_view_table(std::span<const ViewRecord> views,
+                                            std::span<const std::string> pictures = {});
 
 /// Returns the view that a user means: a name first; a number that is no name is an id. Throws
 /// FileError that names the file when there is no such view.

@@ -57,7 +57,7 @@ VisualOdometry visual_odometry(const VisualMemory& memory) {
 std::string add_visual_odometry(Dataset& run, const VisualMemory& memory,
                                 const ViewEncoder& encoder, Executor& executor) {
   VisualOdometry odometry = visual_odometry(memory);
-  make_in_order(
+  process_in_order(
       run.entries.size(), executor,
       [&](std::size_t i) {
         return OdometryView(encoder.signature(read_observation(run.entries[i])));

@@ -25,7 +25,7 @@ RegisteredSchemes& registered_schemes() {
   return registered;
 }
 
-std::shared_ptr<const MemoryScheme> find_registered(const std::filesystem::path& memory) {
+std::shared_ptr<const MemoryScheme> find_registered_scheme(const std::filesystem::path& memory) {
   RegisteredSchemes& registered = registered_schemes();
   const std::lock_guard lock(registered.mutex);
   for (const auto& [beginning, scheme] : registered.schemes) {
@@ -77,7 +77,7 @@ void report_left_out(const std::filesystem::path& memory, const MemoryFile::Faul
 }
 
 std::shared_ptr<const MemoryScheme> find_memory_scheme(const std::filesystem::path& memory) {
-  auto scheme = find_registered(memory);
+  auto scheme = find_registered_scheme(memory);
   const std::size_t colon = memory.native().find("://");
   if (scheme || colon == std::string::npos || colon == 0) return scheme;
   const std::string name = memory.native().substr(0, colon);
@@ -88,7 +88,7 @@ std::shared_ptr<const MemoryScheme> find_memory_scheme(const std::filesystem::pa
 }
 
 bool is_server_address(const std::filesystem::path& memory) {
-  return find_registered(memory) != nullptr;
+  return find_registered_scheme(memory) != nullptr;
 }
 
 bool memory_exists(const std::filesystem::path& memory) {

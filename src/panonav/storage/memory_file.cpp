@@ -155,7 +155,7 @@ void MemoryFile::copy_to(const std::filesystem::path& path) const {
       }
       std::set<ViewId> copied;
       constexpr std::size_t views_per_part = 1000;  // some megabytes
-      for_each_part(views(), views_per_part, [&](std::span<const ViewId> ids) {
+      for_each_batch(views(), views_per_part, [&](std::span<const ViewId> ids) {
         const VisualMemory memory = load(ids);
         std::vector<NewView> part;
         for (const ViewId id : memory.views()) {
@@ -197,7 +197,7 @@ void MemoryFile::change(const std::function<void()>& changes,
                         const std::optional<std::string>& undo) {
   implementation_->write([&](MemoryTables& tables) {
     if (undo) {
-      tables.keep_for_undo(changes, *undo);
+      tables.run_with_undo(changes, *undo);
     } else {
       changes();
     }
@@ -249,7 +249,7 @@ void MemoryFile::remove(std::span<const ViewId> views) {
       if (!removed.insert(view).second) throw_unknown_view(view);
     }
     tables.remove(views);
-    forget_in_maps(tables, views);
+    erase_views_from_maps(tables, views);
   });
 }
 
@@ -259,7 +259,7 @@ void MemoryFile::set_pose(ViewId view, const std::optional<ReferencePose>& pose)
 }
 
 void MemoryFile::rename(ViewId view, std::string_view name) {
-  require_name("view", name);
+  check_new_name("view", name);
   implementation_->change_info(view, [&](ReferenceInfo& info) { info.name = name; });
 }
 
@@ -378,7 +378,7 @@ void MemoryFile::remove_route(std::string_view name) {
 }
 
 void MemoryFile::rename_route(std::string_view name, std::string_view new_name) {
-  require_name("route", new_name);
+  check_new_name("route", new_name);
   implementation_->write([&](MemoryTables& tables) {
     const auto names = route_names();
     if (std::ranges::find(names, name) == names.end()) throw_unknown_name("route", name);

@@ -33,8 +33,8 @@ void require_band(const std::optional<ElevationBand>& band, std::string_view fie
 }
 
 // Limits of picture files, larger than any from which a picture of the memory could be made.
-void require_picture(int rows, int columns, std::string_view rows_name,
-                     std::string_view columns_name) {
+void require_picture_size(int rows, int columns, std::string_view rows_name,
+                          std::string_view columns_name) {
   constexpr int max_side = 32768;
   constexpr std::int64_t max_pixels = 134'217'728;
   require(rows >= 1 && rows <= max_side, rows_name, rows, "1 .. 32768");
@@ -121,9 +121,9 @@ class SettingsWriter final : public OptionFields<SettingsWriter> {
     put(key, std::string(names[static_cast<std::size_t>(value)]));
   }
   template <class Enum>
-  void choice_or(const std::string& key, std::span<const std::string_view> names, Enum value,
-                 Enum usual) {
-    if (value != usual) choice(key, names, value);
+  void visit_choice_with_default(const std::string& key, std::span<const std::string_view> names,
+                                 Enum value, Enum default_value) {
+    if (value != default_value) choice(key, names, value);
   }
   void band(const std::string& prefix, const std::optional<ElevationBand>& band) {
     if (!band) return;
@@ -177,9 +177,9 @@ class SettingsReader final : public OptionFields<SettingsReader> {
     value = static_cast<Enum>(found - names.begin());
   }
   template <class Enum>
-  void choice_or(const std::string& key, std::span<const std::string_view> names, Enum& value,
-                 Enum usual) {
-    value = usual;
+  void visit_choice_with_default(const std::string& key, std::span<const std::string_view> names,
+                                 Enum& value, Enum default_value) {
+    value = default_value;
     if (settings_.contains(key)) choice(key, names, value);
   }
   void band(const std::string& prefix, std::optional<ElevationBand>& band) {
@@ -244,7 +244,8 @@ void visit_camera(Fields& fields, AnyCamera& camera) {
     fields.field(prefix + name, value);
   });
   if (auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
-    fields.choice_or(prefix + "axis", view_axis_names, unified->axis, UnifiedModel::Axis::down);
+    fields.visit_choice_with_default(prefix + "axis", view_axis_names, unified->axis,
+                                     UnifiedModel::Axis::down);
   }
   fields.field(prefix + "width_px", camera.image_size.width);
   fields.field(prefix + "height_px", camera.image_size.height);
@@ -277,14 +278,14 @@ void visit_header(Fields& fields, Header& header) {
 }
 
 void require_camera(const Camera& camera) {
-  require_picture(camera.image_size.height, camera.image_size.width, "height_px", "width_px");
+  require_picture_size(camera.image_size.height, camera.image_size.width, "height_px", "width_px");
   validate(camera);
 }
 
 }  // namespace
 
 void validate(const MemoryHeader& header) {
-  require_picture(header.shape.rows, header.panorama_columns, "rows", "panorama_columns");
+  require_picture_size(header.shape.rows, header.panorama_columns, "rows", "panorama_columns");
   // The memory checks shape and scale itself.
   static_cast<void>(VisualMemory(header.shape, header.full_scale, header.elevations));
   require(header.panorama_columns / 2 >= header.shape.components, "panorama_columns",
@@ -304,8 +305,8 @@ void validate(const MemoryHeader& header) {
     if (source.kind != PictureKind::panorama) {
       throw ContractError("picture_shape", "there", "there for panoramas only");
     }
-    require_picture(header.picture_shape->rows, header.picture_shape->columns, "image rows",
-                    "image columns");
+    require_picture_size(header.picture_shape->rows, header.picture_shape->columns, "image rows",
+                         "image columns");
     require(header.picture_shape->columns >= 4, "image columns", header.picture_shape->columns,
             ">= 4");
   }

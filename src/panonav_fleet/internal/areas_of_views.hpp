@@ -19,7 +19,7 @@ class AreasOfViews {
     if (view.value >= numbers_.size()) {
       numbers_.resize(std::max<std::size_t>(view.value + std::size_t{1}, numbers_.size() * 5 / 4));
     }
-    numbers_[view.value] = area ? number_of(*area) : no_area;
+    numbers_[view.value] = area ? get_or_create_number(*area) : no_area;
   }
   void erase(ViewId view) {
     if (view.value < numbers_.size()) numbers_[view.value] = no_view;
@@ -45,7 +45,7 @@ class AreasOfViews {
  private:
   static constexpr std::uint32_t no_view = 0;
   static constexpr std::uint32_t no_area = 1;
-  std::uint32_t number_of(const MemoryArea& area) {
+  std::uint32_t get_or_create_number(const MemoryArea& area) {
     return areas_.try_emplace(area, static_cast<std::uint32_t>(areas_.size()) + no_area + 1)
         .first->second;
   }

@@ -23,7 +23,7 @@ struct LargePageAllocator {
   explicit LargePageAllocator(const LargePageAllocator<U>&) noexcept {}
   [[nodiscard]] T* allocate(std::size_t count) {
     if (is_small(count)) return CacheLineAllocator<T>().allocate(count);
-    const std::size_t bytes = rounded(count);
+    const std::size_t bytes = round_up_to_page(count);
     void* const got =
         mmap(nullptr, bytes + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (got == MAP_FAILED) throw std::bad_alloc();
@@ -38,7 +38,7 @@ struct LargePageAllocator {
   }
   void deallocate(T* pointer, std::size_t count) noexcept {
     if (is_small(count)) return CacheLineAllocator<T>().deallocate(pointer, count);
-    munmap(pointer, rounded(count));
+    munmap(pointer, round_up_to_page(count));
   }
   friend bool operator==(LargePageAllocator, LargePageAllocator) {
     return true;
@@ -48,7 +48,7 @@ struct LargePageAllocator {
   static bool is_small(std::size_t count) {
     return count * sizeof(T) < page / 2;
   }
-  static std::size_t rounded(std::size_t count) {
+  static std::size_t round_up_to_page(std::size_t count) {
     return (count * sizeof(T) + page - 1) / page * page;
   }
 };

@@ -221,7 +221,7 @@ void PostgresqlConnection::send(const std::string& sql, const PostgresqlValues* 
   if (values == nullptr) {
     sent = PQsendQuery(connection_.get(), sql.c_str());
   } else {
-    const auto bound = values->bound();
+    const auto bound = values->to_bound();
     sent = PQsendQueryParams(connection_.get(), sql.c_str(), static_cast<int>(bound.types.size()),
                              bound.types.data(), bound.data.data(), bound.lengths.data(),
                              bound.binary.data(), 1);
@@ -245,7 +245,8 @@ void PostgresqlConnection::execute(const std::string& sql) {
   static_cast<void>(checked(exchange(sql, nullptr)));
 }
 
-bool PostgresqlConnection::try_unique(const std::string& sql, const PostgresqlValues* values) {
+bool PostgresqlConnection::execute_unless_duplicate(const std::string& sql,
+                                                    const PostgresqlValues* values) {
   Result result(exchange(sql, values));
   if (get_sqlstate(result.get()) == "23505") return false;
   static_cast<void>(checked(result.release()));

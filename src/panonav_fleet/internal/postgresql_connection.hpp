@@ -35,7 +35,7 @@ class PostgresqlValues {
     std::vector<const char*> data;
     std::vector<int> lengths, binary;
   };
-  [[nodiscard]] Bound bound() const;
+  [[nodiscard]] Bound to_bound() const;
 
  private:
   struct Value {
@@ -85,7 +85,8 @@ class PostgresqlConnection {
   void execute(const std::string& sql);
   /// Executes a statement, with values if there are any. Returns false if a unique constraint
   /// forbids it.
-  [[nodiscard]] bool try_unique(const std::string& sql, const PostgresqlValues* values = nullptr);
+  [[nodiscard]] bool execute_unless_duplicate(const std::string& sql,
+                                              const PostgresqlValues* values = nullptr);
   PostgresqlRows run(const std::string& sql, const PostgresqlValues& values = {});
   /// Passes the rows to `take` one after the other, without holding all of them.
   void stream(const std::string& sql, const PostgresqlValues& values,

@@ -102,7 +102,7 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] std::int64_t route_bytes(std::string_view route) override;
   [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
 
-  void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
+  void run_with_undo(const std::function<void()>& changes, const std::string& what) override;
   /// One change at most.
   [[nodiscard]] std::vector<MemoryFile::KeptChange> history() override;
   void undo() override;
@@ -124,7 +124,7 @@ class PostgresqlTables final : public MemoryTables {
   /// Notes a change at a position for the notification of the transaction.
   void note_changed_area(const std::optional<double>& x_m, const std::optional<double>& y_m) {
     if (x_m && y_m) {
-      areas_.insert(area_of(*x_m, *y_m));
+      areas_.insert(to_memory_area(*x_m, *y_m));
     } else {
       changes_unplaced_views_ = true;
     }

@@ -96,7 +96,7 @@ std::vector<std::string> PostgresqlTables::routes_with_blocks() {
   return query_texts("SELECT DISTINCT route FROM panonav.route_blocks WHERE memory = $1");
 }
 
-void PostgresqlTables::keep_for_undo(const std::function<void()>& changes,
+void PostgresqlTables::run_with_undo(const std::function<void()>& changes,
                                      const std::string& what) {
   run("DELETE FROM panonav.undo_rows WHERE memory = $1");
   connection_.execute("SELECT set_config('panonav.undo', 'on', true)");

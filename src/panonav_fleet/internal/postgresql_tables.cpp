@@ -245,7 +245,7 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
     if (bytes.empty()) {
       rows.add_null().add_null();
     } else {
-      rows.add(std::span<const std::uint8_t>(bytes)).add(bytes_checksum(view, bytes));
+      rows.add(std::span<const std::uint8_t>(bytes)).add(attachment_checksum(view, bytes));
     }
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -276,7 +276,7 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
   if (features) beside("features", "features");
   sql += "UPDATE panonav.memories SET last_view = " + std::to_string(ids.back().value) +
          " WHERE id = " + memory + "; RELEASE rows; TRUNCATE pg_temp.panonav_incoming";
-  if (connection_.try_unique(sql)) return;
+  if (connection_.execute_unless_duplicate(sql)) return;
   connection_.execute("ROLLBACK TO rows");
   const Rows duplicate = run(
       "SELECT i.name FROM pg_temp.panonav_incoming i WHERE EXISTS (SELECT FROM panonav.views v "
@@ -320,7 +320,7 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
   Values values;
   values.add(memory_).add(std::int64_t{view.value}).add(checksum);
   add_info(values, info);
-  if (!connection_.try_unique(
+  if (!connection_.execute_unless_duplicate(
           "UPDATE panonav.views SET checksum = $3, name = $4, x_m = $5, y_m = $6, "
           "heading_rad = $7, stamp_s = $8 WHERE memory = $1 AND id = $2",
           &values)) {

@@ -128,7 +128,7 @@ std::string_view CopyRows::finish() {
   return bytes_;
 }
 
-PostgresqlValues::Bound PostgresqlValues::bound() const {
+PostgresqlValues::Bound PostgresqlValues::to_bound() const {
   Bound bound;
   for (const Value& value : values_) {
     if (value.bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()) / 2) {

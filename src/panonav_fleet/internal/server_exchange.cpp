@@ -92,7 +92,7 @@ std::vector<ServerView> ServerExchange::read_server_views(const PostgresqlRows& 
   return views;
 }
 
-std::map<ViewId, std::int64_t> ServerExchange::checksums_in(const PostgresqlRows& rows) const {
+std::map<ViewId, std::int64_t> ServerExchange::to_checksums(const PostgresqlRows& rows) const {
   std::map<ViewId, std::int64_t> checksums;
   for (int i = 0; i < rows.size(); ++i)
     checksums.emplace(read_view_id(rows, i, 0), rows.integer(i, 1));
@@ -164,7 +164,7 @@ std::vector<ServerView> ServerExchange::read_infos(std::span<const ViewId> ids) 
 std::map<ViewId, std::int64_t> ServerExchange::read_checksums(std::span<const ViewId> views) {
   if (views.empty()) return {};
   const auto numbers = to_numbers(views);
-  return checksums_in(
+  return to_checksums(
       connection().run("SELECT id, checksum FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                        values().add(Numbers(numbers))));
 }
@@ -183,7 +183,7 @@ std::map<ViewId, std::int64_t> ServerExchange::read_checksums_in_blocks(
   if (blocks.empty()) return {};
   PostgresqlValues bound = values();
   add_areas(bound, areas);
-  return checksums_in(connection().run("SELECT v.id, v.checksum FROM " + kept_views_sql(areas) +
+  return to_checksums(connection().run("SELECT v.id, v.checksum FROM " + kept_views_sql(areas) +
                                            " AND " + block_of_v + " = ANY(" +
                                            (areas ? "$4)" : "$2)"),
                                        bound.add(blocks)));
@@ -247,7 +247,7 @@ FullServerView ServerExchange::read_full_view(const PostgresqlRows& rows, const 
     if (rows.is_null(0, column)) return;
     tables_.accept_row(std::nullopt, [&] {
       auto stored = rows.copy(0, column);
-      if (rows.integer(0, column + 1) != bytes_checksum(whole.id, stored)) {
+      if (rows.integer(0, column + 1) != attachment_checksum(whole.id, stored)) {
         tables_.fail_damaged(what + std::to_string(found.id.value) +
                              " does not match its checksum");
       }

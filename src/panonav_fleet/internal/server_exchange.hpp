@@ -65,8 +65,8 @@ class ServerExchange {
   [[nodiscard]] static std::unique_ptr<ServerExchange> connect(const ServerAddress& address);
 
   [[nodiscard]] PostgresqlTables& tables() noexcept { return tables_; }
-  [[nodiscard]] bool may_add() const noexcept { return may_add_; }
-  [[nodiscard]] bool may_change() const noexcept { return may_change_; }
+  [[nodiscard]] bool can_add() const noexcept { return may_add_; }
+  [[nodiscard]] bool can_change() const noexcept { return may_change_; }
   /// Returns the name of the robot that adds views.
   [[nodiscard]] const std::string& robot() const noexcept { return robot_; }
 
@@ -150,7 +150,7 @@ class ServerExchange {
   /// Returns the view of the first row, checked; bad attachments are left out. Throws DamageError.
   [[nodiscard]] FullServerView read_full_view(const PostgresqlRows& rows, const ServerView& found,
                                               SignatureShape shape);
-  [[nodiscard]] std::map<ViewId, std::int64_t> checksums_in(const PostgresqlRows& rows) const;
+  [[nodiscard]] std::map<ViewId, std::int64_t> to_checksums(const PostgresqlRows& rows) const;
   [[nodiscard]] ViewId read_view_id(const PostgresqlRows& rows, int row, int column) const {
     return tables_.to_view_id(rows.integer(row, column));
   }

@@ -118,8 +118,8 @@ class SketchSearch {
                                        std::size_t first, std::size_t count,
                                        SegmentScratch& scratch) const {
     scratch.bytes_read += count * kernels::cell_block * layout_.dimensions(0) / 2;
-    return segment.cell_bounds(layout_, kernels_, query_, scratch.tables, limit, first, count,
-                               scratch.bounds, scratch.indices);
+    return segment.compute_cell_bounds(layout_, kernels_, query_, scratch.tables, limit, first,
+                                       count, scratch.bounds, scratch.indices);
   }
   /// Into scratch.level_bounds.
   void bounds_at(const SketchSegment& segment, int level, std::span<const std::uint32_t> rows,
@@ -175,7 +175,7 @@ class SketchSearch {
     for (std::size_t i = 0; i < segments_.size(); ++i) {
       order_.emplace_back(0U, static_cast<std::uint32_t>(i));
     }
-    query_.choose_unit(layout_, typical_bound(*segments_.front().sketches));
+    query_.choose_unit(layout_, estimate_median_bound(*segments_.front().sketches));
     if (segments_.size() > first_segments) {
       for_segments(0, order_.size(), 64,
                    [this](std::uint32_t number, std::size_t place, SegmentScratch& scratch,
@@ -244,7 +244,7 @@ class SketchSearch {
   }
 
   /// The median bound of some views.
-  std::uint32_t typical_bound(const SketchSegment& segment) {
+  std::uint32_t estimate_median_bound(const SketchSegment& segment) {
     std::vector<std::uint32_t> rows;
     for (std::uint32_t row = 0; row < std::min<std::size_t>(64, segment.rows()); ++row) {
       rows.push_back(row);
@@ -320,8 +320,8 @@ class SketchSearch {
     };
     drop();
     std::vector<SketchedView> best(waiting);
-    keep_best(best, read_at_once_);
-    read_at_once_ = std::min<std::size_t>(2 * read_at_once_, 4096);
+    keep_best(best, batch_size_);
+    batch_size_ = std::min<std::size_t>(2 * batch_size_, 4096);
     read(best);
     drop();
   }
@@ -343,7 +343,7 @@ class SketchSearch {
   std::vector<ViewId> excluded_;                                // ascending
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order_;  // least bound of a sample, number
   std::vector<ViewId> compared_;                                // in full, ascending
-  std::size_t read_at_once_ = 128;
+  std::size_t batch_size_ = 128;
   SearchResult result_;
 };
 

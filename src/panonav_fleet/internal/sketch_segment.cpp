@@ -19,7 +19,7 @@ std::size_t round_up(std::size_t count, std::size_t multiple) {
 
 /// Blocks of a component. Views differ most in their low components, because the spectra of
 /// pictures fall; the numbers make whole cache lines of 15 components.
-int blocks_of(int level, int component, int components) {
+int choose_block_count(int level, int component, int components) {
   constexpr std::array usual{2, 4, 16};
   if (level == 2) return component == 0 ? 2 * usual[2] : usual[2];
   if (component < 2) return 2 * usual[static_cast<std::size_t>(level)];
@@ -38,7 +38,7 @@ SegmentLayout::SegmentLayout(SignatureShape shape) : shape_(shape) {
   for (int level = 0; level < levels; ++level) {
     std::size_t sums = 0;
     for (int k = 0; k < shape.components; ++k) {
-      const int blocks = std::min(max_blocks, blocks_of(level, k, shape.components));
+      const int blocks = std::min(max_blocks, choose_block_count(level, k, shape.components));
       blocks_[level].push_back(blocks);
       sums += static_cast<std::size_t>(blocks);
     }
@@ -254,7 +254,7 @@ void SketchSegment::make_tables(const SegmentLayout& layout,
                       layout.dimensions(0), tables.data());
 }
 
-std::span<const std::uint32_t> SketchSegment::cell_bounds(
+std::span<const std::uint32_t> SketchSegment::compute_cell_bounds(
     const SegmentLayout& layout, const kernels::DistanceKernels& kernels, const SegmentQuery& query,
     std::span<const std::uint8_t> tables, std::uint32_t limit, std::size_t first, std::size_t count,
     std::span<std::uint8_t> bounds, std::span<std::uint32_t> indices) const {

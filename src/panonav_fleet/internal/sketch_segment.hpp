@@ -85,13 +85,11 @@ class SketchSegment {
                    const SegmentQuery& query, std::span<std::uint8_t> tables) const;
   /// Bounds in units, 255 for all beyond, of the rows of blocks first .. first + count - 1; indices
   /// of those that may be at most `limit`, counted from the first block on, are returned.
-  std::span<const std::uint32_t> cell_bounds(const SegmentLayout& layout,
-                                             const kernels::DistanceKernels& kernels,
-                                             const SegmentQuery& query,
-                                             std::span<const std::uint8_t> tables,
-                                             std::uint32_t limit, std::size_t first,
-                                             std::size_t count, std::span<std::uint8_t> bounds,
-                                             std::span<std::uint32_t> indices) const;
+  std::span<const std::uint32_t> compute_cell_bounds(
+      const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
+      const SegmentQuery& query, std::span<const std::uint8_t> tables, std::uint32_t limit,
+      std::size_t first, std::size_t count, std::span<std::uint8_t> bounds,
+      std::span<std::uint32_t> indices) const;
 
   /// Room for a query in the codes of a segment.
   struct Encoded {
@@ -101,7 +99,7 @@ class SketchSegment {
   /// Lower bounds of rows, of level 1 or 2.
   void bounds_at(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
                  const SegmentQuery& query, int level, std::span<const std::uint32_t> rows,
-                 Encoded& room, std::uint32_t* bounds) const;
+                 Encoded& scratch, std::uint32_t* bounds) const;
 
  private:
   /// A sum s is kept as the code nearest to (s - offset) / step; all sums of the segment are within

@@ -52,14 +52,14 @@ SynchronisationReport Synchronisation::run() {
     load_file_state();
     resolve_unacknowledged_uploads();
     prepare_upload();
-    if (server_.may_add()) {
+    if (server_.can_add()) {
       upload_views();
       upload_changes();
       upload_removals();
       upload_links();
     }
     download();
-    if (!needs_reupload_ || !server_.may_add()) break;
+    if (!needs_reupload_ || !server_.can_add()) break;
   }
   return report_;
 }

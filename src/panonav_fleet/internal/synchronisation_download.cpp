@@ -65,7 +65,7 @@ void Synchronisation::download() {
   apply_server_changes(removed, find_lost_views(removed), changes, reused);
 
   transfer_total_ = added.size();
-  for_each_part(added, views_per_batch, [&](std::span<const ViewId> part) {
+  for_each_batch(added, views_per_batch, [&](std::span<const ViewId> part) {
     add_downloaded_views(server_.read_full_views(part, header_.shape));
   });
 
@@ -83,7 +83,7 @@ void Synchronisation::classify_changed_views(const std::vector<ViewId>& changed,
                                              std::vector<ViewId>& reused) {
   const auto reading = file_.transaction(Kind::reading);
   local_checksums_ = read_view_checksums(file_);
-  for_each_part(changed, rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_batch(changed, rows_per_query, [&](std::span<const ViewId> part) {
     for (ServerView& view : server_.read_infos(part)) {
       const auto row = read_local_row(local_by_server_id_.at(view.id));
       if (!row || !is_acceptable(view)) continue;  // removed from the file, or a bad row
@@ -116,7 +116,7 @@ std::set<ViewId> Synchronisation::find_lost_views(const std::vector<ViewId>& rem
     uploaded.push_back(view);
     lost.insert(id);
   }
-  for_each_part(uploaded, rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_batch(uploaded, rows_per_query, [&](std::span<const ViewId> part) {
     for (const Upload& upload : server_.read_uploads(state_.file, part)) {
       const SynchronisedView& row = synchronised_.at(upload.view);
       if (upload.signature == row.signature && upload.server_view == row.server_view) {
@@ -161,7 +161,7 @@ bool Synchronisation::remove_from_file(const std::vector<ViewId>& removed_ids,
   }
   report_.restored = report_.restored || is_server_older_ || needs_reupload_;
   file_.remove(removed);
-  forget_in_maps(file_, removed);
+  erase_views_from_maps(file_, removed);
   for (const ViewId view : removed) local_checksums_.erase(view);
   report_.removed_in_file += removed.size();
   return !removed.empty();
@@ -305,11 +305,11 @@ void Synchronisation::finish_download(const std::vector<std::int64_t>& blocks,
 
 std::size_t Synchronisation::count_withheld_changes() {
   std::size_t count = 0;
-  if (!server_.may_add()) {
+  if (!server_.can_add()) {
     for (const auto& [view, checksum] : local_checksums_)
       count += synchronised_.contains(view) ? 0 : 1;
   }
-  if (server_.may_change()) return count;
+  if (server_.can_change()) return count;
   for (const auto& [view, row] : synchronised_) {
     const auto found = local_checksums_.find(view);
     count += found == local_checksums_.end() || found->second != row.local_checksum ? 1 : 0;
@@ -349,7 +349,7 @@ void Synchronisation::drop_views_outside_areas() {
     outside.push_back(view);
   }
   file_.remove(outside);
-  forget_in_maps(file_, outside);
+  erase_views_from_maps(file_, outside);
   for (const ViewId view : outside) {
     forget_server_view(*synchronised_.at(view).server_view);
     local_checksums_.erase(view);

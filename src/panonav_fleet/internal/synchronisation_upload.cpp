@@ -50,10 +50,10 @@ std::map<ViewId, std::string> Synchronisation::find_local_changes() {
     const auto row = synchronised_.find(view);
     const bool is_new = row == synchronised_.end();
     if (!is_new && row->second.local_checksum == checksum) continue;
-    if (is_new ? server_.may_add() : server_.may_change()) changed.push_back(view);
+    if (is_new ? server_.can_add() : server_.can_change()) changed.push_back(view);
   }
   for (const auto& [view, row] : synchronised_) {
-    if (!local_checksums_.contains(view) && server_.may_change()) removed_locally_.push_back(view);
+    if (!local_checksums_.contains(view) && server_.can_change()) removed_locally_.push_back(view);
   }
   std::map<ViewId, std::string> names;
   const auto reading = file_.transaction(Kind::reading);
@@ -69,7 +69,7 @@ std::map<std::string, ServerView> Synchronisation::find_server_views(
   std::vector<std::string> all_names;
   for (const auto& [view, name] : names) all_names.push_back(name);
   std::map<std::string, ServerView> views;
-  for_each_part(all_names, rows_per_query, [&](std::span<const std::string> part) {
+  for_each_batch(all_names, rows_per_query, [&](std::span<const std::string> part) {
     for (ServerView& view : server_.find_views_by_name(part))
       views[view.info.name] = std::move(view);
   });
@@ -163,7 +163,7 @@ std::map<ViewId, std::string> Synchronisation::find_free_names(
     for (const auto& [view, name] : without_name)
       candidates.push_back(robot_prefixed_name(name, count));
     std::set<std::string> occupied;
-    for_each_part(candidates, rows_per_query, [&](std::span<const std::string> part) {
+    for_each_batch(candidates, rows_per_query, [&](std::span<const std::string> part) {
       for (const ServerView& view : server_.find_views_by_name(part))
         occupied.insert(view.info.name);
     });
@@ -192,7 +192,7 @@ std::vector<ViewId> Synchronisation::find_sent_views(bool are_new) const {
 void Synchronisation::upload_views() {
   const std::vector<ViewId> sent = find_sent_views(true);
   transfer_total_ = sent.size();
-  for_each_part(sent, views_per_batch, [&](std::span<const ViewId> part) {
+  for_each_batch(sent, views_per_batch, [&](std::span<const ViewId> part) {
     std::vector<ViewId> ids;
     std::vector<NewView> views;
     {
@@ -217,7 +217,7 @@ NewView Synchronisation::to_new_view(ViewId view, LocalRow row) {
   const auto read = [&](ViewAttachment table, Bytes& bytes) {
     auto stored = file_.bytes(table, view);
     if (!stored) return;
-    if (stored->checksum != bytes_checksum(view, stored->bytes)) {
+    if (stored->checksum != attachment_checksum(view, stored->bytes)) {
       file_.fail_damaged(
           std::string(table == ViewAttachment::thumbnails ? "thumbnails" : "features") +
           " of view " + std::to_string(view.value) + ": the checksum does not match");
@@ -243,8 +243,8 @@ void Synchronisation::upload_batch(const std::vector<ViewId>& ids,
     staged.push_back({i,
                       {ids[i], row.signature, id, row.local_checksum,
                        view_checksum(scratch_, id, view.info, signature), upload_number_},
-                      bytes_checksum(id, view.thumbnail),
-                      bytes_checksum(id, view.features)});
+                      attachment_checksum(id, view.thumbnail),
+                      attachment_checksum(id, view.features)});
   }
   // Views whose names were used just now are not among them: the next synchronisation finds other
   // names.
@@ -260,7 +260,7 @@ void Synchronisation::upload_batch(const std::vector<ViewId>& ids,
 }
 
 void Synchronisation::upload_changes() {
-  for_each_part(find_sent_views(false), rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_batch(find_sent_views(false), rows_per_query, [&](std::span<const ViewId> part) {
     std::vector<ViewId> ids, server_ids;
     std::vector<LocalRow> rows;
     {
@@ -302,7 +302,7 @@ void Synchronisation::upload_changes() {
 }
 
 void Synchronisation::upload_removals() {
-  for_each_part(removed_locally_, rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_batch(removed_locally_, rows_per_query, [&](std::span<const ViewId> part) {
     std::vector<ViewId> server_ids;
     std::map<ViewId, SynchronisedView> rows;
     local_checksums_ = read_view_checksums(file_);
@@ -352,7 +352,7 @@ std::vector<ViewId> Synchronisation::remove_on_server(
       if (checksum == checksums.at(id)) removed.push_back(id);
     }
     server_.tables().remove(removed);
-    forget_in_maps(server_.tables(), removed);
+    erase_views_from_maps(server_.tables(), removed);
     const std::string key = "parameter." + std::string(recordings_parameter);
     server_.tables().write_setting(key, std::string());
     writing->commit();
@@ -380,7 +380,7 @@ void Synchronisation::upload_links() {
   }
   for (const auto& [ends, kind] : links_) {
     if (local.contains(ends) || !is_in_file(ends.first) || !is_in_file(ends.second)) continue;
-    if (server_.may_change()) changed.push_back({{ends.first, ends.second, kind}, std::nullopt});
+    if (server_.can_change()) changed.push_back({{ends.first, ends.second, kind}, std::nullopt});
   }
   if (added.empty() && changed.empty()) return;
   report_.links_uploaded += server_.submit_links(added, changed);

@@ -39,7 +39,7 @@ DecodedVideo::DecodedVideo(const std::vector<std::string>& input, const std::str
   child_ = start_ffmpeg(arguments, about_);
 }
 
-void DecodedVideo::take_line(const std::string& line) {
+void DecodedVideo::parse_line(const std::string& line) {
   if (line.starts_with("[Parsed_showinfo")) {
     const auto at = line.find("] [info] n:");
     if (at == std::string::npos) return;
@@ -77,7 +77,7 @@ bool DecodedVideo::read_messages() {
   for (ssize_t i = 0; i < got; ++i) {
     const char c = buffer[static_cast<std::size_t>(i)];
     if (c == '\n') {
-      take_line(line_);
+      parse_line(line_);
       line_.clear();
     } else if (line_.size() < max_line) {
       line_ += c;

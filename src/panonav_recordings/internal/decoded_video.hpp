@@ -40,7 +40,7 @@ class DecodedVideo {
   /// Ends the program; `next`, which another thread may be in, then gives nothing more.
   void stop() const noexcept { child_->stop(); }
   /// Returns the last complaint of ffmpeg; empty without one.
-  [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
+  [[nodiscard]] const std::string& last_error() const noexcept { return trouble_; }
 
  private:
   struct Head {
@@ -58,7 +58,7 @@ class DecodedVideo {
   };
   using Clock = std::chrono::steady_clock;
   [[nodiscard]] Ready wait(bool for_picture, const std::optional<Clock::time_point>& until) const;
-  void take_line(const std::string& line);
+  void parse_line(const std::string& line);
 
   std::string about_;
   ImageLimits limits_;

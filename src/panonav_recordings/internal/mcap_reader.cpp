@@ -38,7 +38,7 @@ class McapFile : public ChunkedFile {
   [[nodiscard]] ChunkHead chunk_head(const Block& block) const override {
     constexpr std::uint64_t max_head_bytes = head_bytes + 8 + 8 + 8 + 4 + 4 + 32 + 8;
     const Buffer bytes =
-        bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
+        read_bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
     Fields fields(bytes.bytes());
     const auto kind = fields.number<McapRecord>();
     const auto length = fields.number<std::uint64_t>();
@@ -63,9 +63,9 @@ class McapFile : public ChunkedFile {
     return head;
   }
 
-  bool list_index(const Block& block, std::vector<Entry>& entries) const override {
+  bool list_index_entries(const Block& block, std::vector<Entry>& entries) const override {
     if (block.index_bytes > limits_.chunk_bytes) return false;
-    const Buffer bytes = bytes_at(block.index_at, block.index_bytes);
+    const Buffer bytes = read_bytes_at(block.index_at, block.index_bytes);
     Fields fields(bytes.bytes());
     while (fields.left() > 0) {
       const auto kind = fields.number<McapRecord>();
@@ -191,7 +191,7 @@ class McapFile : public ChunkedFile {
   std::optional<Footer> read_footer() {
     if (size() < mcap_magic.size() + footer_bytes) return std::nullopt;
     Footer footer{.at = size() - footer_bytes};
-    const Buffer end = bytes_at(footer.at, footer_bytes);
+    const Buffer end = read_bytes_at(footer.at, footer_bytes);
     Fields fields(end.bytes());
     const auto kind = fields.number<McapRecord>();
     const auto length = fields.number<std::uint64_t>();
@@ -209,7 +209,7 @@ class McapFile : public ChunkedFile {
     if (start < mcap_magic.size() || start > footer.at || footer.at - start > limits_.chunk_bytes) {
       return false;
     }
-    const Buffer bytes = bytes_at(start, footer.at - start + head_bytes + 16);
+    const Buffer bytes = read_bytes_at(start, footer.at - start + head_bytes + 16);
     if (footer.sum != 0 &&
         ::crc32(0, bytes.data.get(), static_cast<uInt>(bytes.size)) != footer.sum) {
       return false;
@@ -307,16 +307,16 @@ class McapFile : public ChunkedFile {
         break;
       } else if (kind == McapRecord::message && length >= message_head_bytes) {
         if (const auto message = message_in(head.subspan(head_bytes))) {
-          add_loose(at, head_bytes + length, message->time_ns, message->topic);
+          add_loose_message(at, head_bytes + length, message->time_ns, message->topic);
         }
       } else if ((kind == McapRecord::schema || kind == McapRecord::channel) &&
                  length <= limits_.chunk_bytes) {
-        declare(kind, bytes_at(at + head_bytes, length).bytes());
+        declare(kind, read_bytes_at(at + head_bytes, length).bytes());
       }
       if (is_cut) break;
       at += head_bytes + length;
     }
-    warn_cut(at);
+    warn_of_cut(at);
   }
 
   std::unordered_map<std::uint16_t, std::uint32_t> channels_;  // their topics

@@ -29,7 +29,7 @@ class MessageCollector {
   }
 
   /// Adds a message; one that cannot be read is counted.
-  void add(const MessagePlace& place, MessageBytes bytes) {
+  void add(const MessageLocation& place, MessageBytes bytes) {
     try {
       add_by_role(place, bytes);
     } catch (const ContractError& error) {
@@ -77,7 +77,7 @@ class MessageCollector {
     chain.reset();
   }
 
-  void add_by_role(const MessagePlace& place, MessageBytes bytes) {
+  void add_by_role(const MessageLocation& place, MessageBytes bytes) {
     switch (choice_.roles[place.topic]) {
       case TopicRole::none:
         break;
@@ -99,15 +99,15 @@ class MessageCollector {
     }
   }
 
-  [[nodiscard]] const RecordedTopic& topic_of(const MessagePlace& place) const {
+  [[nodiscard]] const RecordedTopic& topic_of(const MessageLocation& place) const {
     return recording_.topics()[place.topic];
   }
   template <class Message>
-  [[nodiscard]] Message read(const MessagePlace& place, MessageBytes bytes) const {
+  [[nodiscard]] Message read(const MessageLocation& place, MessageBytes bytes) const {
     return ros::read_message<Message>(bytes, topic_of(place).encoding);
   }
 
-  void add_picture(const MessagePlace& place, MessageBytes bytes) {
+  void add_picture(const MessageLocation& place, MessageBytes bytes) {
     if (topic_of(place).type == ros::CompressedImage::type) {
       made_.pictures.push_back({place, read<ros::CompressedImage>(place, bytes).header.stamp_ns});
       return;
@@ -119,13 +119,13 @@ class MessageCollector {
     made_.pictures.push_back({place, message.header.stamp_ns});
   }
 
-  void add_odometry(const MessagePlace& place, MessageBytes bytes) {
+  void add_odometry(const MessageLocation& place, MessageBytes bytes) {
     const auto message = read<ros::Odometry>(place, bytes);
     made_.odometry.add({place.time_ns, message.header.stamp_ns}, message.pose.pose);
     ++samples_;
   }
 
-  void add_transforms(const MessagePlace& place, MessageBytes bytes) {
+  void add_transforms(const MessageLocation& place, MessageBytes bytes) {
     const bool is_static = topic_of(place).name.ends_with("tf_static");
     for (const auto& each : read<ros::TFMessage>(place, bytes).transforms) {
       made_.chain->add(each, place.time_ns, is_static);
@@ -133,7 +133,7 @@ class MessageCollector {
     }
   }
 
-  void add_orientation(const MessagePlace& place, MessageBytes bytes) {
+  void add_orientation(const MessageLocation& place, MessageBytes bytes) {
     const auto message = read<ros::Imu>(place, bytes);
     const auto& [x, y, z, w] = message.orientation;
     const double length = std::sqrt(x * x + y * y + z * z + w * w);
@@ -147,7 +147,7 @@ class MessageCollector {
     ++samples_;
   }
 
-  void add_truth(const MessagePlace& place, MessageBytes bytes) {
+  void add_truth(const MessageLocation& place, MessageBytes bytes) {
     if (topic_of(place).type == ros::PoseStamped::type) {
       const auto message = read<ros::PoseStamped>(place, bytes);
       made_.truth.add({place.time_ns, message.header.stamp_ns}, message.pose);
@@ -185,7 +185,7 @@ bool RecordedMessages::sort() {
 RecordedMessages collect_messages(const std::filesystem::path& path, const Recording& recording,
                                   const TopicChoice& choice) {
   MessageCollector collector(path, recording, choice);
-  recording.for_each(choice.topics, {}, [&](const MessagePlace& place, MessageBytes bytes) {
+  recording.for_each(choice.topics, {}, [&](const MessageLocation& place, MessageBytes bytes) {
     collector.add(place, bytes);
   });
   return collector.finish();

@@ -16,7 +16,7 @@ namespace panonav::recordings {
 
 /// A picture of a recording that is not decoded yet.
 struct RecordedPicture {
-  MessagePlace place;
+  MessageLocation place;
   std::int64_t stamp_ns = 0;  ///< of its header
 };
 

@@ -57,13 +57,13 @@ class TopicChooser {
 
   void choose_pictures(const std::optional<std::string>& name) {
     constexpr std::string_view types = "sensor_msgs/Image or sensor_msgs/CompressedImage";
-    if (name) return use(find_named(*name, is_picture_type, types), TopicRole::picture);
-    auto names = names_of(is_picture_type);
+    if (name) return use(find_named_topics(*name, is_picture_type, types), TopicRole::picture);
+    auto names = find_topic_names(is_picture_type);
     if (names.size() > 1) std::erase_if(names, is_derived_from_images);
     if (names.size() == 1) return use(numbers_of(names[0], is_picture_type), TopicRole::picture);
     if (names.empty()) {
-      throw FileError(path_.string(), "has no images of " + std::string(types) +
-                                          "; its topics: " + list_topics(names_of(is_any_type)));
+      throw FileError(path_.string(), "has no images of " + std::string(types) + "; its topics: " +
+                                          list_topics(find_topic_names(is_any_type)));
     }
     throw FileError(path_.string(), "has images of several topics: " + list_topics(names) +
                                         "; choose one with the option image_topic");
@@ -74,10 +74,10 @@ class TopicChooser {
       throw ContractError("odometry", "a topic and frames", "one of the two");
     }
     if (requested.odometry) {
-      return use(find_named(*requested.odometry, is_odometry_type, ros::Odometry::type),
+      return use(find_named_topics(*requested.odometry, is_odometry_type, ros::Odometry::type),
                  TopicRole::odometry);
     }
-    const auto names = names_of(is_odometry_type);
+    const auto names = find_topic_names(is_odometry_type);
     if (!requested.odometry_frames && names.size() == 1) {
       return use(numbers_of(names[0], is_odometry_type), TopicRole::odometry);
     }
@@ -90,14 +90,14 @@ class TopicChooser {
     choice_.frames_are_named = requested.odometry_frames.has_value();
     choice_.frames = requested.odometry_frames.value_or(
         std::pair<std::string, std::string>{"odom", "base_link"});
-    for (const auto& name : names_of(is_transform_type)) {
+    for (const auto& name : find_topic_names(is_transform_type)) {
       use(numbers_of(name, is_transform_type), TopicRole::transforms);
     }
   }
 
   void choose_tilt(const std::optional<std::string>& name, const PictureSource& source) {
-    if (name) return use(find_named(*name, is_imu_type, ros::Imu::type), TopicRole::tilt);
-    const auto names = names_of(is_imu_type);
+    if (name) return use(find_named_topics(*name, is_imu_type, ros::Imu::type), TopicRole::tilt);
+    const auto names = find_topic_names(is_imu_type);
     if (names.empty()) return;
     if (names.size() > 1) {
       choice_.warnings.push_back("inertial sensors of several topics, of which none is used: " +
@@ -126,7 +126,7 @@ class TopicChooser {
     return found;
   }
 
-  [[nodiscard]] std::vector<std::string> names_of(IsType is_type) const {
+  [[nodiscard]] std::vector<std::string> find_topic_names(IsType is_type) const {
     std::vector<std::string> names;
     for (const auto& topic : recording_.topics()) {
       if (is_readable(topic, is_type)) names.push_back(topic.name);
@@ -137,13 +137,13 @@ class TopicChooser {
   }
 
   /// Returns the topic that the caller named, which must be there.
-  [[nodiscard]] TopicNumbers find_named(const std::string& name, IsType is_type,
-                                        std::string_view types) const {
+  [[nodiscard]] TopicNumbers find_named_topics(const std::string& name, IsType is_type,
+                                               std::string_view types) const {
     TopicNumbers found = numbers_of(name, is_type);
     if (found.empty()) {
       throw FileError(path_.string(), "has no topic " + to_readable_line(name) + " of " +
                                           std::string(types) +
-                                          "; it has: " + list_topics(names_of(is_type)));
+                                          "; it has: " + list_topics(find_topic_names(is_type)));
     }
     return found;
   }

@@ -69,7 +69,7 @@ void TransformChain::add(const ros::TransformStamped& transform, std::int64_t lo
     return;
   }
   link.track.add({log_ns, transform.header.stamp_ns}, transform.transform);
-  if (link.is_static) link.track.keep_last();
+  if (link.is_static) link.track.keep_only_last();
 }
 
 bool TransformChain::has_stamps() const {

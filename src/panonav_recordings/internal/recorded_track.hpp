@@ -22,7 +22,7 @@ struct RecordedTimes {
 class RecordedTrack {
  public:
   void add(const RecordedTimes& times, const ros::Pose& pose) { samples_.push_back({times, pose}); }
-  void keep_last() { samples_.erase(samples_.begin(), samples_.end() - 1); }
+  void keep_only_last() { samples_.erase(samples_.begin(), samples_.end() - 1); }
   [[nodiscard]] std::size_t size() const noexcept { return samples_.size(); }
   [[nodiscard]] bool has_stamps() const;
   /// Puts them in order, by the header's stamp or by the log time. Of one time the last stays.

@@ -72,7 +72,7 @@ void RecordingFile::fail(std::string_view what) const {
   throw FileError(path_.string(), to_readable_line(what));
 }
 
-void RecordingFile::require_room(std::size_t places, std::size_t max_places) const {
+void RecordingFile::check_message_limit(std::size_t places, std::size_t max_places) const {
   if (places > max_places) {
     fail("has too many messages to list; allowed: up to " + std::to_string(max_places));
   }
@@ -127,7 +127,7 @@ void ChunkedFile::read_bytes(std::uint64_t at, std::span<std::uint8_t> to) const
   }
 }
 
-Buffer ChunkedFile::bytes_at(std::uint64_t at, std::uint64_t count) const {
+Buffer ChunkedFile::read_bytes_at(std::uint64_t at, std::uint64_t count) const {
   if (at > size_ || count > size_ - at)
     fail("ends before byte " + std::to_string(at) + " + " + std::to_string(count));
   Buffer buffer(static_cast<std::size_t>(count));
@@ -139,13 +139,14 @@ std::span<const std::uint8_t> ChunkedFile::peek(std::uint64_t at, std::size_t ma
   if (at >= size_) return {};
   max_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(max_bytes, size_ - at));
   if (at < ahead_at_ || at + max_bytes > ahead_at_ + ahead_.size) {
-    ahead_ = bytes_at(at, std::min<std::uint64_t>(std::max(max_bytes, ahead_bytes), size_ - at));
+    ahead_ =
+        read_bytes_at(at, std::min<std::uint64_t>(std::max(max_bytes, ahead_bytes), size_ - at));
     ahead_at_ = at;
   }
   return ahead_.bytes().subspan(static_cast<std::size_t>(at - ahead_at_), max_bytes);
 }
 
-void ChunkedFile::warn_cut(std::uint64_t at) const {
+void ChunkedFile::warn_of_cut(std::uint64_t at) const {
   warn(at >= size_ ? "was not closed or is cut off; the existing part is read"
                    : "is damaged or cut off at byte " + std::to_string(at) + " of " +
                          std::to_string(size_) + "; the part before it is read");
@@ -159,7 +160,7 @@ std::vector<std::optional<TimeSpan>> ChunkedFile::blocks() const {
 }
 
 Buffer ChunkedFile::unpack_block(const Block& block) const {
-  if (block.is_loose) return bytes_at(block.at, block.bytes);
+  if (block.is_loose) return read_bytes_at(block.at, block.bytes);
   const ChunkHead head = chunk_head(block);
   if (std::max(head.packed_bytes, head.unpacked_bytes) > limits_.chunk_bytes) {
     fail(describe_chunk(block.at) + " has " +
@@ -178,7 +179,7 @@ Buffer ChunkedFile::unpack_block(const Block& block) const {
   }
   const auto there = head.at > size_ ? 0 : size_ - head.at;
   const auto count = block.is_cut ? std::min(head.packed_bytes, there) : head.packed_bytes;
-  Buffer packed = bytes_at(head.at, count);
+  Buffer packed = read_bytes_at(head.at, count);
   if (head.packing == Packing::none) {
     if (head.unpacked_bytes != head.packed_bytes) {
       fail(describe_chunk(block.at) + " is damaged: it tells two sizes");
@@ -221,10 +222,10 @@ std::shared_ptr<const Buffer> ChunkedFile::content(std::uint64_t block) const {
 
 void ChunkedFile::list(std::size_t block, const std::vector<bool>& chosen_topics,
                        const TimeSpan& within, std::size_t max_places,
-                       std::vector<MessagePlace>& places) const {
+                       std::vector<MessageLocation>& places) const {
   const Block& from = blocks_.at(block);
   std::vector<Entry> read;
-  if (!from.entries && (!list_index(from, read) || read.size() != from.messages)) {
+  if (!from.entries && (!list_index_entries(from, read) || read.size() != from.messages)) {
     warn("the index of " + describe_chunk(from.at) + " is damaged; the chunk itself is read");
     read.clear();
     if (!walk(content(block)->bytes(), read)) {
@@ -237,11 +238,11 @@ void ChunkedFile::list(std::size_t block, const std::vector<bool>& chosen_topics
       continue;
     }
     places.push_back({entry.time_ns, entry.topic, 0, block, entry.offset});
-    require_room(places.size(), max_places);
+    check_message_limit(places.size(), max_places);
   }
 }
 
-RecordedMessage ChunkedFile::read(const MessagePlace& place) const {
+RecordedMessage ChunkedFile::read(const MessageLocation& place) const {
   auto block = content(place.block);
   std::optional<RecordedMessage> message;
   if (place.offset < block->size) message = message_at(block->bytes(), place.offset);
@@ -254,7 +255,7 @@ RecordedMessage ChunkedFile::read(const MessagePlace& place) const {
 
 void ChunkedFile::note(Block& block, const Entry& entry) {
   ++topics_[entry.topic].messages;
-  require_room(++noted_, limits_.messages);
+  check_message_limit(++noted_, limits_.messages);
   if (!block.time) block.time = TimeSpan{entry.time_ns, entry.time_ns};
   block.time->begin_ns = std::min(block.time->begin_ns, entry.time_ns);
   block.time->end_ns = std::max(block.time->end_ns, entry.time_ns);
@@ -283,8 +284,8 @@ void ChunkedFile::add_chunk(std::uint64_t at, bool is_cut) {
   blocks_.push_back(std::move(block));
 }
 
-void ChunkedFile::add_loose(std::uint64_t at, std::uint64_t bytes, std::int64_t time_ns,
-                            std::uint32_t topic) {
+void ChunkedFile::add_loose_message(std::uint64_t at, std::uint64_t bytes, std::int64_t time_ns,
+                                    std::uint32_t topic) {
   if (bytes > limits_.chunk_bytes) {
     warn("the message at byte " + std::to_string(at) + " has " + std::to_string(bytes) +
          " bytes and is left out; allowed: up to " + std::to_string(limits_.chunk_bytes));

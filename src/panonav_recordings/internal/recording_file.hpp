@@ -41,9 +41,9 @@ class RecordingFile {
   /// span, in any order. Throws FileError beyond `max_places` places in all.
   virtual void list(std::size_t block, const std::vector<bool>& chosen_topics,
                     const TimeSpan& within, std::size_t max_places,
-                    std::vector<MessagePlace>& places) const = 0;
+                    std::vector<MessageLocation>& places) const = 0;
   /// Throws FileError on damage.
-  [[nodiscard]] virtual RecordedMessage read(const MessagePlace& place) const = 0;
+  [[nodiscard]] virtual RecordedMessage read(const MessageLocation& place) const = 0;
   /// Adds the line "PATH: what" to the warnings, once.
   void warn(std::string_view what) const;
   void warn(const FileError& error) const;
@@ -56,7 +56,7 @@ class RecordingFile {
   std::uint32_t topic_of(std::string_view name, std::string_view type, std::string_view encoding);
   void forget_topics() noexcept;
   /// Throws FileError when there are more places than allowed.
-  void require_room(std::size_t places, std::size_t max_places) const;
+  void check_message_limit(std::size_t places, std::size_t max_places) const;
   [[noreturn]] void fail(std::string_view what) const;
 
   std::vector<RecordedTopic> topics_;
@@ -113,8 +113,8 @@ class ChunkedFile : public RecordingFile {
   ChunkedFile& operator=(const ChunkedFile&) = delete;
   [[nodiscard]] std::vector<std::optional<TimeSpan>> blocks() const override;
   void list(std::size_t block, const std::vector<bool>& chosen_topics, const TimeSpan& within,
-            std::size_t max_places, std::vector<MessagePlace>& places) const override;
-  [[nodiscard]] RecordedMessage read(const MessagePlace& place) const override;
+            std::size_t max_places, std::vector<MessageLocation>& places) const override;
+  [[nodiscard]] RecordedMessage read(const MessageLocation& place) const override;
 
  protected:
   struct Entry {
@@ -147,7 +147,7 @@ class ChunkedFile : public RecordingFile {
   /// Throws a FileError on damage.
   [[nodiscard]] virtual ChunkHead chunk_head(const Block& block) const = 0;
   /// Appends the entries of the index after the chunk. False if it is damaged.
-  virtual bool list_index(const Block& block, std::vector<Entry>& entries) const = 0;
+  virtual bool list_index_entries(const Block& block, std::vector<Entry>& entries) const = 0;
   /// The message whose record begins there, without owner; empty where none does.
   [[nodiscard]] virtual std::optional<RecordedMessage> message_at(
       std::span<const std::uint8_t> block, std::size_t offset) const = 0;
@@ -160,13 +160,14 @@ class ChunkedFile : public RecordingFile {
   /// of it. `is_cut`: the file ends within the chunk; its beginning is kept. Warns of damage.
   void add_chunk(std::uint64_t at, bool is_cut);
   /// A message outside of chunks, in the record of `bytes` bytes at `at`.
-  void add_loose(std::uint64_t at, std::uint64_t bytes, std::int64_t time_ns, std::uint32_t topic);
+  void add_loose_message(std::uint64_t at, std::uint64_t bytes, std::int64_t time_ns,
+                         std::uint32_t topic);
   /// The file ends, or is damaged from there on.
-  void warn_cut(std::uint64_t at) const;
+  void warn_of_cut(std::uint64_t at) const;
   /// The size of the file when it was opened.
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
   /// Reads `count` bytes of the file. Throws FileError where it lacks them.
-  [[nodiscard]] Buffer bytes_at(std::uint64_t at, std::uint64_t count) const;
+  [[nodiscard]] Buffer read_bytes_at(std::uint64_t at, std::uint64_t count) const;
   /// Returns bytes for small records one after another, reading ahead; fewer at the end of the
   /// file. They are valid until the next call.
   [[nodiscard]] std::span<const std::uint8_t> peek(std::uint64_t at, std::size_t max_bytes);

@@ -51,7 +51,7 @@ class BagFields {
 };
 
 // Seconds in the lower half, nanoseconds in the upper.
-std::int64_t bag_time(std::uint64_t stamp) {
+std::int64_t bag_time_to_ns(std::uint64_t stamp) {
   constexpr std::int64_t second_ns = 1'000'000'000;
   return static_cast<std::int64_t>(stamp & 0xFFFF'FFFFU) * second_ns +
          static_cast<std::int64_t>(stamp >> 32U);
@@ -85,7 +85,7 @@ class BagFile : public ChunkedFile {
   [[nodiscard]] ChunkHead chunk_head(const Block& block) const override {
     constexpr std::uint64_t max_head_bytes = 4096;
     const Buffer bytes =
-        bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
+        read_bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
     Fields fields(bytes.bytes());
     const auto header = fields.prefixed();
     const BagFields named(header);
@@ -107,12 +107,12 @@ class BagFile : public ChunkedFile {
     return head;
   }
 
-  bool list_index(const Block& block, std::vector<Entry>& entries) const override {
+  bool list_index_entries(const Block& block, std::vector<Entry>& entries) const override {
     const ChunkHead head = chunk_head(block);
     const std::uint64_t begin = head.at + head.packed_bytes;
     const std::uint64_t end = block.index_at + block.index_bytes;
     if (begin > end || end - begin > limits_.chunk_bytes) return false;
-    const Buffer bytes = bytes_at(begin, end - begin);
+    const Buffer bytes = read_bytes_at(begin, end - begin);
     Fields fields(bytes.bytes());
     while (fields.left() > 0) {
       const BagFields header(fields.prefixed());
@@ -125,7 +125,7 @@ class BagFile : public ChunkedFile {
         return false;
       }
       while (data.left() > 0) {
-        const auto time = bag_time(data.number<std::uint64_t>());
+        const auto time = bag_time_to_ns(data.number<std::uint64_t>());
         entries.push_back({time, topic->second, data.number<std::uint32_t>()});
       }
     }
@@ -178,7 +178,7 @@ class BagFile : public ChunkedFile {
       return std::nullopt;
     }
     RecordedMessage message;
-    message.time_ns = bag_time(*time);
+    message.time_ns = bag_time_to_ns(*time);
     message.topic = topic->second;
     message.bytes = data;
     return message;
@@ -194,7 +194,7 @@ class BagFile : public ChunkedFile {
   // damaged.
   bool read_index(std::uint64_t index_at, std::uint32_t chunks) {
     if (index_at < bag_magic.size() || size() - index_at > limits_.chunk_bytes) return false;
-    const Buffer bytes = bytes_at(index_at, size() - index_at);
+    const Buffer bytes = read_bytes_at(index_at, size() - index_at);
     Fields fields(bytes.bytes());
     while (fields.left() > 0) {
       const BagFields header(fields.prefixed());
@@ -217,7 +217,7 @@ class BagFile : public ChunkedFile {
         topics_[topic->second].messages += count;
         block.messages += count;
       }
-      if (block.messages > 0) block.time = TimeSpan{bag_time(*begin), bag_time(*end)};
+      if (block.messages > 0) block.time = TimeSpan{bag_time_to_ns(*begin), bag_time_to_ns(*end)};
       blocks_.push_back(std::move(block));
     }
     if (blocks_.size() != chunks) return false;
@@ -251,16 +251,16 @@ class BagFile : public ChunkedFile {
       } else if (*kind == BagRecord::message) {
         // A killed recorder leaves those of its last chunk so.
         if (const auto message = message_in(header, {})) {
-          add_loose(at, data_at + data_bytes - at, message->time_ns, message->topic);
+          add_loose_message(at, data_at + data_bytes - at, message->time_ns, message->topic);
         }
       } else if (*kind == BagRecord::connection && data_bytes <= limits_.chunk_bytes) {
-        const Buffer data = bytes_at(data_at, data_bytes);
+        const Buffer data = read_bytes_at(data_at, data_bytes);
         declare(BagFields(Fields(peek(at, 4 + length)).prefixed()), BagFields(data.bytes()));
       }
       if (is_cut) break;
       at = data_at + data_bytes;
     }
-    if (at != index_at) warn_cut(at);
+    if (at != index_at) warn_of_cut(at);
   }
 
   std::unordered_map<std::uint32_t, std::uint32_t> connections_;  // their topics

@@ -44,7 +44,7 @@ class DatabaseFile : public RecordingFile {
         SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE,
         nullptr);
     handle_.reset(handle);
-    if (code != SQLITE_OK) fail_as(code);
+    if (code != SQLITE_OK) throw_sqlite_error(code);
     // A foreign or damaged file must not make SQLite run code, take much memory or never end.
     constexpr int steps_per_check = 20000;
     sqlite3_progress_handler(
@@ -93,7 +93,7 @@ class DatabaseFile : public RecordingFile {
   [[nodiscard]] std::vector<std::optional<TimeSpan>> blocks() const override { return {time_}; }
 
   void list(std::size_t, const std::vector<bool>& chosen_topics, const TimeSpan& within,
-            std::size_t max_places, std::vector<MessagePlace>& places) const override {
+            std::size_t max_places, std::vector<MessageLocation>& places) const override {
     const std::lock_guard lock(mutex_);
     // The index of times is faster only for a part of the messages.
     const bool is_all = within.begin_ns <= time_->begin_ns && within.end_ns >= time_->end_ns;
@@ -109,11 +109,11 @@ class DatabaseFile : public RecordingFile {
       const auto place = read_place(rows);
       if (!place || !chosen_topics[place->topic]) continue;
       places.push_back(*place);
-      require_room(places.size(), max_places);
+      check_message_limit(places.size(), max_places);
     }
   }
 
-  [[nodiscard]] RecordedMessage read(const MessagePlace& place) const override {
+  [[nodiscard]] RecordedMessage read(const MessageLocation& place) const override {
     const std::lock_guard lock(mutex_);
     const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_reset)> rewind(find_.get(),
                                                                          sqlite3_reset);
@@ -142,7 +142,7 @@ class DatabaseFile : public RecordingFile {
     void operator()(sqlite3* handle) const noexcept { sqlite3_close_v2(handle); }
   };
 
-  [[noreturn]] void fail_as(int code) const {
+  [[noreturn]] void throw_sqlite_error(int code) const {
     const std::string what = handle_ ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code);
     switch (code & 0xFF) {
       case SQLITE_CANTOPEN:
@@ -160,13 +160,13 @@ class DatabaseFile : public RecordingFile {
     steps_left_ = steps_allowed_;
     sqlite3_stmt* statement = nullptr;
     const int code = sqlite3_prepare_v2(handle_.get(), sql, -1, &statement, nullptr);
-    if (code != SQLITE_OK) fail_as(code);
+    if (code != SQLITE_OK) throw_sqlite_error(code);
     return Statement(statement);
   }
 
   bool step(const Statement& statement) const {
     const int code = sqlite3_step(statement.get());
-    if (code != SQLITE_ROW && code != SQLITE_DONE) fail_as(code);
+    if (code != SQLITE_ROW && code != SQLITE_DONE) throw_sqlite_error(code);
     return code == SQLITE_ROW;
   }
 
@@ -188,7 +188,7 @@ class DatabaseFile : public RecordingFile {
 
   // Reads the place of a message from a row that begins with id, topic and time. Empty where these
   // have other types.
-  [[nodiscard]] std::optional<MessagePlace> read_place(const Statement& row) const {
+  [[nodiscard]] std::optional<MessageLocation> read_place(const Statement& row) const {
     for (int column = 0; column < 3; ++column) {
       if (sqlite3_column_type(row.get(), column) != SQLITE_INTEGER) {
         warn("messages without a time or topic are left out");
@@ -201,7 +201,7 @@ class DatabaseFile : public RecordingFile {
            " are left out: the topic is not described");
       return std::nullopt;
     }
-    MessagePlace place;
+    MessageLocation place;
     place.time_ns = sqlite3_column_int64(row.get(), 2);
     place.topic = topic->second;
     place.offset = static_cast<std::uint64_t>(sqlite3_column_int64(row.get(), 0));

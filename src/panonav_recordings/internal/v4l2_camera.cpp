@@ -54,7 +54,7 @@ int open_device(const std::string& device) {
   return descriptor;
 }
 
-std::vector<std::uint32_t> pixel_formats(int descriptor) {
+std::vector<std::uint32_t> list_pixel_formats(int descriptor) {
   constexpr std::uint32_t max_formats = 64;
   std::vector<std::uint32_t> formats;
   for (v4l2_fmtdesc format{}; format.index < max_formats; ++format.index) {
@@ -89,10 +89,10 @@ double wall_minus_monotonic_s() {
 
 }  // namespace
 
-std::vector<CameraFormat> camera_formats(const std::filesystem::path& device) {
+std::vector<CameraFormat> list_camera_formats(const std::filesystem::path& device) {
   const int descriptor = open_device(device.string());
   std::vector<CameraFormat> formats;
-  for (const std::uint32_t pixels : pixel_formats(descriptor)) {
+  for (const std::uint32_t pixels : list_pixel_formats(descriptor)) {
     CameraFormat format{format_name(pixels), is_usable(pixels), {}};
     constexpr std::uint32_t max_sizes = 256;
     for (v4l2_frmsizeenum size{}; size.index < max_sizes; ++size.index) {
@@ -120,7 +120,7 @@ V4l2Camera::V4l2Camera(std::string device, const std::optional<ImageSize>& size)
 }
 
 void V4l2Camera::start(const std::optional<ImageSize>& size) {
-  const auto offered = pixel_formats(descriptor_);
+  const auto offered = list_pixel_formats(descriptor_);
   const auto* const chosen = std::ranges::find_if(usable, [&](std::uint32_t pixels) {
     return std::ranges::find(offered, pixels) != offered.end();
   });

@@ -23,7 +23,7 @@ class HeadReader {
   static MHD_Result read(void* self, MHD_ValueKind /*kind*/, const char* name, const char* value) {
     auto& head = *static_cast<HeadReader*>(self);
     if (value == nullptr) value = "";
-    head.check_place(name, value);
+    head.check_adjacency(name, value);
     head.read_field(to_lower_case(name), value);
     return MHD_YES;
   }
@@ -47,7 +47,7 @@ class HeadReader {
   /// A lenient libmicrohttpd takes heads that others read in another way: folded lines, and lines
   /// that end in "\n" or "\r" alone. It parses in place, and ends each text by as many zeros as the
   /// line had characters at its end, which is how these are noticed here.
-  void check_place(const char* name, const char* value) {
+  void check_adjacency(const char* name, const char* value) {
     has_whole_lines_ = has_whole_lines_ && line_end_ + 2 == name;
     line_end_ = value + std::strlen(value);
   }
@@ -62,13 +62,13 @@ class HeadReader {
         !std::ranges::all_of(value, is_text)) {
       set_refusal(400);
     }
-    if (name == "host") read_once(request_.host, value);
-    if (name == "origin") read_once(request_.origin, value);
-    if (name == "authorization") read_once(request_.authorization, value);
+    if (name == "host") read_unique_field(request_.host, value);
+    if (name == "origin") read_unique_field(request_.origin, value);
+    if (name == "authorization") read_unique_field(request_.authorization, value);
     if (name == "transfer-encoding") set_refusal(501);
     if (name == "content-length") read_length(value);
   }
-  void read_once(std::string& field, std::string_view value) {
+  void read_unique_field(std::string& field, std::string_view value) {
     if (!field.empty() || value.empty()) set_refusal(400);
     field = value;
   }

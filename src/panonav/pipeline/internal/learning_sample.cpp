@@ -13,7 +13,7 @@ constexpr double area_side_m = 10.0;
 // Views loaded before a drawn one without a position, and as many from it on: chosen.
 constexpr std::size_t views_before = 128;
 
-PositionBounds area_around(Point2 position) {
+PositionBounds enclosing_area_bounds(Point2 position) {
   const double x_m = std::floor(position.x_m / area_side_m) * area_side_m;
   const double y_m = std::floor(position.y_m / area_side_m) * area_side_m;
   return {x_m, x_m + area_side_m, y_m, y_m + area_side_m};
@@ -32,7 +32,7 @@ VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> view
     if (sample.size() >= max_views) break;
     if (!seeds.contains(seed)) continue;
     if (const auto& pose = seeds.info(seed).pose) {
-      const PositionBounds area = area_around(pose->position());
+      const PositionBounds area = enclosing_area_bounds(pose->position());
       add(index.views_within(std::span(&area, 1)));
     } else {
       const auto at =

@@ -39,9 +39,9 @@ struct LearntModels {
 /// Reads the models that the file keeps, to the bit as `learn_models` gives them; nullopt where it
 /// keeps none or has changed since. `memory` holds all views of the file. Never writes. Cost: one
 /// pass over the signatures, 40 ms for 100,000 of 20 x 15.
-[[nodiscard]] std::optional<LearntModels> load_kept_models(const MemoryFile& file,
-                                                           const VisualMemory& memory);
+[[nodiscard]] std::optional<LearntModels> load_stored_models(const MemoryFile& file,
+                                                             const VisualMemory& memory);
 /// Reads the models that were kept last, whichever views the file has now.
-[[nodiscard]] std::optional<LearntModels> load_kept_models(const MemoryFile& file);
+[[nodiscard]] std::optional<LearntModels> load_stored_models(const MemoryFile& file);
 
 }  // namespace panonav

@@ -14,7 +14,7 @@ namespace panonav {
 namespace {
 
 // An SQLite URI, in which some characters must be escaped.
-std::string immutable_uri(const std::filesystem::path& path) {
+std::string make_immutable_uri(const std::filesystem::path& path) {
   constexpr char digits[] = "0123456789ABCDEF";
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(path).string()) {
@@ -59,7 +59,7 @@ Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::m
       break;
     case DatabaseMode::immutable:
       flags |= SQLITE_OPEN_READONLY | SQLITE_OPEN_URI;
-      name = immutable_uri(path_);
+      name = make_immutable_uri(path_);
       break;
   }
   sqlite3* handle = nullptr;

@@ -142,7 +142,7 @@ bool forget_views(TopologicalMap& map, const std::set<ViewId>& forgotten) {
   return true;
 }
 
-void forget_in_maps(MemoryTables& tables, std::span<const ViewId> views) {
+void erase_views_from_maps(MemoryTables& tables, std::span<const ViewId> views) {
   const std::set<ViewId> forgotten(views.begin(), views.end());
   for (const std::string& name : tables.map_names()) {
     auto map = read_map(tables, name);

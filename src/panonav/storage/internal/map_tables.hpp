@@ -25,7 +25,7 @@ bool erase_map(MemoryTables& tables, std::string_view name);
 /// one was in it.
 bool forget_views(TopologicalMap& map, const std::set<ViewId>& forgotten);
 /// Drops the nodes of these views, and their edges, from all maps.
-void forget_in_maps(MemoryTables& tables, std::span<const ViewId> views);
+void erase_views_from_maps(MemoryTables& tables, std::span<const ViewId> views);
 /// Passes every map to `check` that may throw; `check` keeps what it threw. `known` says whether a
 /// view is there.
 void verify_maps(MemoryTables& tables, const std::function<bool(ViewId)>& known,

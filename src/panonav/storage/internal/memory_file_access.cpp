@@ -137,7 +137,7 @@ void prepare_for_changes(Database& database) {
   throw FileError(path.string(), "already exists; allowed: a name that is free");
 }
 
-void require_free_name(const fs::path& path) {
+void check_path_is_free(const fs::path& path) {
   std::error_code ignored;
   const std::string name = path.string();
   if (fs::exists(fs::symlink_status(path, ignored))) throw_name_taken(path);
@@ -176,7 +176,7 @@ void create_memory_tables(const fs::path& path, const MemoryHeader& header,
                           const std::function<void(MemoryTables&)>& fill) {
   validate(header);
   if (const auto scheme = find_memory_scheme(path)) return scheme->create(path, header, fill);
-  require_free_name(path);
+  check_path_is_free(path);
   const TemporaryFile unfinished(path);
   remove_log_files(unfinished.path());
   try {

@@ -29,7 +29,7 @@ std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo&
   return static_cast<std::int64_t>(checksum(signature, checksum(scratch.bytes())));
 }
 
-std::int64_t bytes_checksum(ViewId view, std::span<const std::uint8_t> bytes) {
+std::int64_t attachment_checksum(ViewId view, std::span<const std::uint8_t> bytes) {
   RecordBytes record;
   record.add(std::int64_t{view.value});
   return static_cast<std::int64_t>(checksum(bytes, checksum(record.bytes())));
@@ -69,7 +69,7 @@ void throw_used_name(std::string_view what, std::string_view name,
                       "a name that is unique");
 }
 
-void require_name(std::string_view what, std::string_view name) {
+void check_new_name(std::string_view what, std::string_view name) {
   constexpr std::size_t max_bytes = 4096;
   const bool control = std::ranges::any_of(
       name, [](char c) { return static_cast<unsigned char>(c) < 0x20U || c == 0x7F; });

@@ -18,9 +18,9 @@ namespace panonav {
 
 /// Calls work(part) for one part of the rows after the other.
 template <class Row, class Work>
-void for_each_part(const std::vector<Row>& rows, std::size_t at_once, const Work& work) {
-  for (std::size_t at = 0; at < rows.size(); at += at_once) {
-    work(std::span(rows).subspan(at, std::min(at_once, rows.size() - at)));
+void for_each_batch(const std::vector<Row>& rows, std::size_t batch_size, const Work& work) {
+  for (std::size_t at = 0; at < rows.size(); at += batch_size) {
+    work(std::span(rows).subspan(at, std::min(batch_size, rows.size() - at)));
   }
 }
 
@@ -31,7 +31,7 @@ void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>&
 [[nodiscard]] std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,
                                          std::span<const std::uint8_t> signature);
 /// Computes the checksum of a thumbnail or of local features.
-[[nodiscard]] std::int64_t bytes_checksum(ViewId view, std::span<const std::uint8_t> bytes);
+[[nodiscard]] std::int64_t attachment_checksum(ViewId view, std::span<const std::uint8_t> bytes);
 [[nodiscard]] std::int64_t link_checksum(const Link& link);
 [[nodiscard]] std::int64_t setting_checksum(std::string_view key, const SettingValue& value);
 /// Computes the checksum of a change that can be undone; `stamp_s` is when it was made.
@@ -46,7 +46,7 @@ void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>&
                                   const std::filesystem::path& file);
 
 /// Throws ContractError on a new name that people could not type or read.
-void require_name(std::string_view what, std::string_view name);
+void check_new_name(std::string_view what, std::string_view name);
 
 /// Largest size of a change kept for undo: SQLite's fields have at most 256 MiB.
 inline constexpr std::int64_t max_undo_bytes = 200 << 20;

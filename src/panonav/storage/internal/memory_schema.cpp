@@ -123,13 +123,13 @@ void require_memory_file(const std::filesystem::path& path) {
   if (code != SQLITE_OK || std::memcmp(head.data(), magic.data(), magic.size()) != 0) {
     throw FileError(name, "is not a memory file; allowed: memory files that panonav made");
   }
-  const std::uint32_t application_id = big_endian(head.data() + 68);
+  const std::uint32_t application_id = read_big_endian_word(head.data() + 68);
   if (application_id != memory_application_id) {
     throw FileError(name, "is an SQLite file of another program: application_id is " +
                               to_hexadecimal(application_id) +
                               "; allowed: " + to_hexadecimal(memory_application_id));
   }
-  const std::uint32_t version = big_endian(head.data() + 60);
+  const std::uint32_t version = read_big_endian_word(head.data() + 60);
   if (version != static_cast<std::uint32_t>(memory_format_version)) {
     throw FileError(name, "has format version " + std::to_string(version) +
                               "; allowed: " + std::to_string(memory_format_version));

@@ -77,7 +77,7 @@ std::optional<std::vector<std::uint8_t>> MemoryTables::read_checked_bytes(ViewAt
   require_views(std::span(&view, 1));
   auto stored = bytes(table, view);
   if (!stored) return std::nullopt;
-  if (stored->checksum != bytes_checksum(view, stored->bytes)) {
+  if (stored->checksum != attachment_checksum(view, stored->bytes)) {
     fail_damaged(table == ViewAttachment::thumbnails
                      ? "the thumbnail of view " + std::to_string(view.value) +
                            " does not match its checksum"

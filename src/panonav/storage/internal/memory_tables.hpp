@@ -216,7 +216,7 @@ class MemoryTables {
   [[nodiscard]] virtual std::vector<std::string> routes_with_blocks() = 0;
 
   /// Within a writing transaction: runs `changes` and keeps what they replace or drop.
-  virtual void keep_for_undo(const std::function<void()>& changes, const std::string& what) = 0;
+  virtual void run_with_undo(const std::function<void()>& changes, const std::string& what) = 0;
   /// The newest first.
   [[nodiscard]] virtual std::vector<MemoryFile::KeptChange> history() = 0;
   /// Undoes the newest change, within a writing transaction.

@@ -23,7 +23,7 @@ double& to_real(Pose2& pose, std::size_t i) {
 }
 
 // Returns the columns by which the line before is shifted to the heading of this one.
-std::size_t columns_between(const Pose2& before, const Pose2& now, std::size_t columns) {
+std::size_t rotation_in_columns(const Pose2& before, const Pose2& now, std::size_t columns) {
   const auto size = static_cast<long long>(columns);
   const auto turn = std::llround((now.heading_rad - before.heading_rad) *
                                  static_cast<double>(columns) / (2.0 * std::numbers::pi));
@@ -75,7 +75,7 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
     std::size_t turn = 0;
     if (n > 0) {
       before = route.line(first + n - 1);
-      turn = columns_between(route.poses()[first + n - 1], pose, columns);
+      turn = rotation_in_columns(route.poses()[first + n - 1], pose, columns);
     }
     plain[8 * reals_of_pose * count + n] = static_cast<std::uint8_t>(turn & 255U);
     plain[(8 * reals_of_pose + 1) * count + n] = static_cast<std::uint8_t>(turn >> 8U);

@@ -134,7 +134,7 @@ void SqliteTables::insert_attachment(ViewAttachment table, ViewId view,
   const char* const sql = table == ViewAttachment::thumbnails
                               ? "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"
                               : "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)";
-  if (run_statement(database_, sql, view, bytes, bytes_checksum(view, bytes)) != 0) {
+  if (run_statement(database_, sql, view, bytes, attachment_checksum(view, bytes)) != 0) {
     fail_damaged("an entry of " + std::string(name_of(table)) + " without a view");
   }
 }

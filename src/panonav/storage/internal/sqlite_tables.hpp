@@ -65,7 +65,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::int64_t route_bytes(std::string_view route) override;
   [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
 
-  void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
+  void run_with_undo(const std::function<void()>& changes, const std::string& what) override;
   [[nodiscard]] std::vector<MemoryFile::KeptChange> history() override;
   void undo() override;
 

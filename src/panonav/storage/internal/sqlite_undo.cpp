@@ -95,7 +95,7 @@ int is_undone(void*, const char* table) {
 
 }  // namespace
 
-void SqliteTables::keep_for_undo(const std::function<void()>& changes, const std::string& what) {
+void SqliteTables::run_with_undo(const std::function<void()>& changes, const std::string& what) {
   const auto check = [&](int code) {
     if (code != SQLITE_OK) database_.fail(code);
   };

@@ -81,15 +81,16 @@ class LogReader {
   explicit LogReader(const fs::path& log) : in_(log, std::ios::binary) {
     std::array<std::uint8_t, 32> head{};
     if (!read(head)) return;
-    const std::uint32_t magic = big_endian(head.data());
-    page_bytes_ = big_endian(head.data() + 8);
+    const std::uint32_t magic = read_big_endian_word(head.data());
+    page_bytes_ = read_big_endian_word(head.data() + 8);
     big_endian_sums_ = (magic & 1U) != 0;
-    salts_ = {big_endian(head.data() + 16), big_endian(head.data() + 20)};
-    add_to_sums(std::span(head).first(24));
+    salts_ = {read_big_endian_word(head.data() + 16), read_big_endian_word(head.data() + 20)};
+    update_checksums(std::span(head).first(24));
     const bool power_of_two =
         page_bytes_ >= 512 && page_bytes_ <= 65536 && (page_bytes_ & (page_bytes_ - 1)) == 0;
-    valid_ = (magic & ~1U) == 0x377F0682U && power_of_two && sums_[0] == big_endian(&head[24]) &&
-             sums_[1] == big_endian(&head[28]);
+    valid_ = (magic & ~1U) == 0x377F0682U && power_of_two &&
+             sums_[0] == read_big_endian_word(&head[24]) &&
+             sums_[1] == read_big_endian_word(&head[28]);
   }
 
   struct Content {
@@ -103,16 +104,18 @@ class LogReader {
     std::vector<std::uint8_t> frame(24 + std::size_t{page_bytes_});
     while (valid_ && read(frame)) {
       const auto page = std::span<const std::uint8_t>(frame).subspan(24);
-      add_to_sums(std::span<const std::uint8_t>(frame).first(8));
-      add_to_sums(page);
-      if (salts_[0] != big_endian(&frame[8]) || salts_[1] != big_endian(&frame[12]) ||
-          sums_[0] != big_endian(&frame[16]) || sums_[1] != big_endian(&frame[20])) {
+      update_checksums(std::span<const std::uint8_t>(frame).first(8));
+      update_checksums(page);
+      if (salts_[0] != read_big_endian_word(&frame[8]) ||
+          salts_[1] != read_big_endian_word(&frame[12]) ||
+          sums_[0] != read_big_endian_word(&frame[16]) ||
+          sums_[1] != read_big_endian_word(&frame[20])) {
         break;
       }
-      if (big_endian(frame.data()) == page_of_marks) {
+      if (read_big_endian_word(frame.data()) == page_of_marks) {
         if (const auto marks = find_marks(page)) content.marks.push_back(*marks);
       }
-      if (big_endian(&frame[4]) == 0) continue;
+      if (read_big_endian_word(&frame[4]) == 0) continue;
       ++content.changes;
       marks_of_changes = content.marks.size();
       if (content.changes == 1) content.starts_with_mark = !content.marks.empty();
@@ -126,10 +129,10 @@ class LogReader {
     in_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     return static_cast<bool>(in_);
   }
-  void add_to_sums(std::span<const std::uint8_t> bytes) {
+  void update_checksums(std::span<const std::uint8_t> bytes) {
     for (std::size_t i = 0; i + 8 <= bytes.size(); i += 8) {
       const auto word = [&](std::size_t at) {
-        return big_endian_sums_ ? big_endian(&bytes[at])
+        return big_endian_sums_ ? read_big_endian_word(&bytes[at])
                                 : read_little_endian<std::uint32_t>(&bytes[at]);
       };
       sums_[0] += word(i) + sums_[1];

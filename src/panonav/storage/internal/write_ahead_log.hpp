@@ -15,7 +15,7 @@ namespace panonav {
 void require_own_log(const std::filesystem::path& file);
 
 /// Reads four bytes of a file of SQLite as a number, the most significant byte first.
-inline std::uint32_t big_endian(const std::uint8_t* from) {
+inline std::uint32_t read_big_endian_word(const std::uint8_t* from) {
   return (std::uint32_t{from[0]} << 24U) | (std::uint32_t{from[1]} << 16U) |
          (std::uint32_t{from[2]} << 8U) | from[3];
 }
