@@ -112,6 +112,15 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   }
 }
 
+void write_fixes(const std::string& path, const std::vector<FollowedImage>& images,
+                 const std::vector<double>& seconds) {
+  std::vector<StampedPose> trajectory;
+  for (const FollowedImage& image : images) {
+    if (image.fix) trajectory.push_back({seconds[image.index], image.fix->pose});
+  }
+  write_trajectory(path, trajectory);
+}
+
 ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments, Session& session) {
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   const Dataset run =
@@ -158,13 +167,7 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   progress.clear();
   record.close();
 
-  if (arguments.tum) {
-    std::vector<StampedPose> trajectory;
-    for (const FollowedImage& image : images) {
-      if (image.fix) trajectory.push_back({seconds[image.index], image.fix->pose});
-    }
-    write_trajectory(*arguments.tum, trajectory);
-  }
+  if (arguments.tum) write_fixes(*arguments.tum, images, seconds);
   const FollowSummary summary = summarise_follow(images, headings_known);
   if (!session.json()) print_summary(summary, images, session);
   if (arguments.report) {

@@ -110,9 +110,7 @@ bool has_all_or_none(const CsvTable& table, const fs::path& path,
   return found == names.size();
 }
 
-std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& path,
-                                       bool needs_positions) {
-  const CsvTable table = CsvTable::read(path);
+void check_columns(const CsvTable& table, const fs::path& path) {
   for (const auto& column : table.columns()) {
     if (std::find(column_names.begin(), column_names.end(), column) == column_names.end()) {
       std::string known;
@@ -121,6 +119,12 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
     }
   }
   if (!table.has("file")) throw FileError(path.string(), "has no column 'file'");
+}
+
+std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& path,
+                                       bool needs_positions) {
+  const CsvTable table = CsvTable::read(path);
+  check_columns(table, path);
   const bool has_position = has_all_or_none(table, path, {"x_m", "y_m"});
   const bool has_odometry =
       has_all_or_none(table, path, {"odom_x_m", "odom_y_m", "odom_heading_deg"});
