@@ -20,7 +20,7 @@ constexpr double start_heading_deviation_rad = 0.1;
 
 /// Made when the first benchmark asks for it.
 const Corridor& corridor() {
-  static const Corridor made = simulation::make_corridor();
+  static const Corridor made = make_corridor();
   return made;
 }
 

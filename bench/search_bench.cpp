@@ -20,6 +20,7 @@
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_fleet/place_search.hpp"
+#include "panonav_simulation/make_each.hpp"
 #include "rivals.hpp"
 #include "simulated_views.hpp"
 
