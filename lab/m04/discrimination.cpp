@@ -172,7 +172,7 @@ class Discrimination final : public Experiment {
             mean_figure(values), "", target);
   }
 
-  // Returns why more components help with azimuths hidden; empty where the measured disturbance
+  // Returns why more components help when azimuths are hidden; empty if the measured disturbance
   // does not explain it.
   [[nodiscard]] std::string explain_disturbance() const {
     if (disturbance_[1].empty()) return "";

@@ -194,7 +194,8 @@ simulation::SimulatedWorldOptions demo_world_options(const DemoOptions& options,
   simulation::SimulatedWorldOptions world_options;
   world_options.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
   world_options.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
-  // One ray a pixel: unwrapping averages over pixels, and it takes a third of the time.
+  // One ray a pixel suffices, as unwrapping averages over pixels; rendering then takes a third of
+  // the time.
   world_options.frame.rays_per_axis = 1;
   // The value of automatic exposure in these rooms.
   world_options.sensor.exposure = 2.0;

@@ -20,7 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Replaces the names of options that have flags of other names; `name_flags` knows the rest.
+/// Replaces names of library options by the flags of the command where the two differ; `name_flags`
+/// handles the others.
 std::string replace_option_names(std::string text) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 4> flags{{
       {"'source' (a PictureSource)", "--kind"},

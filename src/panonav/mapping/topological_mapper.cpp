@@ -183,9 +183,9 @@ class TopologicalMapper::Implementation {
     nodes_[here].path_m = nodes_[here - 1].path_m + length(motion);
   }
 
-  /// Returns the step by the wheels from the node before, with the mean of both turns. A turn by
-  /// views is off where things are nearer on one side, step after step, which shows only against
-  /// the wheels, whose error is known.
+  /// Returns the wheels' step from the node before, with the mean of the rotations by wheels and by
+  /// views. Rotations by views are biased while one side of the scene is nearer, which only the
+  /// wheels reveal.
   PoseEdge fuse_wheel_step(const Pose2& moved, const std::optional<VisualStep>& step) {
     const std::size_t here = nodes_.size() - 1;
     const double length_m = length(moved);

@@ -143,8 +143,8 @@ struct LiveMemory::Implementation {
     return std::make_unique<PlaceRecogniser>(path, recogniser_options);
   }
 
-  /// Learns from all views on another thread if a quarter of them is new, and uses models learnt
-  /// before until they are ready.
+  /// Learns from all views on another thread once at least 16 and a fifth of them are new, and uses
+  /// models learnt before until they are ready.
   void refresh() {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;

@@ -226,7 +226,8 @@ void PairOfViews::set_weights() {
   if (rows_ > 1) row_weights_ = weigh_rows(c_, highest_, rows_, component_weights_);
 }
 
-// Averages both views, or copies the current one, whose slopes count [S06 eq. 20].
+// Sets the view whose derivatives are used: the mean of both views, or the current one [S06 eq.
+// 20].
 void PairOfViews::average_views() {
   const bool both = options_.gradient == FourierHomingOptions::Gradient::both;
   for (int k = 0; k <= std::min(known_, highest_ + 1); ++k) {

@@ -22,7 +22,8 @@ class SegmentLayout {
   explicit SegmentLayout(SignatureShape shape);
 
   [[nodiscard]] SignatureShape shape() const noexcept { return shape_; }
-  /// Sums of a level with those that pad it: pairs for cells, groups of 64 for the others.
+  /// Returns the number of sums of a level, padded to pairs (cells) or to groups of 64 (other
+  /// levels).
   [[nodiscard]] std::size_t dimensions(int level) const noexcept { return dimensions_[level]; }
   /// Number over all levels.
   [[nodiscard]] std::size_t total() const noexcept {

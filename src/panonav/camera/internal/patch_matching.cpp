@@ -294,7 +294,8 @@ class PatchMatcher::Search {
     }
     return *areas_[view];
   }
-  /// Correlates the patch of view a with view b at all steps that are searched, row by row.
+  /// Correlates the patch of view a with view b at every offset of the search window, in row-major
+  /// order.
   [[nodiscard]] std::vector<Correlation> correlations(int a, int b) {
     std::vector<Correlation> at;
     const int width = 2 * search_ + 1;

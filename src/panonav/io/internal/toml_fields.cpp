@@ -75,8 +75,8 @@ TomlTable convert(const toml::table& table) {
   return result;
 }
 
-/// A name of n parts makes n tables within each other, which are copied and freed by recursion.
-/// Throws FileError where a line may hold a name of more parts than any of ours.
+/// Throws FileError on a line of more than 100 dots. A dotted name of n parts nests n tables, and
+/// copying them recursively could overflow the stack.
 void check_dots(std::string_view text, const std::filesystem::path& path) {
   constexpr std::ptrdiff_t max_dots = 100;  // numbers have dots, too
   for (int number = 1; !text.empty(); ++number) {

@@ -135,7 +135,7 @@ std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins&
   return bin_of;
 }
 
-/// Adds the bins around the seed that belong to no mode yet to this one; returns their weight.
+/// Assigns the bins around the seed that belong to no mode yet to `mode`; returns their weight.
 double gather_mode(BinTable& table, const PoseBins& bins, std::uint32_t seed, int mode) {
   const std::span<Bin> cells = table.bins();
   double weight = 0.0;

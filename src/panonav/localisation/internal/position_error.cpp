@@ -23,7 +23,8 @@ void PositionError::observe(double variance_before_m2, double variance_after_m2,
   const double ratio = variance_before_m2 > 0.0 ? variance_after_m2 / variance_before_m2 : 1.0;
   const double kept = std::min(1.0, ratio);
   const double gain = 1.0 - kept;
-  // Particles that a view moves to another place spread; the error grows with them.
+  // A view that moves the particles to another place widens them; the error variance grows by the
+  // same ratio.
   const double error_m2 = variance_at(variance_before_m2) * std::max(1.0, ratio);
   const double with_view_m2 = last_ ? correlation * last_->of_error_and_view_m2 : 0.0;
   // By the particles the view's share has the variance after / gain, and so the whole view `share`

@@ -240,8 +240,8 @@ void SketchIndex::insert(const ViewStore& store, Row row) {
   layout_.sum_blocks(store.magnitudes(row), sums);
   if (!encode(segment, place, sums)) ++segment.outside;
   ++segment.used;
-  // A scale that was learnt from fewer views is never too wide, so only those outside call for
-  // another.
+  // A scale learnt from fewer views can only be too narrow, so it is learnt again if enough views
+  // are outside of it.
   const bool first = segment.learnt_from == 0 && segment.used >= min_views_to_learn;
   const bool drifted = segment.learnt_from > 0 && segment.outside >= 8 + segment.used / 8;
   if (first || drifted) learn_scales(segment, row - place, store);

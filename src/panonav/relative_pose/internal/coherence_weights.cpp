@@ -27,9 +27,9 @@ Coherence sum_coherence(PairCoefficients& c, int k, std::size_t rows) {
   return sum;
 }
 
-/// Returns the Gaussian exp(-k^2 / (2 width^2)) that is nearest to the coherences in least squares,
-/// up to its height: noise lowers all coherences, distance the high ones first. One row gives
-/// little more than a sign for each frequency, so only the width is fitted to all of them.
+/// Fits a Gaussian exp(-k^2 / (2 width^2)) to the coherences by least squares, up to a factor:
+/// noise lowers all coherences, distance the high ones first. Only the width is fitted, as one row
+/// says little about each frequency.
 PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
   PerFrequency best{};
   double best_gain = -std::numeric_limits<double>::infinity();

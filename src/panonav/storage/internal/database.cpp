@@ -99,7 +99,7 @@ std::int64_t Database::file_bytes() const {
 }
 
 void Database::set_step_limit() {
-  // The largest query, SQLite's own check, takes some 2 steps a byte of the table of links.
+  // SQLite's own check, the largest query, takes some 2 steps a byte; 12 leave a margin of six.
   constexpr std::int64_t min_steps = 10'000'000;  // some 0.1 s
   constexpr std::int64_t steps_per_byte = 12;
   step_limit_ = min_steps + steps_per_byte * file_bytes();
