@@ -20,7 +20,7 @@ namespace {
 // Rounding of coordinates must not decide whether a distance counts.
 constexpr double rounding_m = 1e-6;
 
-/// The part of a home vector that is kept for each pair.
+/// Home vector of a pair, without its quality.
 struct PairVector {
   float xi = 0.0F;
   float eta = 0.0F;
@@ -64,7 +64,7 @@ std::vector<PairVector> compute_home_vectors(const RecordedViews& goals,
   return vectors;
 }
 
-/// The median over pairs near each other of distance over length.
+/// Estimates the median of true distance over length of the home vector, over nearby pairs.
 double estimate_typical_distance_m(const std::vector<Pose2>& goals,
                                    const std::vector<Pose2>& places,
                                    const std::vector<PairVector>& vectors, double near_m) {

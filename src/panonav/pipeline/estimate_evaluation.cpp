@@ -19,7 +19,7 @@ struct Estimate {
   std::map<ViewId, double> stamp_s;  // of the map's views
 };
 
-/// Reads the map of `Mapper`: poses of its first component over time.
+/// Reads the map of `Mapper`: the poses of its first component over time.
 Estimate read_map(const std::filesystem::path& path) {
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
   auto map = file.map("map");

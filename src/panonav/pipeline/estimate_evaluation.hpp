@@ -10,15 +10,16 @@ namespace panonav {
 
 /// Errors of an estimated trajectory or map.
 struct EstimateEvaluation {
-  TrajectoryError trajectory;                       ///< errors of the poses
-  std::optional<MapComparison> map;                 ///< nullopt where `is_comparable` is false
-  std::optional<MapComparison::Closures> closures;  ///< of a map; nullopt for a trajectory
+  TrajectoryError trajectory;        ///< errors of the poses
+  std::optional<MapComparison> map;  ///< nullopt if `is_comparable` is false
+  std::optional<MapComparison::Closures>
+      closures;  ///< loop closures of a map; nullopt for a trajectory
 };
 
-/// Compares an estimate with a true trajectory (TUM text or CSV). The estimate is a trajectory as
-/// well, or a memory file (NAME.panonav) with the map that `Mapper` stored, of which the first
-/// component counts. nullopt when fewer than two poses have a true one at their stamp. Throws
-/// FileError, also where a view of the map has no stamp; OptionError. Cost: that of
+/// Compares an estimate with a true trajectory (TUM text or CSV). The estimate is a trajectory too,
+/// or a memory file (NAME.panonav) with the map that `Mapper` stored, of which the first component
+/// counts. Returns nullopt if fewer than two poses have a true pose at their stamp. Throws
+/// FileError, also if a view of the map has no stamp; OptionError. Cost: that of
 /// `compare_positions`.
 [[nodiscard]] std::optional<EstimateEvaluation> evaluate_estimate(
     const std::filesystem::path& estimate, const std::filesystem::path& truth,

@@ -19,8 +19,8 @@ namespace panonav {
 struct HomingViewOptions {
   SignatureOptions signature;          ///< size of the cylinders, and components
   PreprocessingOptions preprocessing;  ///< steps before the transform
-  /// One row, the mean of the rows within 5 degrees of the horizon (all rows where elevations are
-  /// not known), as [S06] has it; else all rows.
+  /// True: use one row, the mean of the rows within 5 degrees of the horizon [S06], or of all rows
+  /// if elevations are unknown. False: use all rows.
   bool horizon = false;
 };
 
@@ -35,8 +35,9 @@ class HomingEncoder {
   HomingEncoder(const MemoryHeader& header, const PictureSource& source, int components = 0,
                 bool horizon = false);
 
-  /// Throws ContractError (FileError where the observation has a file) on a picture that is too
-  /// small for the components or covered by the masks; else as `ViewEncoder::panorama`.
+  /// Returns the preprocessed panorama of an observation. Throws ContractError (FileError if the
+  /// observation has a file) if the image is too small for the components or covered by the masks;
+  /// else as `ViewEncoder::panorama`.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
   /// Returns the homing view of a panorama that `panorama` made.
   [[nodiscard]] HomingView view(const Panorama& panorama) const;
@@ -57,27 +58,26 @@ class HomingEncoder {
   bool horizon_;
 };
 
-/// True if the vector has a direction: its length is at least its own standard deviation, so that
-/// it is more than its residual alone would make of it.
+/// True if the home vector has a direction: its length is at least its standard deviation, which is
+/// more than its residual alone would produce.
 [[nodiscard]] inline bool has_home_direction(const HomeVector& found) noexcept {
   return found.length() > 0.0 && found.confidence >= 0.5;
 }
 
 /// Result of comparing an observation with a homing goal.
 struct HomingResult {
-  /// True if the observation and the goal have more in common than chance gives (`chance_match`);
-  /// noise and other places do not. If false, there is no direction, and distance and turn mean
-  /// nothing.
+  /// True if observation and goal match better than chance (`chance_match`); noise and other places
+  /// do not. If false, there is no direction, and distance and turn are meaningless.
   bool known = false;
   /// Direction of the goal in the robot's current frame, counter-clockwise from straight ahead.
-  /// Empty if nothing is known, and at the goal itself (`has_home_direction`).
+  /// Empty if `known` is false, and at the goal itself (`has_home_direction`).
   std::optional<double> direction_rad;
   double distance_r = 0.0;  ///< in units of R, the typical distance of the surroundings
   double turn_rad = 0.0;    ///< rotation of the robot since it was at the goal
   /// Probability that the direction is right within 45 degrees
   /// (`ChanceMatch::direction_probability`).
   double probability = 0.0;
-  HomeVector vector;  ///< all that was found, known or not
+  HomeVector vector;  ///< the whole result, also if `known` is false
 };
 
 /// Computes the direction back to a goal from one observation. The goal is a view of a memory, or
@@ -101,8 +101,8 @@ class HomingGuide {
   HomingGuide(HomingEncoder encoder, std::string goal_name, HomingView goal,
               const FourierHomingOptions& options = {});
 
-  /// Throws as `HomingEncoder::panorama`, and ContractError (likewise) where the view has other
-  /// rows than the goal.
+  /// Computes the direction to the goal. Throws as `HomingEncoder::panorama`, and ContractError
+  /// (FileError likewise) if the view has another number of rows than the goal.
   [[nodiscard]] HomingResult home(const Observation& observation) const;
 
   /// Returns the encoder that makes views of observations.

@@ -12,23 +12,25 @@
 
 namespace panonav {
 
-/// Checks that the names that the memory knows mean the same views, as two recordings with the same
-/// file names must not be mixed. Compares poses and stamps of all known views, and their pictures
-/// unless the memory knows the recording: same names, poses, sizes and times of change of all
-/// files. Throws FileError at the first view that differs, or whose picture cannot be read. Cost:
-/// reading the size and time of each file; for a recording that was changed or copied since, that
-/// of memorising the known views; `compared` receives their number now and then.
+/// Checks that views with the same name in recording and memory are the same view, so that two
+/// recordings with the same file names are not mixed. Compares poses and stamps of all known views.
+/// Compares images too, unless names, poses, sizes and modification times of all files are those of
+/// a recording that was memorised. Throws FileError at the first view that differs or whose image
+/// cannot be read. Cost: reading size and time of each file; for a changed or copied recording,
+/// that of memorising the known views. `compared` receives their number from time to time.
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
                        const std::function<void(std::size_t)>& compared = {});
 
-/// Notes that all views of the recording that the memory knows are the recording's, or will be.
+/// Records in the memory that its views with names of this recording come from this recording, now
+/// and in future.
 void remember_recording(const Dataset& recording, MemoryFile& memory);
 
-/// A view that was dropped may come back from another recording, so no recording counts as known.
+/// Marks all recordings as unknown: after a removal, views of that name may come from another
+/// recording.
 void forget_recordings(MemoryFile& memory);
 
-/// True if they are equal but for rounding, as processors round differently.
+/// True if the signatures differ only by rounding, which varies between processors.
 [[nodiscard]] bool is_same_picture(const PackedSignature& a, const PackedSignature& b);
 
 /// Throws the FileError for a name that the memory holds with another view.

@@ -20,7 +20,7 @@ constexpr const char* parameter_name = "learnt models";
 /// Version of the learning, raised when its results change, so that older models are not used.
 constexpr std::string_view learning_version = "4";
 
-// The members of each model in the order in which they are kept.
+// Visits the members of each model in the order in which they are stored.
 template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, PlaceModel>
 void visit_members(Model& m, const Visit& visit) {
@@ -43,7 +43,7 @@ void visit_members(Model& m, const Visit& visit) {
   visit(m.sampled_views);
 }
 
-/// Words with a blank between them; doubles with all their bits.
+/// Writes words separated by blanks, doubles with all their bits.
 class Writer {
  public:
   void operator()(double value) const { text_ += to_hex_text(value) + " "; }
@@ -97,7 +97,7 @@ class Reader {
   mutable bool ok_ = true;
 };
 
-/// Changes with every change of the views, of their signatures and of their poses.
+/// Returns a text that changes with the views, their signatures and their poses.
 std::string compute_fingerprint(const VisualMemory& memory) {
   RecordBytes scratch;
   std::uint64_t hash = checksum({}, memory.shape().size());
@@ -117,7 +117,7 @@ std::string compute_fingerprint(const VisualMemory& memory) {
   return to_hex_digits(hash);
 }
 
-/// Models of other views than the memory's are ignored; null: those of any views.
+/// Reads stored models; nullopt if they are of other views than `memory`, unless it is null.
 std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemory* memory) {
   const auto text = file.parameter(parameter_name);
   if (!text) return std::nullopt;

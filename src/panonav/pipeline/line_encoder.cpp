@@ -16,7 +16,8 @@ std::string make_parameter_name(const std::string& name) {
   return "route." + name;
 }
 
-/// A cylinder no higher than the line needs, as finely sampled as a usual camera sees the horizon.
+/// Chooses a cylinder no higher than the line needs, sampled as finely as a usual camera samples
+/// the horizon.
 PanoramaShape choose_line_panorama_shape(const PictureSource& pictures, const RouteSource& route) {
   if (pictures.kind == PictureKind::panorama) return {};
   constexpr int rows = 5;

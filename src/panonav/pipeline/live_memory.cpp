@@ -51,7 +51,7 @@ class Storer {
     const std::lock_guard lock(mutex_);
     return has_views_;
   }
-  /// Stores all that waits and ends. Rethrows what went wrong.
+  /// Stores all waiting views and ends the thread. Rethrows its exception.
   void finish() {
     join();
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
@@ -128,7 +128,7 @@ struct LiveMemory::Implementation {
     if (memoriser && !options.in_step) storer.emplace(*memoriser);  // it alone uses the file now
   }
 
-  /// Other memories only grow.
+  /// True if enough views have headings for updates; other memories only grow.
   [[nodiscard]] bool can_be_updated() {
     return memoriser->file()->info().views_with_heading >=
            static_cast<std::uint64_t>(ObservationModel::min_views);

@@ -20,11 +20,11 @@ struct LiveMemoryOptions {
   /// Where views are added, too, a memory with few positions and headings only grows.
   bool update = false;
   MemoryUpdateOptions update_options;  ///< of views at known places
-  /// Between two views that are added: until the memory has learnt from a view, the following ones
-  /// look as new as it did. Applies to observations with stamps.
+  /// Minimum time between two added views. Until the memory has learnt from a view, the following
+  /// images look as new as that one did. Applies to observations with stamps.
   double min_interval_s = 0.5;
   /// Store views, and learn models from them, before the next observation is answered, so that the
-  /// same observations give the same bits; otherwise both happen concurrently on threads of lower
+  /// same observations give the same bits. Otherwise both happen concurrently on threads of lower
   /// priority.
   bool in_step = false;
   MemoriserOptions memoriser;  ///< of views that are added; its source is that of all pictures
@@ -69,13 +69,13 @@ class LiveMemory {
   /// `Memoriser::add`, also about views of earlier calls.
   void add(Observation observation);
   static constexpr std::size_t max_waiting = 8;  ///< Views that wait for the disk at most.
-  /// Returns the panorama of the observation that was answered last, until it is added; empty while
-  /// there is no memory.
+  /// Returns the panorama of the last answered observation, until it is added; empty while there is
+  /// no memory.
   [[nodiscard]] const std::optional<Panorama>& panorama() const noexcept;
 
   /// Returns the present recogniser; null while there is no memory. Valid until the next `answer`.
   [[nodiscard]] const PlaceRecogniser* recogniser() const noexcept;
-  /// Returns the number of views that can be found now, and of those that were added.
+  /// Returns the number of views that can be found now.
   [[nodiscard]] std::size_t views() const noexcept;
   /// Returns the number of views added since the start, waiting ones included.
   [[nodiscard]] std::size_t added() const noexcept;

@@ -33,8 +33,7 @@ std::size_t find_largest_component(const TopologicalMap& map) {
 Mapper::Mapper(const std::filesystem::path& memory, const MapperOptions& options)
     : Mapper(MemoryFile::open(memory, Access::read_write), std::nullopt, options) {}
 
-// The nodes are a memory of their own: one that knew what is still to come would be asked another
-// question.
+// The nodes have a memory of their own, as the file may hold views that are still to come.
 Mapper::Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
                const MapperOptions& options)
     : options_(options),

@@ -16,15 +16,15 @@
 
 namespace panonav {
 
-/// The name under which a memory file keeps the map of a `Mapper`.
+/// Name under which a memory file stores the map of a `Mapper`.
 inline constexpr const char* map_name = "map";
 
 /// Options for making a map of observations.
 struct MapperOptions {
-  MappingOptions mapping;          ///< what becomes a node, and how nodes are joined
-  VisualOdometryOptions odometry;  ///< how steps are read from views
-  LoopClosureOptions closure;      ///< which loop closures are believed
-  PoseGraphOptions graph;          ///< how the whole is optimised
+  MappingOptions mapping;          ///< which images become nodes, and how nodes are joined
+  VisualOdometryOptions odometry;  ///< how motions are estimated from views
+  LoopClosureOptions closure;      ///< which loop closures are accepted
+  PoseGraphOptions graph;          ///< how the pose graph is optimised
   bool thumbnails = true;          ///< keep small pictures of the views
 };
 
@@ -38,11 +38,11 @@ class Mapper {
   /// Result of mapping.
   struct Result {
     TopologicalMap map;                     ///< all nodes and edges
-    std::vector<std::size_t> observations;  ///< by node: its number, counted from 0
+    std::vector<std::size_t> observations;  ///< for each node, the index of its observation
     std::size_t skipped = 0;                ///< observations that differed too little from a node
-    double scale_m = 0.0;                   ///< metres for each unit of length of the views
-    bool wheels = false;     ///< all observations had odometry, and steps come from it
-    double mapping_s = 0.0;  ///< time of the mapping itself, without pictures and files
+    double scale_m = 0.0;                   ///< metres per unit of visual displacement
+    bool wheels = false;     ///< true: all observations had odometry, and motions come from it
+    double mapping_s = 0.0;  ///< time of the mapping alone, without decoding and file access
   };
 
   /// An encoded observation that is not in the map yet.
@@ -56,7 +56,7 @@ class Mapper {
   /// Pictures come from the memory's own camera. Throws FileError as `MemoryFile::open`,
   /// OptionError.
   explicit Mapper(const std::filesystem::path& memory, const MapperOptions& options = {});
-  /// Takes a file open for writing. `source`: layout of the pictures; empty: the memory's own.
+  /// Takes a file open for writing. `source`: layout of the images; empty: that of the memory.
   /// Throws ContractError as `ViewEncoder`, OptionError.
   Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
          const MapperOptions& options = {});
@@ -77,11 +77,11 @@ class Mapper {
              const std::function<void()>& mapped = {});
 
   /// Optimises the nodes that are not optimised yet, and stores the map and a link for each of its
-  /// edges. Where no observation had a pose, the views of the largest component get those of the
+  /// edges. If no observation had a pose, the views of the largest component get the poses of the
   /// map. More observations may follow. Throws FileError.
   Result finish();
 
-  /// Returns the map so far, for display: `finish` still moves nodes. Cost: a copy.
+  /// Returns the present map, for display; `finish` still moves nodes. Cost: a copy.
   [[nodiscard]] TopologicalMap current_map() const { return mapper_.map(); }
   /// Returns the file that views are appended to.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
@@ -101,7 +101,7 @@ class Mapper {
   bool any_pose_ = false;
 };
 
-/// Returns the component with the largest number of nodes, of equal ones the first.
+/// Returns the number of the component with the most nodes; of several, the first.
 [[nodiscard]] std::size_t find_largest_component(const TopologicalMap& map);
 
 }  // namespace panonav

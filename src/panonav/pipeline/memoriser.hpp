@@ -21,25 +21,25 @@ struct MemoriserOptions {
   SignatureOptions signature;          ///< of a new file
   PreprocessingOptions preprocessing;  ///< of a new file
   bool thumbnails = true;              ///< keep small pictures of the views for people
-  /// Keep local features, with which places 1 to 2 m apart are found (about 4 kB a view); none are
-  /// kept where elevations are unknown.
+  /// Store local features, which tell apart places 1 to 2 m apart (about 4 kB a view); not stored
+  /// if elevations are unknown.
   bool features = true;
-  /// Receives each observation that is left out because its picture does not fit the others, such
-  /// as one of another size; empty: `add` throws.
+  /// Receives each observation that is left out because its image does not fit the others, for
+  /// example by its size; empty: `add` throws instead.
   std::function<void(const Observation&, const Error&)> left_out;
 };
 
-/// Makes the header of a new memory: sizes from the first observation, the full scale from all of
-/// these. Throws ContractError on options that do not fit the pictures, FileError on observations
-/// without structure.
+/// Makes the header of a new memory: sizes from the first observation, the full scale from all
+/// given ones. Throws ContractError on options that do not fit the images, FileError if an image
+/// has no structure.
 [[nodiscard]] MemoryHeader make_memory_header(std::span<const Observation> first,
                                               const PictureSource& source,
                                               const SignatureOptions& signature,
                                               const PreprocessingOptions& preprocessing,
                                               Executor& executor);
 
-/// Makes the header of a new memory from the first views of a recording, so that nothing about
-/// light or scene need be known beforehand. Throws FileError also on pictures that cannot be read.
+/// Makes the header of a new memory from the first images of a recording, so that nothing about
+/// light or scene must be known beforehand. Throws FileError also on images that cannot be read.
 [[nodiscard]] MemoryHeader make_header_from_recording(const Dataset& recording,
                                                       const SignatureOptions& signature,
                                                       const PreprocessingOptions& preprocessing,
@@ -65,14 +65,14 @@ class Memoriser {
   /// the same pose, stamp and picture, and is not stored again. Throws ContractError on an empty
   /// name, FileError on another view under a known name, and as `ViewEncoder::panorama`.
   void add(Observation observation);
-  /// Adds observations, encoded on all threads and stored in one transaction. Those before a
-  /// refused one are stored.
+  /// Adds observations: encodes them on all threads and stores them in one transaction. If one is
+  /// rejected, those before it are stored.
   void add(std::vector<Observation> observations, Executor& executor);
 
   /// Numbers of observations by their outcome.
   struct Counts {
-    std::size_t appended = 0;      ///< views that the file got
-    std::size_t known_before = 0;  ///< observations whose views were there
+    std::size_t appended = 0;      ///< views added to the file
+    std::size_t known_before = 0;  ///< observations that were in the file already
   };
   /// Writes observations that wait for a new file's full scale, and stores the models learnt of the
   /// views (`learn_and_store_models`). More may be added afterwards. Throws FileError;
@@ -80,7 +80,7 @@ class Memoriser {
   Counts finish();
   Counts finish(Executor& executor);  ///< Finishes on all threads.
 
-  /// Returns the file; null while a new file waits for its full scale, as `encoder()`.
+  /// Returns the file; null while a new file waits for its full scale.
   [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
   /// Returns the encoder that makes views of pictures; null as `file()`.
   [[nodiscard]] const ViewEncoder* encoder() const noexcept {

@@ -25,8 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// True if the name can be that of a file in the folder, which no other file or folder of the
-/// export uses.
+/// True if the name can be a file name in the folder and no file or folder of the export has it.
 bool is_file_name(const std::string& name) {
   constexpr std::array<std::string_view, 8> own{"dataset.toml", "poses.csv",      "images.csv",
                                                 "views.csv",    "signatures.npy", "memorise.toml",
@@ -44,7 +43,7 @@ bool is_file_name(const std::string& name) {
   });
 }
 
-/// The file of each view's picture: its name wherever that can be one.
+/// Returns a file name for each view's image: the view's name if that is possible.
 std::vector<std::string> choose_picture_names(const std::vector<ViewRecord>& views) {
   std::set<std::string> files;
   std::set<std::string> folders;
@@ -72,7 +71,7 @@ std::vector<std::string> choose_picture_names(const std::vector<ViewRecord>& vie
   return names;
 }
 
-/// Options as the sections of a --config file.
+/// Writes options as the sections of a --config file.
 class OptionText final : public OptionVisitor {
  public:
   void visit(const OptionInfo& info, int& value) override { add(info, std::to_string(value)); }
@@ -97,7 +96,8 @@ class OptionText final : public OptionVisitor {
   }
 };
 
-/// NumPy's format 1.0: whole numbers of 8 bit, views x (magnitudes, phases) x components x rows.
+/// Makes an array in NumPy's format 1.0: 8-bit integers, views x (magnitudes, phases) x components
+/// x rows.
 std::vector<std::uint8_t> make_npy_array(const VisualMemory& memory) {
   const SignatureShape shape = memory.shape();
   std::string head = "{'descr': '|u1', 'fortran_order': False, 'shape': (" +
@@ -133,7 +133,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   dataset.folder = out;
   dataset.source.layout = {.forward_column = picture_forward_column(header.panorama_columns),
                            .elevations = header.elevations};
-  // Sampled too coarsely for the highest component, a picture would show another one.
+  // A thumbnail sampled too coarsely for the highest component would alias it.
   const bool large_enough = thumbnail_columns(header) >= 2 * header.shape.components;
   std::vector<std::string> files = choose_picture_names(views);
   std::vector<ViewId> ids;

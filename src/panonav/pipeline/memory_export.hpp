@@ -11,16 +11,17 @@ namespace panonav {
 /// Contents of an export of a memory.
 struct MemoryExport {
   std::size_t views = 0;  ///< number in views.csv and signatures.npy
-  /// Number of views whose thumbnail is a picture of the data set; 0: there is no data set.
+  /// Number of views whose thumbnail became an image of the data set; 0: no data set was written.
   std::size_t pictures = 0;
-  /// Number of these whose name cannot be that of a file: their pictures have other names.
+  /// Number of these whose name cannot be a file name; their images have other names.
   std::size_t renamed = 0;
-  /// True if positions are in the data set. A data set has them for all of its pictures or for
-  /// none; where some views have none they are in views.csv alone.
+  /// True if the data set has positions: all of its images have one. Otherwise positions are only
+  /// in views.csv.
   bool positions = false;
-  bool headings = false;  ///< see `positions`; not without them
-  bool stamps = false;    ///< see `positions`
-  bool enlarged = false;  ///< thumbnails are smaller than the panoramas that the memory compares
+  bool headings = false;  ///< like `positions`; false without them
+  bool stamps = false;    ///< like `positions`
+  bool enlarged =
+      false;  ///< true: thumbnails are smaller than the panoramas of the memory and were enlarged
 };
 
 /// Writes views, poses, thumbnails and signatures into a new folder (docs/formats.md, section

@@ -34,7 +34,8 @@ std::optional<Pose2> get_complete_pose(const ReferenceInfo& info) {
   return Pose2{info.pose->x_m, info.pose->y_m, *info.pose->heading_rad};
 }
 
-/// Relative poses of the file's views. The largest connected component is number 0.
+/// Returns the map of the file's views, or makes one from their poses. The largest connected
+/// component becomes number 0.
 TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& views) {
   TopologicalMap map = file.map(map_name).value_or(TopologicalMap{});
   if (map.nodes.empty()) {
@@ -57,7 +58,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
       ++node.component;
     }
   }
-  // Poses that were given, as by a recording, are better than those that the map estimated.
+  // Given poses, as from a recording, are better than those that the map estimated.
   std::size_t nodes = 0;
   std::size_t positions = 0;
   std::size_t poses = 0;
@@ -110,8 +111,8 @@ TopologicalMap replace_ids(const TopologicalMap& map, const NewIds& ids) {
   return result;
 }
 
-/// Appends a map whose nodes are in frames of their own. A node that is there already joins
-/// nothing: it stays where it is.
+/// Appends a map whose nodes are in frames of their own. Nodes that both maps have keep their place
+/// and connect nothing.
 void append_disconnected(TopologicalMap& map, const TopologicalMap& more) {
   std::size_t next = 0;
   for (const TopologicalMap::Node& node : map.nodes) next = std::max(next, node.component + 1);
@@ -147,7 +148,7 @@ void require_comparable(const MemoryFile& first, const MemoryFile& second) {
   require_same("preprocessing", a.preprocessing == b.preprocessing);
 }
 
-/// Returns a free name: the name itself, or prefixed by its file's.
+/// Returns the name itself if it is free, else prefixed by the name of its file.
 template <class IsTaken>
 std::string make_free_name(const std::string& name, const MemoryFile& from,
                            const IsTaken& is_taken) {
@@ -278,7 +279,7 @@ class Merge {
     file.link(links);
   }
 
-  /// The first keeps its frame.
+  /// Sets the poses of the second memory's views; those of the first keep their frame.
   void set_poses(MemoryFile& file, const TopologicalMap& map) {
     std::set<ViewId> of_first;
     for (const auto& both : ids_[0]) of_first.insert(both.second);

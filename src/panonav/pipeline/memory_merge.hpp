@@ -12,13 +12,14 @@ namespace panonav {
 
 /// Result of `merge_memories`.
 struct MergedMemory {
-  std::size_t views = 0;    ///< of the new memory
-  std::size_t shared = 0;   ///< views that both had, kept once
-  std::size_t renamed = 0;  ///< views and routes of the second whose names the first had for others
+  std::size_t views = 0;   ///< of the new memory
+  std::size_t shared = 0;  ///< views in both memories, stored once
+  std::size_t renamed =
+      0;  ///< renamed views and routes of the second, whose names the first uses for others
   /// Pose of the second in the frame of the first; empty if no common place was found.
   std::optional<SessionAlignment> alignment;
   std::size_t connected_components = 0;  ///< of the new map
-  /// Views of the second whose positions are not kept, because they are in a frame of their own.
+  /// Number of views of the second that lost their positions, which are in a frame of their own.
   std::size_t without_position = 0;
 };
 

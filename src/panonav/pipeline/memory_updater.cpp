@@ -34,7 +34,7 @@ std::string to_parameter(const MemoryUpdate::Use& use) {
   return text;
 }
 
-// A text of an unknown version counts as none.
+// Parses a stored use; returns an empty one for an unknown version.
 MemoryUpdate::Use parse_memory_use(const std::optional<std::string>& text) {
   MemoryUpdate::Use use;
   if (!text) return use;
@@ -158,7 +158,7 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
   dropped.insert(dropped.end(), planned.forgotten.begin(), planned.forgotten.end());
   self.file.change(
       [&] {
-        // Another process may have dropped some meanwhile.
+        // Another process may have removed some meanwhile.
         const std::vector<ViewId> there = self.file.views();
         std::erase_if(dropped,
                       [&](ViewId view) { return !std::ranges::binary_search(there, view); });

@@ -30,26 +30,28 @@ class MemoryUpdater {
   MemoryUpdater(MemoryUpdater&&) noexcept;
   MemoryUpdater& operator=(MemoryUpdater&&) noexcept;
 
-  /// Adds the next observation with its panorama, of the memory's shape, and the answer of the
-  /// memory. Observations without odometry are left out. Throws ContractError on another shape and
+  /// Adds the next observation with its panorama, which has the memory's shape, and the memory's
+  /// answer. Observations without odometry are ignored. Throws ContractError on another shape and
   /// after `finish`.
   void observe(const Observation& observation, const Panorama& panorama, const Place& place);
-  /// True if the last observation is so near to one whose place was certain that the update will
+  /// True if the last observation is near enough to one with a certain place that the update will
   /// place it by odometry.
   [[nodiscard]] bool is_near_known_place() const;
 
   /// Changes that a run made to its memory.
   struct Changes {
     std::size_t observations = 0;  ///< observations with odometry
-    std::size_t certain = 0;       ///< of these, whose place was certain and new
-    std::size_t reinforced = 0;    ///< views of the memory that explained what the robot saw
-    std::size_t added = 0;         ///< views of this run
-    std::size_t replaced = 0;      ///< views that were dropped for added ones
-    std::size_t forgotten = 0;     ///< views that were dropped because they had failed for long
-    std::size_t views = 0;         ///< of the memory now
+    std::size_t certain =
+        0;  ///< of these, those whose place was certain and differed from the last certain one
+    std::size_t reinforced = 0;  ///< views of the memory that matched what the robot observed
+    std::size_t added = 0;       ///< views added from this run
+    std::size_t replaced = 0;    ///< views removed in exchange for added ones
+    std::size_t forgotten = 0;   ///< views removed because they had not matched for long
+    std::size_t views = 0;       ///< views of the memory afterwards
   };
   /// Changes the file and learns its models again, in one transaction. `what`: name of the run in
-  /// the history. Throws FileError, which leaves the file as it was; ContractError the second time.
+  /// the history. Throws FileError and then leaves the file unchanged; ContractError on a second
+  /// call.
   Changes finish(const std::string& what);
 
  private:

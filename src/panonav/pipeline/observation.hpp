@@ -17,8 +17,8 @@
 
 namespace panonav {
 
-/// A picture of a robot's camera with all that is known of that moment. A folder, a video, a live
-/// camera and a recording all become observations, and everything in `pipeline` takes them one at a
+/// An image of a robot's camera with all that is known about that moment. Folders, videos, live
+/// cameras and recordings all become observations, and everything in `pipeline` takes them one at a
 /// time.
 struct Observation {
   // NOLINTNEXTLINE(google-explicit-constructor): a picture alone is an observation
@@ -32,17 +32,17 @@ struct Observation {
   std::variant<Image, Panorama> picture;
   /// The PNG or JPEG that a live picture was decoded from, to be passed on; may be empty.
   std::vector<std::uint8_t> encoded;
-  std::string name;  ///< of the view that a memory keeps; messages name it
-  /// File of the picture, if any; then errors about it are FileErrors that name the file.
+  std::string name;  ///< name of the view in a memory, and in messages
+  /// File of the image, if any; errors about the image are then FileErrors that name it.
   std::filesystem::path file;
-  std::optional<double> stamp_s;  ///< when it was taken, seconds; ascending where times count
-  /// Absolute pose in the frame of the odometry, which drifts against the world.
+  std::optional<double> stamp_s;  ///< time of exposure, seconds; must ascend where time matters
+  /// Absolute pose in the frame of the odometry, which drifts relative to the world.
   std::optional<Pose2> odometry;
-  /// Pose in the world frame, from a survey or a simulation. Memories keep it; no estimate of this
-  /// picture's own place reads it.
+  /// Pose in the world frame, from a survey or a simulation. Memories store it; the pose of a query
+  /// is never used to estimate its own place.
   std::optional<ReferencePose> pose;
-  /// Tilt measured by an inertial sensor, which panoramas compensate; where the elevations of the
-  /// picture are not known, more than half a degree is refused with ContractError.
+  /// Tilt measured by an inertial sensor, which panoramas compensate. If the elevations of the
+  /// image are unknown, more than half a degree throws ContractError.
   std::optional<Tilt> tilt;
 };
 

@@ -17,15 +17,15 @@ namespace panonav {
 /// a time. Throws FileError on a picture that is missing or damaged.
 [[nodiscard]] Observation read_observation(const DatasetEntry& entry);
 
-/// Returns the poses of all entries in the data set's frame. Without headings in the data set, they
-/// are those of the path: the tangent fitted to the positions within 0.3 m of path to either side.
-/// Empty without positions.
+/// Returns the poses of all entries in the frame of the data set. If the data set has no headings,
+/// they are computed from the path: the tangent fitted to the positions within 0.3 m of path on
+/// either side. Empty without positions.
 [[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
 /// Returns the odometry of all entries; empty without odometry.
 [[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
 
 /// Calls `make(i)` for 0 .. count - 1 on all threads, and `use(i, made)` in order on this one. An
-/// exception of `make` is thrown when all before it were used.
+/// exception of `make` is thrown after all earlier results were used.
 template <class Make, class Use>
 void process_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
   constexpr std::size_t batch = 32;
@@ -52,7 +52,7 @@ void process_in_order(std::size_t count, Executor& executor, const Make& make, c
 class ObservationSource {
  public:
   virtual ~ObservationSource() = default;
-  /// Returns the kind and layout of all its pictures.
+  /// Returns the kind and layout of all images.
   [[nodiscard]] virtual const PictureSource& pictures() const noexcept = 0;
   /// Returns the next observation; empty at the end. Throws FileError on a picture that cannot be
   /// read; the next call continues after it.

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns the first names, and how many more there are.
+/// Returns the first names, joined, and the number of further ones.
 std::string join_names(const std::vector<std::string>& names) {
   constexpr std::size_t max_listed = 8;
   std::string text;
@@ -45,8 +45,8 @@ void add_warning_of_skipped_files(Dataset& opened) {
   }
 }
 
-/// Size of the first picture; nullopt where it cannot be read: who reads its pixels says what is
-/// wrong.
+/// Returns the size of the first image; nullopt if it cannot be read, as reading its pixels will
+/// report the reason.
 std::optional<ImageSize> read_first_picture_size(const Dataset& dataset) {
   const DatasetEntry& first = dataset.entries.front();
   try {
@@ -56,8 +56,8 @@ std::optional<ImageSize> read_first_picture_size(const Dataset& dataset) {
   }
 }
 
-/// Radians in the place of degrees make a band that is far lower than the rows of its pictures; a
-/// data set of a few rows, as a route's may be, has a low band by right.
+/// Warns of an elevation band that is far too low for the rows of its images: probably radians in
+/// place of degrees. A data set of a few rows, as a route's may be, rightly has a low band.
 void add_warning_of_low_band(Dataset& opened) {
   constexpr double min_band_deg = 5.0;  // pi radians, taken for degrees, are less
   constexpr double max_stretch = 8.0;   // of pixels; radians stretch them 57 times
@@ -75,8 +75,8 @@ void add_warning_of_low_band(Dataset& opened) {
                             " degrees; are these radians? elevation_deg is in degrees");
 }
 
-/// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
-/// likelihood: as a panorama of square pixels it would reach from pole to pole.
+/// Warns of panoramas twice as wide as high: such an image most probably shows the whole sphere,
+/// since as a panorama of square pixels it would reach from pole to pole.
 void add_warning_of_wrong_kind(Dataset& opened) {
   constexpr double max_band_deg = 170.0;  // from here on the band is nearly the sphere's
   if (opened.source.kind != PictureKind::panorama) return;

@@ -23,14 +23,14 @@ namespace panonav {
 
 namespace {
 
-/// The parts of a query for one observation, each computed at most once, when it is needed. Both
+/// Computes the parts of a query for one observation, each at most once and on first use. Both
 /// arguments must outlive it.
 class ObservationQuery {
  public:
   ObservationQuery(const ViewEncoder& encoder, const Observation& observation)
       : encoder_(encoder), observation_(observation) {}
 
-  /// `by_features`: the panorama is needed in any case.
+  /// `by_features`: the panorama is needed anyway.
   [[nodiscard]] PackedSignature signature(bool by_features) {
     return by_features ? encoder_.packed(panorama()) : encoder_.packed(observation_);
   }
@@ -92,10 +92,10 @@ struct PlaceRecogniser::Implementation {
     learn_from_index(file);
   }
 
-  // Kept models were learnt over all components.
+  // True if stored models apply, which were learnt over all components.
   [[nodiscard]] bool can_use_kept_models() const { return options.localiser.components == 0; }
 
-  /// Empty where the memory has no features.
+  /// Returns the features of the memory, cached; empty if it has none.
   FeatureSource get_or_create_features(const MemoryFile& file, std::optional<ViewId> last_view) {
     if (!file.header().elevations || !file.has_features()) return {};
     if (!features) features = std::make_shared<FeatureCache>(file, last_view);

@@ -23,14 +23,14 @@ struct SearchCounters;
 
 /// Options of a place recogniser.
 struct PlaceRecogniserOptions {
-  LocaliserOptions localiser;  ///< how many views are compared and listed
+  LocaliserOptions localiser;  ///< number of views compared and listed
   /// Layout of the pictures; empty: that of the memory's own.
   std::optional<PictureSource> source;
-  /// Compute also the area where the robot may be, component by component. The memory is held then,
-  /// as areas are cut out of the positions of all views.
+  /// Compute also the area where the robot may be, component by component. This holds the memory,
+  /// as areas are computed from the positions of all views.
   std::optional<LocalisationAccuracy> areas;
-  /// Largest number of views of a memory on a server that is held. Larger ones are searched on the
-  /// server: 350 bytes a view instead of 2700, and a longer time for each picture (docs/scale.md).
+  /// Largest number of views for which a memory on a server is held. Larger ones are searched on
+  /// the server: 350 bytes a view instead of 2700, but more time for each image (docs/scale.md).
   /// Files are always held.
   std::size_t max_held_views = 200'000;
   /// Largest number of views from which models are learnt in a memory that is not held.
@@ -64,10 +64,9 @@ class PlaceRecogniser {
   PlaceRecogniser(PlaceRecogniser&&) noexcept;
   PlaceRecogniser& operator=(PlaceRecogniser&&) noexcept;
 
-  /// Finds the place of an observation. Views called `excluded_names` are not found. Throws as
-  /// `ViewEncoder::panorama`; where the memory is not held, FileError when its server cannot be
-  /// reached, and the next picture may reach it again. Cost: that of `Localiser::localise` and 0.1
-  /// ms for a mirror picture.
+  /// Finds the place of an observation. Views with names in `excluded_names` are ignored. Throws as
+  /// `ViewEncoder::panorama`; if the memory is not held, FileError while its server cannot be
+  /// reached. Cost: that of `Localiser::localise` and 0.1 ms for a mirror image.
   [[nodiscard]] Place localise(const Observation& observation,
                                std::span<const std::string> excluded_names = {}) const;
 
@@ -75,9 +74,9 @@ class PlaceRecogniser {
   [[nodiscard]] std::size_t size() const;       ///< Returns the number of views that can be found.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Returns the encoder.
 
-  /// Adds a view that can be found from now on; it takes part in what is learnt of all views only
-  /// in a new PlaceRecogniser. The file is not changed. No other thread may use *this meanwhile.
-  /// Throws ContractError as `VisualMemory::append`, and where the memory is not held.
+  /// Adds a view that can be found from now on; models learn from it only in a new PlaceRecogniser.
+  /// The file is not changed. No other thread may use *this meanwhile. Throws ContractError as
+  /// `VisualMemory::append`, and if the memory is not held.
   void append(const ReferenceInfo& info, const PackedSignature& signature);
   /// Returns the held views. Throws ContractError if the memory is not held.
   [[nodiscard]] const VisualMemory& memory() const;

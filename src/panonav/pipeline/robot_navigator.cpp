@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::array<std::string_view, 4> origin_names{"map", "lattice", "links", "arrangement"};
 
-/// Empty when the file has nothing of the kind.
+/// Loads the graph of this origin; empty if the file has none.
 std::optional<NavigationGraph> load_graph(RobotNavigatorOptions::GraphOrigin origin,
                                           const MemoryFileViews& source, Executor& executor) {
   const MemoryFile& file = source.file();
@@ -66,7 +66,7 @@ NavigationGraph load_requested_graph(
   }
 }
 
-/// Returns the route with the views near it, by their poses: both must have been recorded with the
+/// Returns the route and the views near it, by their poses: both must have been recorded with the
 /// poses of one data set.
 KnownRoute load_known_route(const MemoryFileViews& source, const std::string& name,
                             const KnownRouteOptions& options) {

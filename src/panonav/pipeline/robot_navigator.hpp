@@ -22,17 +22,18 @@ namespace panonav {
 struct RobotNavigatorOptions {
   /// Source of the edges between the views of a memory.
   enum class GraphOrigin {
-    map,          ///< stored by a `Mapper`: the motions of the map
-    lattice,      ///< stored by the verb `arrange`: directions from the views' phases
-    links,        ///< of the memory: lengths, too
-    arrangement,  ///< none of these is there: the views are arranged first
+    map,          ///< map of a `Mapper`: edges are its motions
+    lattice,      ///< map of the verb `arrange`: directions come from the phases of views
+    links,        ///< links of the memory, with lengths
+    arrangement,  ///< computed by arranging the views, if there is none of the others
   };
 
-  NavigatorOptions navigator;        ///< how it decides
-  PlannerOptions planner;            ///< how it plans
-  BaseOptions base;                  ///< what velocity commands are made for
-  std::optional<GraphOrigin> edges;  ///< empty: the first that the memory has
-  /// Name of a recorded route of the memory, to be followed where the path leads along it.
+  NavigatorOptions navigator;        ///< options of decisions
+  PlannerOptions planner;            ///< options of path planning
+  BaseOptions base;                  ///< drive of the robot, and limits of its velocity commands
+  std::optional<GraphOrigin> edges;  ///< source of the edges; empty: the first that the memory has
+  /// Name of a recorded route of the memory, which the robot follows where its path coincides with
+  /// it.
   std::optional<std::string> route;
   KnownRouteOptions known_route;  ///< how the route is followed
 };
@@ -42,9 +43,9 @@ struct RobotNavigatorOptions {
 [[nodiscard]] std::optional<RobotNavigatorOptions::GraphOrigin> parse_graph_origin(
     std::string_view name);
 
-/// Drives a robot to a remembered view by its pictures: a picture in, a velocity out. Views are
-/// read from the memory file when they are needed: those of one area and around it are held, of the
-/// rest only the graph. Making the graph needs the views of all nodes of a map, or all views for an
+/// Drives a robot to a remembered view: takes an image, returns a velocity. Views are read from the
+/// memory file when needed: those of the current area and its surroundings are held, of the rest
+/// only the graph. Making the graph needs the views of all nodes of a map, or all views for an
 /// arrangement; these are released afterwards. One thread at a time.
 class RobotNavigator {
  public:
@@ -52,11 +53,12 @@ class RobotNavigator {
   struct Step {
     NavigationDecision decision;  ///< the last one
     Velocity velocity;            ///< for the next period of the base (`BaseOptions::period_s`)
-    bool decided = false;         ///< by this observation; else the previous decision continues
+    bool decided =
+        false;  ///< true: this observation led to a new decision; false: the previous one continues
   };
 
-  /// `goal`: name or id of a view. `source`: layout of the pictures; empty: the memory's own.
-  /// Throws FileError when the memory has no views, not the edges or the route of the options, or
+  /// `goal`: name or id of a view. `source`: layout of the images; empty: that of the memory.
+  /// Throws FileError if the memory has no views or lacks the edges or route of the options, or if
   /// no edge leads to the goal; OptionError.
   RobotNavigator(const std::filesystem::path& memory, const std::string& goal,
                  const RobotNavigatorOptions& options = {},
@@ -65,13 +67,14 @@ class RobotNavigator {
   RobotNavigator(const RobotNavigator&) = delete;
   RobotNavigator& operator=(const RobotNavigator&) = delete;
 
-  /// Sets another goal; the robot's place stays known. Throws FileError as the constructor.
+  /// Sets another goal and keeps the estimate of the robot's place. Throws FileError as the
+  /// constructor.
   void set_goal(const std::string& goal);
 
-  /// Returns the next motion; to be called once in each period of the base. The robot decides again
-  /// when the previous step is done, by odometry or else as commanded, and when `report` says that
-  /// something stopped it; only then the picture is evaluated. Throws as `ViewEncoder::signature`
-  /// and `Navigator::observe`.
+  /// Returns the next motion; call it once in each period of the base. The image is evaluated only
+  /// for a new decision: when the previous step is done, by odometry or else as commanded, or when
+  /// `report` says that something stopped it. Throws as `ViewEncoder::signature` and
+  /// `Navigator::observe`.
   [[nodiscard]] Step step(const Observation& observation, RobotReport report = {});
 
   /// Returns the source of the edges.
@@ -89,7 +92,7 @@ class RobotNavigator {
   [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
   /// Returns the encoder that makes queries of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
-  /// Returns how lines are made along its route; null without one.
+  /// Returns how the lines of the followed route are made; null without a route.
   [[nodiscard]] const RouteSource* route() const noexcept {
     return route_source_ ? &*route_source_ : nullptr;
   }
@@ -106,11 +109,11 @@ class RobotNavigator {
   std::optional<RouteSource> route_source_;
   std::optional<LineEncoder> line_encoder_;
   std::optional<Navigator> navigator_;
-  // The current step.
+  // State of the current step.
   Step last_;
   Point2 target_;                  // in the current robot frame
-  double time_left_s_ = 0.0;       // after which it counts as done
-  Pose2 moved_;                    // since the decision
+  double time_left_s_ = 0.0;       // until the step counts as done
+  Pose2 moved_;                    // motion since the decision
   std::optional<Pose2> odometry_;  // of the last observation
 };
 

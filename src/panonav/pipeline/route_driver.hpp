@@ -12,17 +12,18 @@ namespace panonav {
 
 /// Options for repeating a route.
 struct RouteDriverOptions {
-  RouteFollowerOptions follower;  ///< how the robot is found on it
-  PathFollowerOptions path;       ///< how closely its path is kept
-  BaseOptions base;               ///< what velocities are made for
-  /// Distance along the route at which an earlier drive ended: where the route passes the robot's
-  /// place several times, the drive continues at the pass nearest to it. Empty: at the first pass.
+  RouteFollowerOptions follower;  ///< how the robot is located on the route
+  PathFollowerOptions path;       ///< how closely the robot keeps to the path
+  BaseOptions base;               ///< drive of the robot, and limits of its velocities
+  /// Distance along the route at which an earlier drive ended. If the route passes the robot's
+  /// place several times, the drive continues at the pass nearest to that distance; empty: at the
+  /// first pass.
   std::optional<double> resume_m;
 };
 
-/// Repeats a recorded route [Y03]: a picture with its odometry in, a velocity out. The robot drives
-/// from its place, of several the first along the route, to the end of the route, by pure pursuit
-/// of the positions of its lines (`PathFollower`). One thread at a time.
+/// Repeats a recorded route [Y03]: takes an image with its odometry, returns a velocity. The robot
+/// drives from its place (if it is on the route several times, from the first) to the end, by pure
+/// pursuit of the positions of its lines (`PathFollower`). One thread at a time.
 class RouteDriver {
  public:
   /// State of a repeated route.
@@ -30,7 +31,8 @@ class RouteDriver {
     searching,  ///< the robot stands: its place is not known yet
     driving,    ///< the robot is on its way to the end of the route
     arrived,    ///< at the end of the route
-    lost,       ///< not found on the route, or not for so long that odometry alone is no guide
+    lost,       ///< not found on the route, or without a fix for so long that odometry alone is
+                ///< unreliable
   };
 
   /// The robot's next motion after an observation, and its position relative to the route.
@@ -51,7 +53,7 @@ class RouteDriver {
   RouteDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
               const RouteDriverOptions& options = {});
 
-  /// Returns the next motion; to be called once in each period of the base, until the robot arrived
+  /// Returns the next motion; call it once in each period of the base until the robot has arrived
   /// or is lost. `other_estimate`: pose of the robot in the frame of the route by another method
   /// (`Tracker`); as long as it agrees with the odometry since the last fix, the robot is not lost.
   /// Throws as `LineEncoder::line`, ContractError on an observation without odometry.
@@ -67,7 +69,7 @@ class RouteDriver {
 
   RouteDriverOptions options_;
   RouteFollower follower_;
-  std::optional<PathFollower> path_;  // from the robot's first place on
+  std::optional<PathFollower> path_;  // from the robot's first place onwards
   double start_m_ = 0.0;              // along the route
   double length_m_ = 0.0;
   std::optional<Pose2> odometry_;  // of the step before

@@ -16,20 +16,21 @@ namespace panonav {
 /// Options for following a route.
 struct RouteFollowerOptions {
   std::optional<std::string> name;  ///< of the route; empty: the only one
-  RouteTrackerOptions tracker;      ///< where the robot is searched, and when a fit is believed
+  RouteTrackerOptions tracker;      ///< search range, and thresholds for accepting a fit
   RouteFitOptions fit;              ///< how lines are fitted
-  bool use_odometry = true;         ///< of observations that have it; else each is located alone
+  bool use_odometry =
+      true;  ///< use odometry where observations have it; otherwise each is located alone
 };
 
-/// Finds a robot relative to a recorded route [Y03], observation by observation. Odometry, of
-/// observations that have it, predicts the place; where the prediction does not hold, the robot is
-/// searched around it, then on the whole route. One thread at a time, except `encode`.
+/// Locates a robot relative to a recorded route [Y03], observation by observation. Odometry, if
+/// there is any, predicts the place. If the prediction fails, the robot is searched around it, then
+/// on the whole route. One thread at a time, except `encode`.
 class RouteFollower {
  public:
   /// The robot's position relative to the route.
   struct Step {
     std::vector<float> line;                          ///< pixels of the observation's line
-    std::optional<RouteFix> fix;                      ///< empty: not on this route
+    std::optional<RouteFix> fix;                      ///< empty: the robot is not on this route
     std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene differs from the route's
   };
 
@@ -46,17 +47,17 @@ class RouteFollower {
   [[nodiscard]] std::vector<float> encode(const Observation& observation) const {
     return encoder_.line(observation);
   }
-  /// Finds the robot by the next line, which `encode` made, and the odometry of its observation, if
-  /// any.
+  /// Locates the robot by the next line, which `encode` made, and the odometry of its observation,
+  /// if any.
   [[nodiscard]] Step step(std::vector<float> line, const std::optional<Pose2>& odometry);
-  /// Encodes the next observation and finds the robot. Throws as `encode`.
+  /// Encodes the next observation and locates the robot. Throws as `encode`.
   [[nodiscard]] Step step(const Observation& observation) {
     return step(encode(observation), observation.odometry);
   }
 
   [[nodiscard]] const std::string& name() const noexcept {
     return name_;
-  }  ///< Name of the route in the memory.
+  }  ///< Returns the name of the route in the memory.
   /// Returns how the route's lines were made, and where its poses came from.
   [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
   /// Returns the tracker, with its present state.

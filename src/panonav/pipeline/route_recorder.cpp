@@ -17,7 +17,7 @@ std::string describe_route(const MemoryFile& file, const std::string& name) {
   return "the route '" + name + "' in " + file.path().string();
 }
 
-/// Lines can only go on with the same camera and in the same frame.
+/// Lines can only be continued with the same camera and in the same frame.
 RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& options) {
   require(options.every_m >= 0.0, "every_m", options.every_m, ">= 0");
   RouteSource source{.line = options.line.value_or(HorizonScanlineOptions{}),
@@ -90,7 +90,7 @@ std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
 }
 
 bool RouteRecorder::is_due(const std::optional<Pose2>& last, const Pose2& next, double every_m) {
-  // A robot that drives every_m between pictures is sometimes a little nearer or farther.
+  // Allows for robots that drive slightly less or more than every_m between images.
   return !last || distance(last->position(), next.position()) >= 0.999 * every_m;
 }
 

@@ -28,19 +28,19 @@ struct RouteRecorderOptions {
   /// First and last row that show the horizon, counted from 0 at the top, of panoramas whose
   /// elevations are not known. Empty: those of the existing route, else all.
   std::optional<std::pair<int, int>> horizon_rows;
-  bool odometry = false;  ///< remember the odometry's poses, even where observations have poses
+  bool odometry = false;  ///< store the odometry's poses, even if observations have poses
 };
 
-/// Records a route as one line of pixels a step [Y03] in a memory file, 64 lines in one
-/// transaction. Poses are those of the observations, which need headings, or those of their
-/// odometry, as the options say. One thread at a time, except `encode`.
+/// Records a route in a memory file as one line of pixels per step [Y03], 64 lines per transaction.
+/// Poses are those of the observations, which need headings, or of their odometry, as the options
+/// say. One thread at a time, except `encode`.
 class RouteRecorder {
  public:
   /// The recorded route, and the lines that this recorder added to it.
   struct Recorded {
     RoutePanorama route;       ///< all of its lines, those of earlier drives included
-    std::size_t appended = 0;  ///< lines
-    std::uint64_t bytes = 0;   ///< of the route's lines and poses as stored
+    std::size_t appended = 0;  ///< number of lines added
+    std::uint64_t bytes = 0;   ///< stored size of the route's lines and poses
     /// Bytes for each kilometre of the route; 0 for a route without length.
     [[nodiscard]] double bytes_per_km() const;
   };
@@ -51,11 +51,11 @@ class RouteRecorder {
     std::vector<float> line;  ///< as `horizon_scanline` gives it
   };
 
-  /// Pictures come from the memory's own camera. Throws as the other.
+  /// Takes images of the memory's own camera. Throws as the constructor below.
   explicit RouteRecorder(const std::filesystem::path& memory,
                          const RouteRecorderOptions& options = {});
-  /// Takes a file open for writing. `source`: layout of the pictures; empty: the memory's own.
-  /// Throws ContractError when the route is there and was recorded otherwise, FileError.
+  /// Takes a file open for writing. `source`: layout of the images; empty: that of the memory.
+  /// Throws ContractError if the route exists and was recorded in another way, FileError.
   RouteRecorder(MemoryFile memory, const std::optional<PictureSource>& source,
                 const RouteRecorderOptions& options = {});
 
@@ -67,17 +67,18 @@ class RouteRecorder {
   /// nor odometry.
   [[nodiscard]] EncodedLine encode(const Observation& observation) const;
   /// Returns the number of lines at the beginning of a drive that the route already holds, if it
-  /// holds nothing else: an interrupted recording continues after them. 0 for any other route.
+  /// holds nothing else: an interrupted recording then continues after them. Returns 0 for any
+  /// other route.
   [[nodiscard]] std::size_t skip_recorded(std::span<const Pose2> drive);
-  /// Adds a line, whatever its distance from the line before. Throws FileError; at the first line
-  /// also when the route is there and ends farther than a metre from it.
+  /// Adds a line, whatever its distance from the last one. Throws FileError; for the first line
+  /// also if the route exists and ends more than a metre away.
   void add(EncodedLine line);
-  /// Adds a line of the next observation if one is due. Returns true if it was. Throws as `encode`
-  /// and the other.
+  /// Encodes and adds the next observation if a line is due. Returns true if it was. Throws as
+  /// `encode` and the overload above.
   bool add(const Observation& observation);
-  /// Records a whole drive, with a pose for each entry: adds lines of those entries at which one is
-  /// due and skips those that the route already holds. Calls `recorded` with their number after
-  /// each line. Throws as `add` and `finish`; those before a picture that cannot be read are kept.
+  /// Records a whole drive, with a pose for each entry: adds lines at the entries where one is due
+  /// and skips those that the route already holds. Calls `recorded` with the number of lines after
+  /// each. Throws as `add` and `finish`; lines before an unreadable image stay.
   Recorded record(const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
                   const std::function<void(std::size_t lines)>& recorded = {});
   /// Writes the added lines to the disk. Throws FileError; ContractError if nothing was ever added.
@@ -97,8 +98,8 @@ class RouteRecorder {
   RouteSource source_;
   bool source_kept_ = false;
   LineEncoder encoder_;
-  std::optional<Pose2> end_;   // of the route that was there
-  std::optional<Pose2> last_;  // of the lines added
+  std::optional<Pose2> end_;   // last pose of the route before this recording
+  std::optional<Pose2> last_;  // pose of the last added line
   std::vector<EncodedLine> waiting_;
   std::size_t appended_ = 0;
 };

@@ -25,7 +25,8 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& m
   }
   validate(options.filter);
   try {
-    // The filter's seed is that of learning, too; what is kept was learnt with the default one.
+    // Stored models were learnt with the default seed, and the filter's seed is that of learning
+    // too.
     if (options.filter.seed == LearningOptions{}.seed) {
       if (const auto models = load_stored_models(file, memory); models && models->observation) {
         return {std::make_shared<const ColumnRanking>(memory), *models->observation, options.filter,

@@ -12,8 +12,8 @@ namespace panonav {
 
 /// Options for following a robot.
 struct TrackerOptions {
-  MonteCarloOptions filter;  ///< how particles are drawn and weighed
-  OdometryNoise odometry;    ///< errors of the robot's wheels
+  MonteCarloOptions filter;  ///< how particles are sampled and weighted
+  OdometryNoise odometry;    ///< errors of the wheel odometry
   /// Layout of the pictures; empty: that of the memory's own.
   std::optional<PictureSource> source;
 };
@@ -28,8 +28,8 @@ struct TrackerOptions {
 /// whole memory; the file is not needed afterwards. Same file, options and observations: same bits.
 class Tracker {
  public:
-  /// The robot starts anywhere in the memorised area. Throws FileError on a file that is missing or
-  /// damaged, or whose views do not know enough positions to learn from; OptionError.
+  /// Starts with the robot anywhere in the memorised area. Throws FileError if the file is missing
+  /// or damaged, or if too few of its views have a position; OptionError.
   explicit Tracker(const std::filesystem::path& memory, const TrackerOptions& options = {});
   /// Uses an open file.
   explicit Tracker(const MemoryFile& file, const TrackerOptions& options = {});
@@ -38,17 +38,17 @@ class Tracker {
   Tracker(Tracker&&) noexcept;
   Tracker& operator=(Tracker&&) noexcept;
 
-  /// Forgets the robot's pose, as `MonteCarloLocaliser::start_globally`.
+  /// Forgets the robot's pose (`MonteCarloLocaliser::start_globally`).
   void start_globally(std::optional<double> heading_rad = std::nullopt);
   /// Starts around a known pose, in the frame of the memory's positions.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
-  /// Moves by the odometry, where the observation has one, and takes the picture into account.
-  /// Throws as `ViewEncoder::panorama`; the robot has moved then all the same.
+  /// Moves by the odometry, if the observation has one, and updates the estimate from the image.
+  /// Throws as `ViewEncoder::panorama`, after the motion was applied.
   MonteCarloEstimate observe(const Observation& observation);
-  /// Takes only a picture into account, encoded by `encoder()` on another thread.
+  /// Updates the estimate from an image alone, encoded by `encoder()` on another thread.
   MonteCarloEstimate observe(const PackedSignature& view);
-  /// Moves the robot by the difference from the odometry before; the first call only sets it.
+  /// Moves the robot by the difference from the previous odometry; the first call only sets it.
   /// `odometry`: absolute, in its own frame. Throws ContractError beyond `max_position_m`.
   void move_to(const Pose2& odometry);
 

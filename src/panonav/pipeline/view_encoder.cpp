@@ -19,8 +19,7 @@ namespace {
 
 constexpr PanoramaShape default_shape{80, 512};  // [M04 section 2.1]
 
-/// Pictures that are resampled anyway are cut to the memory's band; ready-made panoramas stay as
-/// they are.
+/// Crops resampled images to the memory's band; ready-made panoramas stay unchanged.
 PictureSource crop_to_band(const MemoryHeader& header, PictureSource source) {
   if (source.kind != PictureKind::panorama) source.layout.kept_elevations = header.elevations;
   return source;
@@ -50,7 +49,7 @@ bool is_same_band(const std::optional<ElevationBand>& a, const std::optional<Ele
 
 constexpr std::string_view as_remembered = ", as in the views of the memory";
 
-/// Pixels of a panorama that become one pixel of its thumbnail, in each direction.
+/// Returns the number of pixels, in each direction, that become one pixel of the thumbnail.
 int compute_thumbnail_step(int columns) {
   constexpr int max_columns = 256;
   return (columns + max_columns - 1) / max_columns;
@@ -64,7 +63,7 @@ void require_same(std::string_view field, int value, int remembered) {
 
 }  // namespace
 
-/// Buffers of the threads that encode at the moment, kept for those that will.
+/// Pool of the encoding buffers, one for each thread that encodes at the moment.
 class ViewEncoder::Workspaces {
  public:
   class Borrowed {

@@ -18,8 +18,8 @@
 
 namespace panonav {
 
-/// Requested size of the cylinders; 0: 80 x 512 [M04 section 2.1] for mirror and 360 degree
-/// pictures, the picture's own for ready-made panoramas.
+/// Requested size of the panoramic cylinders; 0: 80 x 512 [M04 section 2.1] for mirror and 360
+/// degree images, the image's own size for ready-made panoramas.
 struct SignatureOptions {
   int rows = 0;         ///< 0, or >= 1
   int columns = 0;      ///< 0, or >= 4
@@ -31,8 +31,8 @@ void visit_options(SignatureOptions& options, OptionVisitor& visitor);
 /// once and buffers are reused. Several threads may use one encoder.
 class ViewEncoder {
  public:
-  /// `source`: layout of the pictures; that of the memory's own camera is `header.source`. Throws
-  /// ContractError when the elevations of the pictures are not the memory's.
+  /// `source`: layout of the images; `header.source` for the memory's own camera. Throws
+  /// ContractError if the images have other elevations than the memory.
   ViewEncoder(const MemoryHeader& header, const PictureSource& source);
   ~ViewEncoder();
   /// A moved-from object may only be destroyed or assigned to.
@@ -52,19 +52,19 @@ class ViewEncoder {
   /// memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
 
-  /// Computes the signature of an observation; of a picture or of an existing panorama the same
-  /// bits. Mirror pictures of a level robot go through the fused `SignatureExtractor` without a
+  /// Computes the signature of an observation, bit for bit the same from an image or its panorama.
+  /// Images of a level robot with a mirror go through the fused `SignatureExtractor` without a
   /// panorama. Throws as `panorama`.
   [[nodiscard]] FourierSignature signature(const Observation& observation) const;
   /// Computes the signature of a picture as the camera of a level robot delivers it.
   [[nodiscard]] FourierSignature signature(ImageView picture) const;
   /// Computes the signature of a panorama of the memory's shape.
   [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;
-  /// Computes the signature with the memory's full scale.
+  /// Computes the signature, packed with the memory's full scale.
   [[nodiscard]] PackedSignature packed(const Observation& observation) const;
-  /// Computes the same of a picture of a level robot.
+  /// Computes the packed signature of an image of a level robot.
   [[nodiscard]] PackedSignature packed(ImageView picture) const;
-  /// Computes the same of a panorama of the memory's shape.
+  /// Computes the packed signature of a panorama of the memory's shape.
   [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
 
   /// Extracts the local features of a panorama of the memory's shape; empty where elevations are
@@ -83,27 +83,27 @@ class ViewEncoder {
   std::optional<PanoramaShape> picture_shape_;  ///< of panoramas that are resampled
 };
 
-/// Returns the size of the cylinders of a new memory, with the defaults filled in; 0: a panorama's
-/// own.
+/// Returns the size of the cylinders of a new memory, with defaults filled in; 0: that of the
+/// panorama.
 [[nodiscard]] PanoramaShape choose_panorama_shape(const PictureSource& source,
                                                   const SignatureOptions& options);
 
-/// Returns the largest magnitude of k >= 1. The mean brightness, k = 0, is much larger than the
-/// rest and depends more on the light than on the place, so it may saturate.
+/// Returns the largest magnitude of all frequencies k >= 1. The mean brightness, k = 0, is much
+/// larger and depends more on the light than on the place, so it may saturate.
 [[nodiscard]] float largest_nonconstant_magnitude(const FourierSignature& signature);
 
-/// Returns a small picture of the view for people, as PNG.
+/// Returns a small image of the view for people, as PNG.
 [[nodiscard]] std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama);
 
-/// Restores the panorama of a thumbnail of `encode_thumbnail`: of the memory's size, enlarged where
-/// the thumbnail is smaller. Columns and rows that did not fill a pixel of the thumbnail are
-/// missing; the rest is stretched over them, by less than one pixel. Empty when the picture cannot
-/// be decoded or is of another size than thumbnails of this memory.
+/// Restores the panorama of a thumbnail that `encode_thumbnail` made, enlarged to the memory's
+/// size. Columns and rows that did not fill a pixel of the thumbnail are missing; the rest is
+/// stretched over them, by less than one pixel. Empty if the image cannot be decoded or has another
+/// size than thumbnails of this memory.
 [[nodiscard]] std::optional<Panorama> panorama_from_thumbnail(
     std::span<const std::uint8_t> thumbnail, const MemoryHeader& header);
 /// Restores the panorama of a view's thumbnail; empty if it has none.
 [[nodiscard]] std::optional<Panorama> panorama_from_thumbnail(const MemoryFile& file, ViewId view);
-/// Returns the columns of a memory's thumbnails: its own up to 256.
+/// Returns the columns of a memory's thumbnails, at most 256.
 [[nodiscard]] int thumbnail_columns(const MemoryHeader& header) noexcept;
 
 /// Calls body(i) for 0 .. count - 1 on all threads.

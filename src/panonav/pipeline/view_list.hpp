@@ -16,7 +16,7 @@ struct ViewRecord {
   ReferenceInfo info;      ///< name, pose and stamp
   std::size_t links = 0;   ///< to other views of the file
   bool thumbnail = false;  ///< a picture is stored with it
-  /// Connected component of the file's map (that called `map`, else its first); empty without a
+  /// Connected component in the map called `map`, else in the file's first map; empty without a
   /// map, and for views that are not in it.
   std::optional<std::size_t> component;
   friend bool operator==(const ViewRecord&, const ViewRecord&) = default;
@@ -26,14 +26,14 @@ struct ViewRecord {
 /// `MemoryFile::load`.
 [[nodiscard]] std::vector<ViewRecord> list_views(const MemoryFile& file);
 
-/// Returns the table of docs/formats.md, section "Tables of views": a header and one line for each
-/// view. `pictures`: empty, or for each view the file that holds its picture, empty where none
+/// Returns the table of views (docs/formats.md, section "Tables of views"): a header and one line
+/// for each view. `pictures`: empty, or for each view the file that holds its image; empty if none
 /// does.
 [[nodiscard]] std::string format_view_table(std::span<const ViewRecord> views,
                                             std::span<const std::string> pictures = {});
 
-/// Returns the view that a user means: a name first; a number that is no name is an id. Throws
-/// FileError that names the file when there is no such view.
+/// Returns the view that a user names: by name first, else by id. Throws FileError that names the
+/// file if there is no such view.
 [[nodiscard]] ViewId find_view_by_name_or_id(const MemoryFile& file, const std::string& name_or_id);
 
 }  // namespace panonav

@@ -9,16 +9,16 @@
 #include "panonav/motion/odometry.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 
-/// Motion of robots without wheels' odometry, from their pictures.
+/// Motion of robots without wheel odometry, estimated from their images.
 namespace panonav {
 
-/// Returns the noise that a map assumes for odometry from pictures.
+/// Returns the noise that a map assumes for visual odometry.
 [[nodiscard]] OdometryNoise visual_odometry_noise();
-/// Makes visual odometry whose metres are calibrated by views of the memory with known positions.
+/// Makes visual odometry whose scale is calibrated by views of the memory with known positions.
 [[nodiscard]] VisualOdometry visual_odometry(const VisualMemory& memory);
-/// Fills the odometry of all entries from the pictures themselves (`VisualOdometry`), with metres
-/// calibrated by the memory. Returns a message: how many steps could not be read, at which the
-/// robot seems to stand, and the scale. Throws FileError on a picture that cannot be read.
+/// Fills the odometry of all entries by `VisualOdometry`, with the scale calibrated by the memory.
+/// Returns a message with the number of steps that could not be estimated, at which the robot seems
+/// to stand, and the scale. Throws FileError on an image that cannot be read.
 [[nodiscard]] std::string add_visual_odometry(Dataset& run, const VisualMemory& memory,
                                               const ViewEncoder& encoder, Executor& executor);
 

@@ -14,7 +14,7 @@ namespace panonav {
 /// file handle of its own. Several threads may use it.
 class FeatureCache {
  public:
-  /// Opens the memory again. Views above `last_view` were added later and have no features here;
+  /// Opens the memory again. Views with an id above `last_view` are treated as having no features;
   /// empty: all views count.
   explicit FeatureCache(const MemoryFile& memory, std::optional<ViewId> last_view = std::nullopt);
 
@@ -28,7 +28,7 @@ class FeatureCache {
   MemoryFile file_;
   bool is_lost_ = false;  ///< `file_` has lost its server
   std::optional<ViewId> last_view_;
-  FeatureSource read_;  ///< looks at `file_`; empty: the memory has no features
+  FeatureSource read_;  ///< reads from `file_`; empty: the memory has no features
   std::map<ViewId, std::optional<LocalFeatures>> views_;
 };
 

@@ -8,9 +8,9 @@ namespace panonav {
 
 namespace {
 
-// Side of the square areas that are loaded whole: chosen, some spacings of references wide.
+// Side of the square areas that are loaded as a whole: chosen, some spacings of references wide.
 constexpr double area_side_m = 10.0;
-// Views loaded before a drawn one without a position, and as many from it on: chosen.
+// Number of views loaded before a sampled view without a position, and from it onwards: chosen.
 constexpr std::size_t views_before = 128;
 
 PositionBounds enclosing_area_bounds(Point2 position) {

@@ -10,12 +10,12 @@
 
 namespace panonav {
 
-/// Models that localisation and tracking learn of a memory before they answer, with the default
-/// options of learning and over all components.
+/// Models that localisation and tracking learn from a memory before they answer, with the default
+/// learning options and over all components.
 struct LearntModels {
-  PlaceModel place;        ///< for whether a place is known
-  PositionModel position;  ///< for positions between references
-  double spacing_m = 0.0;  ///< of references with headings (`NeighbourSupport`)
+  PlaceModel place;        ///< decides whether a place is known
+  PositionModel position;  ///< estimates positions between references
+  double spacing_m = 0.0;  ///< spacing of references with headings (`NeighbourSupport`)
   /// Empty if the memory has too few views with a position, or all of them at one place.
   std::optional<ObservationModel> observation;
   /// True if local features decide between the best matches
@@ -27,21 +27,21 @@ struct LearntModels {
 [[nodiscard]] LearntModels learn_models(const VisualMemory& memory,
                                         const FeatureSource& features = {});
 
-/// Learns the models without that of observations, over `components` (0: all). Throws ContractError
-/// on more components than the memory's.
+/// Learns all models but the observation model, over `components` (0: all). Throws ContractError if
+/// the memory has fewer components.
 [[nodiscard]] LearntModels learn_place_models(const VisualMemory& memory,
                                               const FeatureSource& features, int components);
 
-/// Returns a function that reads the local features of a view from the file at each call; empty
-/// where the file has none. The file must outlive it.
+/// Returns a function that reads the local features of a view from the file at each call; empty if
+/// the file has none. The file must outlive it.
 [[nodiscard]] FeatureSource make_feature_source(const MemoryFile& file);
 
-/// Reads the models that the file keeps, to the bit as `learn_models` gives them; nullopt where it
-/// keeps none or has changed since. `memory` holds all views of the file. Never writes. Cost: one
-/// pass over the signatures, 40 ms for 100,000 of 20 x 15.
+/// Reads the models stored in the file, bit for bit as `learn_models` returned them; nullopt if
+/// there are none or the views have changed since. `memory` holds all views of the file. Never
+/// writes. Cost: one pass over the signatures, 40 ms for 100,000 of 20 x 15.
 [[nodiscard]] std::optional<LearntModels> load_stored_models(const MemoryFile& file,
                                                              const VisualMemory& memory);
-/// Reads the models that were kept last, whichever views the file has now.
+/// Reads the models stored last, even if the views have changed since.
 [[nodiscard]] std::optional<LearntModels> load_stored_models(const MemoryFile& file);
 
 }  // namespace panonav
