@@ -44,7 +44,7 @@ std::vector<RankedMatch> ColumnRanking::rank(const PackedSignature& query,
   std::vector<RankedMatch> ranked;
   ranked.reserve(matches.size());
   for (const Match& match : matches) {
-    // Kept profiles are over all rows.
+    // Cached profiles cover all rows.
     const ColumnProfiles* const found = allowed_rows.empty() ? find_kept(match.view) : nullptr;
     const ColumnMatch columns =
         found != nullptr ? match_columns(query_profiles, *found)

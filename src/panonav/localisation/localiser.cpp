@@ -17,8 +17,8 @@ namespace panonav {
 
 namespace {
 
-// Returns the signature with the magnitudes of the rows that do not count set to 0; unchanged
-// without `allowed_rows`.
+// Returns the signature with the magnitudes of disallowed rows set to 0; unchanged without
+// `allowed_rows`.
 PackedSignature keep_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
   if (allowed_rows.empty()) return signature;
   for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
@@ -27,7 +27,7 @@ PackedSignature keep_rows(PackedSignature signature, std::span<const std::uint8_
   return signature;
 }
 
-// Returns the features without those in rows that do not count.
+// Returns the features in allowed rows.
 std::optional<LocalFeatures> keep_rows(std::optional<LocalFeatures> features,
                                        std::span<const std::uint8_t> allowed_rows) {
   if (features && !allowed_rows.empty()) {
@@ -38,21 +38,20 @@ std::optional<LocalFeatures> keep_rows(std::optional<LocalFeatures> features,
   return features;
 }
 
-/// Matches of which the heading is the mean, and of which the nearest one is listed first: the
+/// Number of best matches whose headings are averaged and whose nearest one is listed first: the
 /// corners of a grid's square.
 constexpr std::size_t nearest_references = 4;
 
-/// Half the window of the compass: columns give the rotation to one of their steps.
+/// Half width of the compass's search window: columns give the rotation to within one column.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
-// Returns the weighted mean of the headings by the nearest references. The error of the compass
-// grows with the distance, and so does the square of the difference, so weights are its inverse
-// fourth power. Only headings near that by the best match count: a compass that locked on to a
-// wrong maximum must not pull the mean.
+// Returns the weighted mean of the headings by the nearest references. Weights are the inverse
+// fourth power of the difference, as the compass's error grows with its square. Headings far from
+// that of the best match are outliers of the compass and are ignored.
 std::optional<double> estimate_heading(const VisualMemory& memory,
                                        std::span<const PlaceMatch> matches) {
-  constexpr double agreement_rad = radians(15.0);  // three times the compass's usual error
-  constexpr double min_difference = 1e-2;          // below it all differences count alike
+  constexpr double agreement_rad = radians(15.0);  // three times the compass's typical error
+  constexpr double min_difference = 1e-2;          // below it all weights are equal
   std::optional<double> centre_rad;
   double sum = 0.0;
   double weights = 0.0;
@@ -71,8 +70,8 @@ std::optional<double> estimate_heading(const VisualMemory& memory,
   return wrap_angle(*centre_rad + sum / weights);
 }
 
-// Moves the nearest of the best references to the front: the position, on which many references
-// agree, identifies it better than single differences, in which noise decides between neighbours.
+// Moves the nearest of the best references to the front. The interpolated position identifies it
+// better than single differences, which noise dominates between neighbours.
 void move_nearest_first(const VisualMemory& memory, Point2 position,
                         std::vector<PlaceMatch>& matches) {
   const auto end =
@@ -91,7 +90,7 @@ std::vector<ViewId> to_ids(std::span<const RankedMatch> matches) {
   return ids;
 }
 
-// Replaces rectangles that overlap by one around both.
+// Merges overlapping rectangles into one that encloses both.
 std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) {
   const auto overlap = [](const PositionBounds& a, const PositionBounds& b) {
     return a.min_x_m <= b.max_x_m && b.min_x_m <= a.max_x_m && a.min_y_m <= b.max_y_m &&
@@ -138,7 +137,7 @@ VisualMemory join_memories(const VisualMemory& part, const VisualMemory& drawn) 
   std::ranges::set_union(part.views(), drawn.views(), std::back_inserter(views));
   for (const ViewId view : views) {
     const VisualMemory& from = part.contains(view) ? part : drawn;
-    // Another user may have given its name to another view meanwhile.
+    // Another user may meanwhile have given its name to another view.
     if (all.find(from.info(view).name)) continue;
     all.append_with_id(view, from.packed(view), from.info(view));
   }
@@ -210,8 +209,8 @@ class Localiser::Query {
   }
 
  private:
-  /// Finds the views of least dissimilarity [M04 section 2.2], in the order of their columns; more
-  /// of them where none explains the query.
+  /// Searches the views of least dissimilarity [M04 section 2.2] and ranks them by columns;
+  /// searches more of them if none explains the query.
   void find_candidates() {
     const int first = std::max(
         {options_.top, PositionModel::candidates, ranks_by_features_ ? verified_candidates : 0});
@@ -259,7 +258,7 @@ class Localiser::Query {
   void weigh_columns() { place_.evidence = compared_->criterion.evidence(view_, ranked_, mask_); }
 
   void rank_by_support() {
-    // Profiles of the references are kept over all rows.
+    // Profiles of the references cover all rows.
     if (options_.reranked_views == 0 || !mask_.allowed_rows.empty()) return;
     compared_->support.rank_by_support(ColumnProfiles(view_, options_.components), ranked_,
                                        mask_.excluded_views);
@@ -311,7 +310,7 @@ class Localiser::Query {
   void estimate_pose() {
     const PositionModel& model = own_.position_model_;
     place_.position = interpolate_position(compared_->ranking, model, ranked_);
-    // Columns alone do not know the place, so they give the position no better than this.
+    // If columns alone do not recognise the place, the position is no more precise than this.
     if (!is_known_by_columns_ && place_.position && place_.position->radius_m) {
       place_.position->radius_m = std::max(*place_.position->radius_m, model.neighbourhood_m);
     }

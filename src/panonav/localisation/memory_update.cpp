@@ -13,15 +13,15 @@ namespace panonav {
 
 namespace {
 
-/// Probability of an answer from which on it is sure: 99 % of these are right (docs/decisions.md).
+/// Smallest probability of a sure localisation: 99 % of these are right (docs/decisions.md).
 constexpr double sure_probability = 0.9;
-/// Spacings of travel within which answers are witnesses: odometry errs by 0.4 spacings there.
+/// Longest travel to a witness, in spacings: odometry errs by 0.4 spacings over it.
 constexpr double witness_reach_spacings = 8.0;
-/// Images kept before one that is decided, and after it.
+/// Largest number of witnesses before an image, and after it.
 constexpr std::size_t max_witnesses = 64;
-/// Share of the expected similarity from which on a view is explained.
+/// Smallest share of the expected similarity at which a reference explains a view.
 constexpr double explained_share = 0.5;
-/// Spacings between images that count: nearer ones see the same.
+/// Shortest travel between two images, in spacings: nearer ones show the same.
 constexpr double new_image_spacings = 0.25;
 
 }  // namespace

@@ -16,89 +16,87 @@ namespace panonav {
 
 struct PoseWitness;
 
-/// Limits of a memory: the views it may keep, and when one is forgotten.
+/// Limits of a memory: how many views it keeps, and when one is forgotten.
 struct MemoryUpdateOptions {
-  int appearances = 3;  ///< views of one place, at most
-  int failures = 10;    ///< runs in a row in which a view failed before it is forgotten
-  int max_views = 0;    ///< of the memory; 0: `appearances` times its places
+  int appearances = 3;  ///< largest number of views of one place
+  int failures = 10;    ///< successive runs in which a view must fail before it is forgotten
+  int max_views = 0;    ///< largest size of the memory; 0: `appearances` times its places
 };
 void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor);
 
-/// Decides which changes a run through the places of a memory makes there. Where the robot
-/// certainly was (`find_witnessed_pose`), the references around are compared with its view; one
-/// explains it if their similarity is at least half of that expected at their distance
-/// (`ObservationModel`).
-/// - A reference that explains the view is reinforced; one that does not while another does has
-///   failed, and is forgotten after `failures` runs in a row.
-/// - If none does, the view is added, one a run at most. Of more than `appearances` the least
-///   useful is replaced.
+/// Decides which views a run adds to a memory and which it removes. At each certain pose
+/// (`find_witnessed_pose`), the robot's view is compared with the references around. One explains
+/// it if they are at least half as similar as expected at their distance (`ObservationModel`).
+/// - A reference that explains the view is reinforced. One that does not, while another does, has
+///   failed; it is forgotten after `failures` successive runs.
+/// - A view that no reference explains is added, at most once a run for each place; if the place
+///   has `appearances` views, it replaces the least useful one.
 /// - A place keeps at least one view.
 ///
-/// Cost: 10 microseconds for each reference around. Holds at most 128 images of the run. Same run:
-/// same changes.
+/// Cost: 10 microseconds for each reference around. Holds at most 128 images.
 class MemoryUpdate {
  public:
-  /// Knowledge of earlier runs that updates of a memory need. Plain numbers, to be stored with the
-  /// memory.
+  /// Statistics of earlier runs, to be stored with the memory and passed to its next update.
   struct Use {
-    /// Usefulness of one view so far.
+    /// Statistics of one view.
     struct View {
-      int matched = 0;   ///< runs in which it explained the robot's view at its place
-      int failed = 0;    ///< runs in a row in which another view of the place did, but not this one
-      int last_run = 0;  ///< in which it matched or was learnt; 0: none
-      bool learnt = false;  ///< by an update
+      int matched = 0;  ///< runs in which it explained the robot's view at its place
+      int failed = 0;  ///< successive runs in which another view of the place did, but not this one
+      int last_run = 0;     ///< last run in which it matched or was learnt; 0: none
+      bool learnt = false;  ///< added by an update
       friend bool operator==(const View&, const View&) = default;
     };
 
-    int runs = 0;  ///< by which the memory was updated
-    /// Of the memory before its first update: appearances of a place make references seem nearer to
-    /// each other and less similar than places are. 0 before that.
+    int runs = 0;  ///< number of runs that have updated the memory
+    /// Spacing of the memory before its first update: later, several views of a place make
+    /// references seem nearer to each other and less similar than places are. 0 before the first
+    /// update.
     double spacing_m = 0.0;
     double far_difference = 0.0;   ///< `ObservationModel::far_difference` of the same memory
     double range_m = 0.0;          ///< `ObservationModel::range_m` of the same memory
-    int places = 0;                ///< views of the same memory, and of places that came later
+    int places = 0;                ///< places of the same memory, and those added later
     int size = 0;                  ///< views of the memory after the last update
-    std::map<ViewId, View> views;  ///< those that have been used
+    std::map<ViewId, View> views;  ///< views that have matched or failed
     friend bool operator==(const Use&, const Use&) = default;
   };
 
-  /// One image of a run, as a `Localiser` answered it by the memory at the beginning of the run.
+  /// One image of a run, localised in the memory as it was at the beginning of the run.
   struct AnsweredView {
     Pose2 odometry;                  ///< absolute, in its own frame
-    PackedSignature signature;       ///< of the image, as the memory compares it
+    PackedSignature signature;       ///< of the image, in the memory's shape
     double known_probability = 0.0;  ///< of the answer
-    std::optional<Pose2> pose;  ///< of the answer; nullopt where position or heading is unknown
-    std::optional<double> radius_m;  ///< of 95 %, of the position
+    std::optional<Pose2> pose;       ///< estimated; nullopt if position or heading is unknown
+    std::optional<double> radius_m;  ///< holds the position in 95 % of the cases
   };
 
-  /// Changes that a run makes in its memory.
+  /// Changes of the memory by one run.
   struct Changes {
     /// An image of the run that becomes a view.
     struct Added {
       std::size_t number = 0;  ///< of the image in the run
-      ReferencePose pose;      ///< where it certainly was taken, with its heading
+      ReferencePose pose;      ///< certain pose at which it was taken
     };
     std::vector<Added> added;       ///< ascending
-    std::vector<ViewId> replaced;   ///< dropped for an added one; ascending
-    std::vector<ViewId> forgotten;  ///< dropped because others have long been better; ascending
+    std::vector<ViewId> replaced;   ///< removed for an added one; ascending
+    std::vector<ViewId> forgotten;  ///< removed because others have long been better; ascending
     std::vector<ViewId> matched;    ///< ascending
-    std::size_t certain = 0;        ///< images whose place was certain
-    Use use;                        ///< to store; without the added views and the new size
+    std::size_t certain = 0;        ///< number of images whose pose was certain
+    Use use;                        ///< to be stored; without the added views and the new size
   };
 
   /// `ranking` and its memory must outlive *this and not change. Throws OptionError.
   MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model, Use use,
                const MemoryUpdateOptions& options = {});
 
-  /// Adds the next image; its number is the count of those before. One that lies less than a
-  /// quarter of a spacing from the one before shows nothing new and is left out.
+  /// Adds the next image; its number is the count of earlier ones. An image less than a quarter of
+  /// a spacing from the previous one shows nothing new and is skipped.
   void add(AnsweredView view);
-  /// True if the image may still be added to the memory: it waits for a decision or was chosen.
+  /// True if the image may still become a view of the memory: it is undecided or was chosen.
   [[nodiscard]] bool can_become_view(std::size_t number) const;
   /// True if the last image is within reach of a certain answer before it, so that it may become
   /// certain.
   [[nodiscard]] bool is_near_known_place() const;
-  /// Decides the remaining images. Nothing may be added afterwards.
+  /// Decides the remaining images and returns all changes. Call it last.
   [[nodiscard]] Changes finish();
 
  private:

@@ -20,42 +20,39 @@ namespace panonav {
 
 namespace {
 
-/// Sectors of the circle in which particles are clustered: 15 degrees, between the compass's error
-/// of some 5 degrees and the quarter turn after which rooms look alike.
+/// Number of heading sectors in which particles are clustered: 15 degrees, between the compass's
+/// error of some 5 degrees and the quarter turn after which rooms look alike.
 constexpr int heading_bins = 24;
 
-// Work per image, so that all modes are followed in a time that the search does not exceed; less
-// while the robot is localised.
+// Limits of the work per image; lower while the robot is localised.
 constexpr int searched_views = 16;                ///< views that the search finds
 constexpr int searched_views_when_localised = 4;  ///< the same of a localised robot
-constexpr std::size_t max_followed_sites = 256;   ///< references near the particles compared
+constexpr std::size_t max_followed_sites = 256;   ///< compared references near the particles
 constexpr std::size_t max_followed_sites_when_localised = 16;
-/// Smallest share of the particles' weight near a reference that is compared for them: five of
-/// 5000.
+/// Smallest share of the particles' weight around a reference for it to be compared: five of 5000.
 constexpr double min_followed_weight = 1e-3;
 
 // Probabilities from one image to the next (docs/decisions.md, particle injection).
-constexpr double p_kidnap = 0.01;  ///< that the robot was carried anywhere
+constexpr double p_kidnap = 0.01;  ///< that the robot is carried elsewhere
 constexpr double p_leave = 0.02;   ///< that it leaves the memorised area
 constexpr double p_return = 0.1;   ///< that it comes back
-/// Probability at the first image that the robot is not where the particles were drawn: few of them
-/// are near it.
+/// Probability at the first image that the robot is not near any particle.
 constexpr double p_elsewhere_at_start = 0.9;
 /// Belief in being inside the memorised area before the first image: undecided.
 constexpr double p_inside_at_start = 0.5;
 
 /// Log-likelihood ratio that one in a hundred views of another place reaches by chance
-/// (docs/decisions.md, "Lost is a second belief"). One image is never stronger evidence against the
-/// area than this.
+/// (docs/decisions.md, "Lost is a second belief"). It limits the evidence of one image against the
+/// memorised area.
 constexpr double chance_log_ratio = 1.0;
-// Strongest evidence of one image for the area, by its likelihood or by its difference alone: odds
-// of 150 and of 7, so that some images against it prevail
+// Limits of the evidence of one image for the memorised area, by its likelihood and by its
+// difference alone: odds of 150 and of 7, so that a few images can refute it
 // (tests/localisation/monte_carlo_test.cpp).
 constexpr double max_log_ratio = 5.0;
 constexpr double max_log_ratio_of_difference = 2.0;
 /// Log-likelihood ratio of an explained difference against an unrelated one (the same tests).
 constexpr double log_ratio_per_margin = 4.0;
-/// Smallest distance between the two that counts; keeps the margin finite where they coincide.
+/// Smallest unit of the margin; keeps it finite if both differences coincide.
 constexpr double min_margin_unit = 0.05;
 
 /// Smallest exponent of a view's likelihood, however close it is to the view before, so that a
@@ -81,12 +78,12 @@ struct MonteCarloLocaliser::Implementation {
   ViewLikelihood likelihood;
   PoseSampler sampler;
   ParticleWeighing weighing;
-  InjectionRule injection_rule;  // empty: none but the filter's own
+  InjectionRule injection_rule;  // empty: only the filter's own injection
   Random random;
   Particles particles;
   double travelled_m = 0.0;  // since the last image
   PositionError error;
-  bool knows_nothing = true;          // no image since the start
+  bool knows_nothing = true;          // no image since a start without a known pose
   double inside = p_inside_at_start;  // belief that the robot is in the memorised area
   MonteCarloEstimate latest;
 
@@ -149,7 +146,7 @@ struct MonteCarloLocaliser::Implementation {
     return std::exp(-travelled_m / model.range_m);
   }
 
-  /// Compares column by column the views that the search finds, those around the best of them, and
+  /// Compares, column by column, the views found by the search, those around the best of them, and
   /// those around the particles.
   void compare_views(const PackedSignature& view, bool was_localised) {
     likelihood.set_view(view);
@@ -197,7 +194,7 @@ struct MonteCarloLocaliser::Implementation {
     for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
   }
 
-  /// Replaces random particles by new ones, by the caller's rule.
+  /// Replaces random particles by new ones according to the caller's rule.
   void inject_by_rule(const PackedSignature& view) {
     if (!injection_rule) return;
     const std::size_t size = particles.size();
@@ -230,14 +227,15 @@ struct MonteCarloLocaliser::Implementation {
     ExplainedInjection injection(likelihood, sampler, model, options.compass);
     if (!injection.find_places(particles, random)) return;
     latest.log_there = injection.log_evidence();
-    // A robot that was outside may come back anywhere.
+    // A robot that was outside may return anywhere.
     const double prior =
         knows_nothing ? p_elsewhere_at_start : p_kidnap + (1.0 - inside) * p_return;
     const double elsewhere = kidnap_probability(prior, latest.log_there, latest.log_here);
     latest.injected = injection.inject(particles, elsewhere, random);
   }
 
-  /// Updates the belief in being inside by how much better the view is explained than by chance.
+  /// Updates the belief in being inside the memorised area by how much better than chance the view
+  /// is explained.
   void update_inside() {
     double evidence = latest.log_here;
     if (options.injection == MonteCarloOptions::Injection::explained) {
@@ -302,7 +300,7 @@ struct MonteCarloLocaliser::Implementation {
     resample_particles(particles, count, random);
   }
 
-  /// True if a reference is near enough to be compared with the place.
+  /// True if a reference is near enough to be compared at this position.
   [[nodiscard]] bool is_in_memorised_area(Point2 place) const {
     if (!likelihood.sites_near(place).empty()) return true;
     const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
@@ -375,7 +373,8 @@ void MonteCarloLocaliser::start_globally(std::optional<double> heading_rad) {
   auto& own = *implementation_;
   const auto count = static_cast<std::size_t>(own.options.max_particles);
   own.particles.resize(count);
-  // Spread evenly over the references: as many particles as references leave none without one.
+  // Particles are spread evenly over the references: with as many particles as references, each
+  // gets one.
   const std::size_t sites = own.likelihood.sites().size();
   const double first = own.random.uniform(0.0, 1.0);
   for (std::size_t i = 0; i < count; ++i) {

@@ -17,54 +17,53 @@
 
 namespace panonav {
 
-/// Options of the filter: its particles, and how they are weighed and renewed.
+/// Options of the particle filter.
 struct MonteCarloOptions {
-  /// Particle injection: how many particles are replaced at each image, so that a kidnapped robot
-  /// is found again, and where the new ones are drawn.
+  /// Particle injection: how many particles are replaced at each image and where new ones are
+  /// sampled, so that a kidnapped robot is found again.
   enum class Injection {
     none,       ///< none
-    explained,  ///< as many as the view is better explained elsewhere than where the particles are
+    explained,  ///< as many as the view's likelihood elsewhere demands (Bayes)
   };
 
-  int min_particles = 200;      ///< >= 1, also in one narrow mode
-  int max_particles = 5000;     ///< when the robot may be anywhere
-  double kld_error = 0.05;      ///< allowed between the particles' distribution and the true one
-  double resample_below = 0.5;  ///< effective sample size, as a share of the particles
-  bool compass = true;          ///< the visual compass weighs headings too
-  Injection injection = Injection::explained;  ///< where new particles are drawn
+  int min_particles = 200;      ///< >= 1; used for one narrow mode
+  int max_particles = 5000;     ///< used when the robot may be anywhere
+  double kld_error = 0.05;      ///< largest error (Kullback-Leibler) of the particles' distribution
+  double resample_below = 0.5;  ///< smallest effective sample size, as a share of the particles
+  bool compass = true;          ///< headings are weighed by the visual compass, too
+  Injection injection = Injection::explained;  ///< how new particles are sampled
   int reranked_views = 1000;  ///< compared column by column when no near view explains the image
   int seed = 1;               ///< of all random choices, >= 0
 };
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
 
-/// Estimate of the robot's place, and the particles behind it.
+/// Certainty of the estimated position.
 enum class LocalisationState {
-  localised,  ///< one mode, no wider than the references' spacing resolves, explains the views
+  localised,  ///< one mode, no wider than the references resolve, explains the views
   ambiguous,  ///< the views are of this memory, but several places or a large area explain them
   lost,       ///< the views are not explained by this memory, or odometry has led out of its area
 };
-/// "localised", "ambiguous", "lost".
+/// Returns "localised", "ambiguous" or "lost".
 [[nodiscard]] std::string_view name_of(LocalisationState state);
 
-/// The belief of the filter after an image.
+/// Estimate of the filter after an image.
 struct MonteCarloEstimate {
   LocalisationState state = LocalisationState::lost;  ///< localised, ambiguous or lost
-  /// Heaviest first; all that hold at least 1 % of the weight. Covariance and spread of the
-  /// position are those of its error: the particles' and, as these take the errors of successive
-  /// views and the scale error of travel for independent, the part that they miss
-  /// (docs/decisions.md).
+  /// Modes with at least 1 % of the weight, heaviest first. Covariance and spread are those of the
+  /// position error. They exceed the particles' own, which ignore that the errors of successive
+  /// views and of travel are correlated (docs/decisions.md).
   std::vector<PoseMode> modes;
   std::optional<Pose2> pose;         ///< mean of the heaviest mode; nullopt when lost
   double spread_m = 0.0;             ///< root mean square distance of all particles from their mean
-  int particles = 0;                 ///< as many as KLD sampling needs
+  int particles = 0;                 ///< number of particles, chosen by KLD sampling
   double effective_particles = 0.0;  ///< effective sample size before resampling
-  bool resampled = false;            ///< light particles were replaced by heavy ones
+  bool resampled = false;            ///< particles were resampled after this image
   int injected = 0;                  ///< particles that were replaced by new ones
-  /// Minimum difference (`ColumnMatch`) of the view to the references near the particles; nullopt
-  /// when none was compared.
+  /// Minimum difference (`ColumnMatch`) of the view from references near the particles; nullopt if
+  /// none was compared.
   std::optional<double> difference_here;
   std::optional<double> difference_anywhere;  ///< the same to all references
-  /// Log-likelihood of the view where the particles were, relative to that of an unexplained view.
+  /// Log-likelihood of the view at the particles, relative to that of an unexplained view.
   double log_here = 0.0;
   double log_there = 0.0;  ///< the same anywhere in the memory (only with `Injection::explained`)
   double inside = 0.0;  ///< belief that the robot is in the memorised area, 0 .. 1; lost below 0.5
@@ -75,20 +74,19 @@ struct MonteCarloEstimate {
   std::uint64_t views_compared = 0;  ///< column by column
 };
 
-/// Monte-Carlo localisation over the posed views of a memory [M03 section 4].
+/// Localises a robot by a particle filter over the posed views of a memory [M03 section 4].
 ///
-/// A robot with an unknown start is localised within a few images, keeps its position where images
-/// are missing or uninformative, and recovers after it was kidnapped. In places that look alike the
-/// filter keeps several modes. Runs in the calling thread. Same memory, options and calls: same
-/// bits.
+/// A robot with an unknown start is localised within a few images, keeps its position while images
+/// are missing or uninformative, and recovers after being kidnapped. Among places that look alike
+/// the filter keeps several modes. Runs in the calling thread. Deterministic.
 class MonteCarloLocaliser {
  public:
-  /// The result of a rule of particle injection for one image.
+  /// Result of an injection rule for one image.
   struct InjectedParticles {
     std::size_t count = 0;       ///< replaced by new ones
-    std::vector<ViewId> around;  ///< references around which these are drawn; empty: anywhere
+    std::vector<ViewId> around;  ///< references around which they are sampled; empty: anywhere
   };
-  /// A rule of particle injection: from the image's signature and the number of particles.
+  /// Decides which particles to inject, from the image's signature and the number of particles.
   using InjectionRule =
       std::function<InjectedParticles(const PackedSignature& view, std::size_t particles)>;
 
@@ -96,7 +94,7 @@ class MonteCarloLocaliser {
   /// must not change. Throws OptionError; ContractError as `learn_observation_model`.
   explicit MonteCarloLocaliser(const VisualMemory& memory, const MonteCarloOptions& options = {},
                                const OdometryNoise& odometry = {});
-  /// Takes a model learnt before.
+  /// Uses a model learnt before.
   MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking, const ObservationModel& model,
                       const MonteCarloOptions& options = {}, const OdometryNoise& odometry = {});
   ~MonteCarloLocaliser();
@@ -104,28 +102,29 @@ class MonteCarloLocaliser {
   MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept;
   MonteCarloLocaliser& operator=(MonteCarloLocaliser&&) noexcept;
 
-  /// Injects particles by this rule before each image is weighed, besides `options.injection`
-  /// [M03 section 4.1]; empty: by none.
+  /// Sets a rule that injects particles before each image is weighed, in addition to
+  /// `options.injection` [M03 section 4.1]. An empty rule injects none.
   void set_injection_rule(InjectionRule rule);
 
-  /// Starts again anywhere in the memorised area. `heading_rad`: where it is known.
+  /// Restarts anywhere in the memorised area. `heading_rad`: heading of all particles; random if
+  /// nullopt.
   void start_globally(std::optional<double> heading_rad = std::nullopt);
-  /// Starts again around a known pose; standard deviations of each coordinate, >= 0.
+  /// Restarts around a known pose. `deviation_m`: standard deviation of x and of y, >= 0.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
-  /// Moves the particles by `robot_old_from_robot_new` of the odometry and its noise; any number of
-  /// steps may come between two images.
+  /// Moves the particles by a step of the odometry (robot_old_from_robot_new) with its noise. Any
+  /// number of steps may come between two images.
   void move(const Pose2& step);
 
-  /// Weighs the particles by an image. Throws ContractError on a signature of another shape than
-  /// the memory's.
+  /// Weighs the particles by an image and returns the new estimate. Throws ContractError on a
+  /// signature of another shape than the memory's.
   MonteCarloEstimate observe(const PackedSignature& view);
-  /// The present belief, without an image.
+  /// Returns the present estimate, without a new image.
   [[nodiscard]] MonteCarloEstimate estimate() const;
 
-  /// The hypotheses after the last step.
+  /// Returns the particles after the last step.
   [[nodiscard]] const Particles& particles() const noexcept;
-  /// Similarity of this memory's views by their distance.
+  /// Returns the observation model of the memory.
   [[nodiscard]] const ObservationModel& model() const noexcept;
 
  private:

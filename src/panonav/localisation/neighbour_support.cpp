@@ -14,9 +14,9 @@ namespace panonav {
 
 namespace {
 
-/// Neighbours of a reference: those on a grid.
+/// Largest number of neighbours of a reference: those on a grid.
 constexpr std::size_t max_neighbours = 8;
-/// Views that explain a query together: the corners of a grid's square.
+/// Number of views that jointly explain a query: the corners of a grid's square.
 constexpr std::size_t counted_views = 4;
 /// Radius of the neighbourhood in spacings: more than the diagonal of a grid's square.
 constexpr double radius_spacings = 1.5;

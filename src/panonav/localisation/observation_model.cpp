@@ -22,16 +22,16 @@ namespace panonav {
 
 namespace {
 
-/// References around a position that are compared for it: as many as decide a likelihood
+/// Number of references compared around a position: as many as decide a likelihood
 /// (`ViewLikelihood::sites_near`).
 constexpr std::size_t near_sites = 12;
-/// Spacings beyond which views are far from each other: longer than most ranges of similarity.
+/// Distance in spacings beyond which views are unrelated: longer than most ranges of similarity.
 constexpr double far_spacings = 6.0;
-/// References up to which the fall of the similarity is fitted: those within four spacings on a
+/// Number of references to which the fall of similarity is fitted: those within four spacings on a
 /// grid.
 constexpr std::size_t fitted_sites = 48;
 constexpr double fitted_spacings = 4.0;
-/// Spacings within which references are neighbours on a grid, diagonal ones included.
+/// Largest distance of neighbours on a grid in spacings, diagonal ones included.
 constexpr double adjacent_site_spacings = 1.5;
 /// Bounds of the range of similarity in spacings: at shorter ones neighbours have nothing in
 /// common, at longer ones the fitted four spacings show no fall.
@@ -40,11 +40,11 @@ constexpr double max_range_spacings = 20.0;
 /// Largest log-likelihood of a typical view at its own place: a higher one would place no view
 /// better, and one wrong view would outweigh all others.
 constexpr double max_log_likelihood = 50.0;
-/// Smallest width of headings: three steps of the columns, by which a neighbouring view may be off.
+/// Smallest heading width: three columns, the possible error of a neighbouring view.
 constexpr double min_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
-/// Width of headings in median errors: normal errors exceed it once in 23 times.
+/// Heading width in median errors: normal errors exceed it once in 23 times.
 constexpr double median_heading_errors = 3.0;
-/// Larger errors are headings at which the columns fit by chance or by symmetry.
+/// Largest heading error learnt from; larger ones are chance or symmetric fits.
 constexpr double max_heading_error_rad = std::numbers::pi / 4.0;
 
 struct Site {
@@ -101,13 +101,15 @@ class LeftOutView {
   std::vector<std::optional<ColumnMatch>> matches_;
 };
 
-// Negative for views that differ more than views far from each other do on average.
+// Returns the similarity of two views; negative if they differ more than distant views do on
+// average.
 double to_similarity(const ColumnMatch& match, double far) {
   return far * far - match.difference * match.difference;
 }
 
-// Fits the slope of the logarithm of the mean similarity over distance [M04 section 2.2]. The line
-// starts at far^2, the similarity of a view to itself. Bins below a twentieth of that are noise.
+// Fits the range of similarity: the slope of the logarithm of the mean similarity over distance
+// [M04 section 2.2]. The line starts at far^2, the similarity of a view to itself. Bins below a
+// twentieth of that are noise.
 double fit_range(std::span<const std::pair<double, double>> distance_and_similarity,
                  double spacing_m, double far) {
   constexpr auto bins = static_cast<std::size_t>(2.0 * fitted_spacings);
@@ -134,11 +136,11 @@ double fit_range(std::span<const std::pair<double, double>> distance_and_similar
                     max_range_spacings * spacing_m);
 }
 
-/// Squared similarity explained at each candidate place, the view's own one first.
+/// Squared similarity explained at each candidate position; the view's own one first.
 using Explained = std::vector<double>;
 
-// Fits the sharpness that gives the places of the views left out the highest probability among all
-// candidates; the logarithm of that probability is concave in the sharpness.
+// Fits the sharpness that maximises the probability of the true positions of the left-out views
+// among all candidates. Its logarithm is concave in the sharpness.
 double fit_sharpness(std::span<const Explained> views) {
   std::vector<double> own;
   for (const Explained& view : views) own.push_back(view.front());
@@ -169,8 +171,7 @@ double fit_sharpness(std::span<const Explained> views) {
   return 0.5 * (low + high);
 }
 
-/// The posed views of a memory, those that are left out in turn, and the candidate places of each
-/// of these.
+/// The posed views of a memory, the sample that is left out in turn, and the candidate positions.
 class LearningSample {
  public:
   LearningSample(const ColumnRanking& ranking, const LearningOptions& options)
@@ -194,7 +195,7 @@ class LearningSample {
       own_.push_back(number_of(view));
       left_out_.emplace_back(ranking, sites_, own_.back());
     }
-    // All, or as many as keep the limit together with the references around them.
+    // All sites, or as many as keep the limit together with the references around them.
     const int count = static_cast<int>(sites_.size()) <= options.compared_views
                           ? static_cast<int>(sites_.size())
                           : std::max(8, options.compared_views / static_cast<int>(near_sites));
@@ -223,7 +224,7 @@ class LearningSample {
     return far.empty() ? PlaceModel::unrelated_difference : quantile(far, 0.5);
   }
 
-  /// Learns how similarity falls with distance, and how far headings of neighbours are off.
+  /// Learns how similarity falls with distance, and the heading errors of neighbours.
   void learn_decay(ObservationModel& model) {
     std::vector<std::pair<double, double>> curve;
     std::vector<double> heading_errors;
@@ -287,10 +288,10 @@ class LearningSample {
 
   std::vector<Site> sites_;
   double spacing_m_ = 0.0;
-  std::vector<std::uint32_t> own_;                // sites of the views left out
+  std::vector<std::uint32_t> own_;                // sites of the left-out views
   std::vector<LeftOutView> left_out_;             // these views
   std::vector<std::uint32_t> candidates_;         // sites
-  std::vector<std::vector<std::uint32_t>> near_;  // each site and those around it, where needed
+  std::vector<std::vector<std::uint32_t>> near_;  // each site and those around it, filled on demand
 };
 
 }  // namespace

@@ -8,8 +8,8 @@
 
 namespace panonav {
 
-/// Hypotheses of the robot's pose, column by column as kernels need them. Invariant: columns of one
-/// size. In a filter the weights sum to 1.
+/// Weighted pose hypotheses (particles), stored column by column for the kernels. Invariant: all
+/// columns have the same size. In a filter the weights sum to 1.
 struct Particles {
   std::vector<double> x_m,     ///< in the frame of the memory's positions
       y_m,                     ///< in the frame of the memory's positions
@@ -18,11 +18,11 @@ struct Particles {
 
   /// Number of particles.
   [[nodiscard]] std::size_t size() const noexcept { return weight.size(); }
-  /// True if there is none.
+  /// True if there are no particles.
   [[nodiscard]] bool empty() const noexcept { return weight.empty(); }
-  /// Position of particle i < size().
+  /// Returns the position of particle i < size().
   [[nodiscard]] Point2 position(std::size_t i) const { return {x_m[i], y_m[i]}; }
-  /// Pose of particle i < size().
+  /// Returns the pose of particle i < size().
   [[nodiscard]] Pose2 pose(std::size_t i) const { return {x_m[i], y_m[i], heading_rad[i]}; }
   /// Replaces particle i < size().
   void set(std::size_t i, const Pose2& pose, double new_weight) {
@@ -36,7 +36,7 @@ struct Particles {
     resize(size() + 1);
     set(size() - 1, pose, new_weight);
   }
-  /// Keeps the first `count`; additional ones are all zeros.
+  /// Keeps the first `count` particles; added ones are all zeros.
   void resize(std::size_t count) {
     for (auto* column : {&x_m, &y_m, &heading_rad, &weight}) column->resize(count);
   }
@@ -44,10 +44,10 @@ struct Particles {
 
 /// A cluster of particles.
 struct PoseMode {
-  double weight = 0.0;                 ///< sum over its particles
-  Pose2 mean;                          ///< weighted; the heading is the circular mean
+  double weight = 0.0;                 ///< sum over the cluster's particles
+  Pose2 mean;                          ///< weighted mean; circular for the heading
   std::array<double, 9> covariance{};  ///< of x, y (m) and heading (rad), row by row
-  double spread_m = 0.0;               ///< root mean square distance of the particles from the mean
+  double spread_m = 0.0;               ///< root mean square distance from the mean
   double heading_spread_rad = 0.0;     ///< the same of the headings
 };
 

@@ -17,7 +17,7 @@ namespace panonav {
 
 namespace {
 
-// Exchanges left and right: I'(phi) = I(-phi), so psi' = -psi.
+// Mirrors a view left to right: I'(phi) = I(-phi), so psi' = -psi.
 PackedSignature mirror(PackedSignature signature) {
   for (std::uint8_t& phase : signature.phases) phase = static_cast<std::uint8_t>(-phase);
   return signature;
@@ -41,13 +41,14 @@ std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId v
   return nearest;
 }
 
-/// Drawn views with which the mirrored query is compared: their standard deviation errs by 9 %.
+/// Number of sampled views compared with the mirrored query: their standard deviation errs by 9 %.
 constexpr std::size_t chance_views = 64;
-/// Drawn views that replace excluded ones; 80 column profiles take 0.2 MB in all.
+/// Number of further sampled views that replace excluded ones; 80 column profiles take 0.2 MB in
+/// all.
 constexpr std::size_t spare_views = 16;
-/// Views whose local features are compared for chance and for neighbours, 0.1 ms each.
+/// Number of views whose local features are compared for chance and for neighbours, 0.1 ms each.
 constexpr std::size_t feature_views = 12;
-/// Matches of which the best and the tenth best count: the ranking by columns is right to some.
+/// Number of best matches among which the best and the tenth best by the better half are found.
 constexpr std::size_t examined_matches = 16;
 /// Standard deviations of a Gaussian between its mean and its first decile.
 constexpr double decile_deviations = 1.2816;
@@ -64,7 +65,7 @@ double better_half_difference(const ColumnProfiles& query, const ColumnProfiles&
          static_cast<double>(half - columns.begin());
 }
 
-// Returns the tenth smallest difference; of fewer the largest.
+// Returns the tenth smallest difference; the largest of fewer than ten.
 double tenth_smallest(std::vector<double> differences) {
   std::ranges::sort(differences);
   return differences[std::min<std::size_t>(10, differences.size()) - 1];
@@ -153,8 +154,8 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
 }
 
 std::array<double, column_term_count> column_terms(const PlaceEvidence& evidence) noexcept {
-  // The range from which `bench/place_probability` learnt: below the smallest difference rounding
-  // decides, above the large one a view is dissimilar by itself; and sizes of the memories.
+  // Ranges in which `bench/place_probability` learnt: below the smallest difference rounding
+  // dominates, above the large one a view is clearly dissimilar.
   constexpr double min_difference = 0.02;
   constexpr double large_difference = 0.5;
   constexpr int min_views = 8;

@@ -17,29 +17,30 @@ namespace panonav {
 
 namespace {
 
-/// Neighbourhoods in spacings of the memory that learning compares: rings of a grid.
-/// Exponents of the variogram: 1 is exact for signatures that change as a random walk, 2 would be
-/// for signatures that change linearly with the position but has no unique solution.
+/// Candidates for the neighbourhood, in spacings (rings of a grid), and for the variogram's
+/// exponent. 1 is exact for signatures that change as a random walk, 2 for signatures that change
+/// linearly with position, but without a unique solution.
 constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
 constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
 /// Share of the true positions that are within the radius; of the rest, half may be at another
 /// place that looks alike.
 constexpr double coverage = 0.95;
 constexpr double max_wrong_share = 0.5 * (1.0 - coverage);
-/// Matches searched for a view left out: its doubles at up to 48 places can be removed.
+/// Number of matches searched for a left-out view, so that its lookalikes at up to 48 places can be
+/// removed.
 constexpr int searched_matches = 4 * PositionModel::candidates;
-/// Spacings within which a view's nearest match shows the view's own place: a grid's neighbours.
+/// Largest distance of a right best match in spacings: a grid's neighbours.
 constexpr double own_place_spacings = 2.0;
-/// Smallest unit of squared differences, for memories of equal views.
+/// Smallest unit of squared differences, for memories of identical views.
 constexpr double min_difference_unit = 1e-4;
 
-/// Views that were left out of the memory in turn, and the views that resemble them there.
+/// Views left out of the memory in turn, and the views that resemble them.
 struct LeftOutViews {
   std::vector<Point2> truths;
   /// Matches of the search, duplicates of the place included: the interpolation is learnt from
   /// them, and they matter most if there are few views.
   std::vector<ResemblingViews> found;
-  /// The views of an answer: the radius is learnt from them.
+  /// The views found without lookalikes, as for a query; the radius is learnt from them.
   std::vector<ResemblingViews> answered;
 
   [[nodiscard]] std::size_t size() const { return truths.size(); }
@@ -112,9 +113,9 @@ double learn_difference_unit(const LeftOutViews& left_out) {
   return std::max(min_difference_unit, quantile(differences, 0.5));
 }
 
-// Chooses the neighbourhood and the exponent that place the views best. False where no view is
-// found near its place. Views whose nearest match only looks alike do not count: they would favour
-// a wide neighbourhood, as the middle of many wrong places is wrong by less.
+// Chooses the neighbourhood and the exponent with the smallest position errors. Returns false if no
+// view is found near its place. Views whose best match only looks alike are ignored: they would
+// favour a wide neighbourhood, as averaging many wrong places lowers their error.
 bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
   double best_sum_m = std::numeric_limits<double>::infinity();
   for (const double spacings : neighbourhoods) {
@@ -154,8 +155,8 @@ InterpolationErrors interpolate_all(const LeftOutViews& left_out, const Position
   return result;
 }
 
-// Learns from which ratio on the answer may be the wrong one of two places: the largest share of
-// views, from the clearest on, of which hardly any was found elsewhere, is not ambiguous.
+// Learns the ratio from which on the position may be that of a lookalike. Sorted by ratio, the
+// longest prefix of views of which hardly any was found elsewhere counts as clear.
 void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> errors_m,
                      PositionModel& model) {
   std::vector<std::pair<double, std::size_t>> by_ratio;
@@ -179,8 +180,8 @@ void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> error
   model.ambiguous_radius_m = quantile(ambiguous_errors_m, coverage);
 }
 
-// Learns how large a radius holds the errors of views found near their place, separately for those
-// that references surround. False where there is none to learn from.
+// Learns the radii that hold the errors of views found near their place, separately for views that
+// references surround. Returns false if there is no such view.
 bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors,
                  PositionModel& model) {
   std::vector<double> all;
@@ -196,8 +197,8 @@ bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors
   // If none is near, every answer is ambiguous.
   if (all.empty() && model.ambiguous_from) all.push_back(0.0);
   if (all.empty()) return false;
-  // Returns the quantile of a sample of n that a further draw stays below with at least this
-  // probability; that of all where there are few of a kind.
+  // Returns the quantile of a sample below which a further draw stays with at least this
+  // probability; uses all errors if there are few of a kind.
   const auto bound = [&](const std::vector<double>& kind) {
     const auto& of = kind.size() < PositionModel::min_views ? all : kind;
     const double n = static_cast<double>(of.size());

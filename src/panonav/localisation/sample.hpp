@@ -9,11 +9,11 @@
 
 namespace panonav {
 
-/// Number of views that a model is learnt from.
+/// Options of learning a model from views.
 struct LearningOptions {
-  int sampled_views = 100;    ///< left out in turn; all of smaller memories
-  int compared_views = 1000;  ///< with which each is compared; all of smaller memories
-  int seed = 1;               ///< of the draws
+  int sampled_views = 100;    ///< views left out in turn; all of a smaller memory
+  int compared_views = 1000;  ///< views with which each is compared; all of a smaller memory
+  int seed = 1;               ///< seed of the sampling
 };
 void visit_options(LearningOptions& options, OptionVisitor& visitor);
 
