@@ -350,7 +350,7 @@ class Loop {
     return true;
   }
 
-  // True if the node relocalises after the robot was carried away.
+  // True if the node relocalises after the robot was kidnapped.
   bool kidnap(int number, Random& random) {
     const Taught& place = taught_[random.index(taught_.size())];
     judge_.carry(place.truth * Pose2{0.0, 0.0, random.uniform(-3.0, 3.0)});

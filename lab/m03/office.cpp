@@ -105,7 +105,7 @@ FilterSetting large_error_setting(InjectionMethod injection) {
   setting.odometry.translation_from_translation = 0.05;
   setting.odometry.translation_scale_error = 0.2;
   setting.odometry.rotation_from_translation = radians(10.0);
-  // The filter has no model of a wrong scale: it is told of as much random error instead.
+  // The filter has no model of a wrong scale: it assumes as much random error instead.
   setting.assumed_odometry.translation_from_translation = 0.25;
   setting.assumed_odometry.rotation_from_translation = radians(10.0);
   return setting;

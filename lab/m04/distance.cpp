@@ -145,7 +145,7 @@ class DistanceCurve final : public Experiment {
                            .style = viewer::SeriesStyle::lines_and_points};
     std::size_t shared = curves_.front().size();
     for (const Curve& curve : curves_) shared = std::min(shared, curve.size());
-    // Every point up to 30 cm, then one each 10 cm, so that error bars can be told apart.
+    // Every point up to 30 cm, then one each 10 cm, so that error bars can be distinguished.
     for (std::size_t bin = 0; bin < shared; bin += bin_distance_m(bin) < 0.299 ? 1 : 5) {
       std::vector<double> here;
       for (const Curve& curve : curves_) here.push_back(curve[bin]);

@@ -36,7 +36,7 @@ constexpr double moved_objects_share = 0.1;
 constexpr double drive_spacing_m = 0.25;
 constexpr double drive_m = 60.0;
 // Largest distance of a start from a drive, as where a robot is set down by hand.
-constexpr double beside_drive_m = 0.3;
+constexpr double max_start_offset_m = 0.3;
 
 // Measures of missions of one kind.
 struct Measures {
@@ -204,7 +204,7 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
                          std::uint64_t stream, Measures& measures) {
       const auto missions = simulation::sample_missions(where, remembered,
                                                         {.count = count_runs(options, i),
-                                                         .max_distance_m = beside_drive_m,
+                                                         .max_distance_m = max_start_offset_m,
                                                          .kidnapped = is_kidnapped},
                                                         Random(seed, stream).next());
       const auto runs = simulation::run_missions(where, remembered, missions, mission,
@@ -266,7 +266,7 @@ void NavigationExperiments::reproduce_tours() const {
     const MemoryViewSource source(remembered.memory);
     const int tours = (count_runs(options, i) + goals_a_tour - 1) / goals_a_tour;
     const auto missions = simulation::sample_missions(
-        place, remembered, {.count = tours * goals_a_tour, .max_distance_m = beside_drive_m},
+        place, remembered, {.count = tours * goals_a_tour, .max_distance_m = max_start_offset_m},
         Random(seed, 12).next());
     for (Kind& kind : kinds) {
       auto runs =
@@ -313,7 +313,7 @@ void NavigationExperiments::reproduce_route_missions() const {
     simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, drive, simulation::make_noisy_wheels(), Random(seed, 1).next(), executor);
     const auto missions = simulation::sample_missions(
-        place, remembered, {.count = count_runs(options, i), .max_distance_m = beside_drive_m},
+        place, remembered, {.count = count_runs(options, i), .max_distance_m = max_start_offset_m},
         Random(seed, 13).next());
     for (Kind& kind : kinds) {
       const auto runs = simulation::run_missions(place, remembered, missions, {},

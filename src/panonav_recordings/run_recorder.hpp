@@ -44,7 +44,7 @@ struct RunRegion {
 /// A reference that was compared with the current view.
 struct RunComparison {
   std::size_t reference = 0;        ///< index into `RunMoment::references`
-  std::uint32_t dissimilarity = 0;  ///< as `Match`: the less, the more alike
+  std::uint32_t dissimilarity = 0;  ///< as `Match`: less means more similar
 };
 
 /// Direction and confidence of a home vector.

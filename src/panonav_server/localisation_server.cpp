@@ -35,7 +35,7 @@ using nlohmann::ordered_json;
 constexpr std::size_t max_picture_bytes = std::size_t{16} << 20U;
 constexpr std::size_t max_in_flight_bytes = std::size_t{64} << 20U;
 constexpr std::size_t max_waiting_bytes = std::size_t{128} << 20U;
-/// Deadline of an answer, after which its client is told to try again: longer than the silence of a
+/// Deadline of an answer, after which its client is asked to retry: longer than the silence of a
 /// memory's server and the time of a full queue.
 constexpr std::chrono::seconds request_deadline(30);
 constexpr std::chrono::seconds time_for_last_answers(5);

@@ -87,7 +87,7 @@ MissionPlace make_mission_place(const std::string& scene, SimulatedWorldOptions 
     if (!header.elevations) {
       throw FileError(robot.memory().path().string(),
                       "does not say which elevations its views show, so no camera of a simulated "
-                      "robot sees alike; make it from a data set with elevation_deg");
+                      "robot fits them; make it from a data set with elevation_deg");
     }
     const PanoramaShape shape =
         header.picture_shape.value_or(PanoramaShape{header.shape.rows, header.panorama_columns});

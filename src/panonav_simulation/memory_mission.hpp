@@ -14,8 +14,8 @@ namespace panonav::simulation {
 /// Makes the world a place for missions: a robot of the chosen size and sensor in it.
 [[nodiscard]] MissionPlace make_mission_place(const SimulatedWorld& world);
 
-/// Makes the data that a simulated run needs from the robot's memory: its graph, and the true poses
-/// of its views. No signature is held.
+/// Makes the data that a simulated run needs from the robot's memory: its graph, and the true
+/// poses of its views. No signature is held.
 [[nodiscard]] RememberedPlace make_remembered_place(const RobotNavigator& robot);
 
 /// Called with each image that a simulated robot takes, and with its panorama.

@@ -77,7 +77,7 @@ struct RememberedPlace {
                                              const OdometryNoise& wheels, std::uint64_t seed,
                                              Executor& executor);
 
-/// The robot of a mission: drives as it is told, with the errors of its drive, and stops where
+/// The robot of a mission: executes its commands with the errors of its drive, and stops where
 /// something or somebody stands in its way. It feels what is near. Holds the true pose, and the
 /// people around, for whom time passes as it drives.
 class MissionRobot final : public RobotBase {

@@ -56,7 +56,7 @@ struct RecordedPose {
 /// Plans the poses of a recording, all of them free. `way_points` replace the scene's tour.
 /// Straight lines that are not free are replaced by the shortest free paths. The same seed gives
 /// the same poses. Throws OptionError; ContractError when no place is free at this spacing, a way
-/// point is not free, or a tour is asked for where there is none.
+/// point is not free, or a tour is requested where there is none.
 [[nodiscard]] std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
                                                        const RecordingOptions& options,
                                                        const OdometryNoise& odometry,

@@ -88,8 +88,8 @@ struct Scene {
 };
 
 /// Throws ContractError that names the mesh and its fault: an index out of range, a number of
-/// texture coordinates that is not the number of vertices, a coordinate that is not finite or out
-/// of reach.
+/// texture coordinates that is not the number of vertices, a coordinate that is not finite or
+/// out of reach.
 void validate(const Scene& scene);
 using panonav::validate;  // for options
 

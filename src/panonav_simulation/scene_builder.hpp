@@ -18,8 +18,8 @@ struct Footing {
   double turn_rad = 0.0;  ///< counter-clockwise seen from above
 };
 
-/// Colours of the furniture of a scene. Rooms are furnished from few suppliers: pieces of a
-/// kind look alike, so that a view has large dark and bright parts and not only small ones.
+/// Colours of the furniture of a scene. Rooms are furnished from few suppliers: pieces of a kind
+/// look similar, so that a view has large dark and bright parts and not only small ones.
 struct Palette {
   Colour wood;   ///< of desks and shelves
   Colour paint;  ///< of drawers and cabinets

@@ -32,7 +32,7 @@ class TextureStore {
   /// Finds the picture that a mesh or material file calls `written` (any slashes, absolute paths of
   /// foreign machines, `file://`). Looked for as written beside `directory`, then by its base name
   /// in the usual texture folders around `directory`, then with another ending (.png, .jpg, .jpeg)
-  /// for the same base name; upper and lower case alike. A name that is not as written is a
+  /// for the same base name; the case of letters is ignored. A name that is not as written is a
   /// warning. Null if there is none.
   [[nodiscard]] std::shared_ptr<const Image> find(std::string_view written,
                                                   const std::filesystem::path& directory);

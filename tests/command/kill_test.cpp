@@ -56,7 +56,7 @@ std::string content_of(const fs::path& memory) {
   return text;
 }
 
-/// Names of views and lines of routes: what whoever looks at the memory now is told that it holds.
+/// Names of views and lines of routes: what commands report as the memory's content.
 std::set<std::string> acknowledged_in(const fs::path& memory) {
   std::set<std::string> held;
   if (!fs::exists(memory)) return held;
@@ -287,7 +287,7 @@ TEST_F(Kill, LocaliseAdd) {
   kill_at_random({"localise"}, {run(), "--add"}, {}, false, false);
 }
 
-// Both are told that it is there, or one is done: neither replaces the other's memory.
+// Both are refused because it exists, or one succeeds: neither replaces the other's memory.
 TEST_F(Kill, TwoMergesAtOnce) {
   const std::vector<std::string> arguments = {"merge", mapped(), make_second(), "-o",
                                               folder_ / "m.panonav"};

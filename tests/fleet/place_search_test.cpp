@@ -45,7 +45,7 @@ class PlaceSearchTest : public MemoryFileTest {
                 held.search(signature, options, mask).matches);
     }
   }
-  /// Changes are told a moment later.
+  /// Changes are reported a moment later.
   static void refresh(PlaceSearch& search, std::size_t views) {
     for (int i = 0; i < 500; ++i) {
       search.refresh();

@@ -23,7 +23,7 @@ struct Ended {
   int steps = 0;
 };
 
-// A robot that does exactly what it is told.
+// A robot that executes each command exactly.
 Ended run(const ToyWorld& world, HomingPursuit pursuit, Pose2 pose) {
   for (;;) {
     const HomingPursuit::Decision decision = pursuit.decide(seen_from(world, pose));

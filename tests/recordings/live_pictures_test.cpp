@@ -26,7 +26,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// In the form of a JPEG picture, as far as its end can be told: segments, one of which holds
+/// In the form of a JPEG picture, so that its end can be found: segments, one of which holds
 /// another picture as cameras keep thumbnails, then data with stuffed bytes and restart markers.
 Bytes picture_like(Random& random) {
   Bytes bytes{0xff, 0xd8, 0xff, 0xe1};

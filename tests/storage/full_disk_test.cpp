@@ -32,8 +32,8 @@ class FullDisk : public MemoryFileTest {
  protected:
   static constexpr int cannot_mount = 97;
 
-  /// Copies the memory, with its log if there is one, to a full disk, and returns what `body` says
-  /// of the copy there, in a process of its own.
+  /// Copies the memory, with its log if there is one, to a full disk, and returns what `body`
+  /// says of the copy there, in a process of its own.
   [[nodiscard]] int run_on_full_disk(const std::function<int(const fs::path& copy)>& body) const {
     return exit_code_of(start_child([&] {
       const fs::path disk = folder / "disk";

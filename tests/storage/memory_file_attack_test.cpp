@@ -322,8 +322,8 @@ TEST_F(MemoryFileAttack, TablesWithoutEndAreFoundInTime) {
   }
 }
 
-// SQLite reads what it is told to invert and apply without looking: 15 of 250 of these led it out
-// of its buffers.
+// SQLite reads changesets to invert and apply without bounds checks: 15 of 250 of these led it
+// out of its buffers.
 TEST_F(MemoryFileAttack, MutatedChangesAreUndoneOrNamedInTime) {
   {
     MemoryFile file = MemoryFile::open(path, Access::read_write);

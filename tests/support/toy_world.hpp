@@ -349,7 +349,7 @@ inline ToyWorld striped_round_room(double radius_m, std::uint64_t seed) {
 }
 
 /// A round room around (0, 0) whose wall carries another pattern in each row of a picture, all
-/// frequencies alike, so that places are told apart as in a furnished room.
+/// frequencies with the same amplitude, so that places are distinguished as in a furnished room.
 inline ToyWorld round_room(double radius_m, std::uint64_t seed) {
   constexpr int rows = 12;
   constexpr int waves = 12;

@@ -134,13 +134,13 @@ def look(browser, url, shots):
     assert browser.ask("document.querySelector('pn-map').zoom") > before
     browser.key("0", "Digit0")
     browser.settle()
-    # Somebody who is carried away leaves no line; who stands, or goes at one speed, leaves a whole one.
+    # The line is interrupted where the robot was kidnapped; it is whole for one that stands or keeps its speed.
     line = lambda places: browser.ask(f"import('panonav/store').then(({{ steady }}) => steady({places}.map((x, t) => "
                                       "({ t, truth: [x, 0] })), 'truth').map(at => at ? at[0] : 'apart'))")
     assert line([0, 0.1, 0.2, 0.3, 3.3, 3.4, 3.5]) == [0, 0.1, 0.2, 0.3, "apart", 3.3, 3.4, 3.5]
     assert line([1, 1, 1, 2, 3, 4]) == [1, 1, 1, 2, 3, 4]
     assert line([5]) == [5] and line([5, 5, 5]) == [5, 5, 5]
-    # Uses keys alone: to the view nearest to the robot, to the next one, into its card, and the robot is told to be there.
+    # Uses keys alone: to the view nearest to the robot, to the next one, into its card, and the robot's pose is set to this view.
     browser.ask("document.querySelector('pn-map').focus()")
     browser.key("ArrowUp")
     near = text_of(browser, "pn-card h2")

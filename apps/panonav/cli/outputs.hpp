@@ -13,9 +13,9 @@ struct NamedValue {
 };
 
 /// Throws UsageError if an output would replace a file that another value names: the same file
-/// (device and inode, also through links), a file in a named folder, one that a TOML file names, or
-/// a log of a memory file. Also throws if two outputs are the same file. Cost: a look at each file
-/// of the folders, only if an output exists already.
+/// (device and inode, also through links), a file in a named folder, one that a TOML file names,
+/// or a log of a memory file. Also throws if two outputs are the same file. Cost: a look at each
+/// file of the folders, only if an output exists already.
 void require_separate_outputs(std::span<const NamedValue> values);
 
 }  // namespace panonav::command

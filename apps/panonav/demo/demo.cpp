@@ -312,7 +312,7 @@ void print(const DemoResults& done, Session& session) {
       "  places in the office recognised: " + format_percent(done.own.known) +
       "; images of another room wrongly recognised: " + format_percent(done.foreign.known));
   session.print("  tracking: localised " + format_delay(done.track.until_localised) +
-                "; after the robot was carried away, localised again " +
+                "; after the robot was kidnapped, localised again " +
                 format_delay(done.track.until_found_again) + "; median error " +
                 format_median(done.track.errors_m, 100.0, 1, "cm") + "; " +
                 of(done.track.wrong, done.track.localised) + " answers wrong");
@@ -336,8 +336,7 @@ void print(const DemoResults& done, Session& session) {
       "  navigation: " + of(navigation.arrived, navigation.runs.size()) +
       " missions arrived; median ratio of driven path to shortest path " +
       (navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2)) +
-      "; mission with a robot that was carried away: " +
-      std::string(name_of(navigation.kidnapped.end)) +
+      "; mission with a kidnapped robot: " + std::string(name_of(navigation.kidnapped.end)) +
       "; mission with a new obstacle on the path: " +
       (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
 }

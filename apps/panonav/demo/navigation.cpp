@@ -263,19 +263,19 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
       "a direction towards the goal. The robot takes an image, finds the most similar stored view, "
       "and drives one step in the direction of this view. It repeats this until it is near the "
       "goal. Then it drives to the goal with the method of part 6.");
-  page.add_text("The robots started at " + count + " random places and were sent to " + count +
-                " random stored views. In one additional mission the robot was carried away on its "
-                "path. In another one a new obstacle, a screen, stood across the path. A mission "
-                "is successful if the robot reports its arrival and is not farther from the goal "
-                "than half the spacing of the views, " +
-                within + ".");
+  page.add_text(
+      "The robots started at " + count + " random places and were sent to " + count +
+      " random stored views. In one additional mission the robot was moved by hand "
+      "(kidnapped) on its path. In another one a new obstacle, a screen, stood across the "
+      "path. A mission is successful if the robot reports its arrival and is not farther "
+      "from the goal than half the spacing of the views, " +
+      within + ".");
   page.add_figures(
       {{arrived, "missions ended within " + within + " of the goal and reported their arrival"},
        {navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2),
         "median ratio of the driven path to the shortest path"},
        {format_fixed(median(navigation.steps), 0), "median number of steps per mission"},
-       {describe_end(navigation.kidnapped, navigation.within_m),
-        "result of the robot that was carried away"},
+       {describe_end(navigation.kidnapped, navigation.within_m), "result of the kidnapped robot"},
        {navigation.screened ? describe_end(*navigation.screened, navigation.within_m) : "none",
         navigation.screened ? "result of the robot with a screen across its path"
                             : "no test with a screen: it would block every path"}});
@@ -288,7 +288,7 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
       {std::move(shown.all),
        "All missions at once. The path of a mission that did not reach its goal is orange."},
       {std::move(shown.kidnapped),
-       "This robot was carried away in the middle of its path to the purple square. " +
+       "This robot was kidnapped in the middle of its path to the purple square. " +
            describe_run(navigation.kidnapped, navigation.within_m)}};
   if (shown.screened) {
     maps.push_back({std::move(*shown.screened),

@@ -18,7 +18,7 @@ void add_story(DemoStory story, viewer::ReportPage& page) {
         .meaning = "median error from one image. Orange: possible positions, for an increasing "
                    "number of Fourier components. Cross: true position.",
         .part = 2},
-       {.title = "Tracking after the robot was carried away",
+       {.title = "Tracking after the robot was moved by hand",
         .shown = viewer::ReportPlot{std::move(story.gathering), ""},
         .value = std::move(story.found_again),
         .meaning =

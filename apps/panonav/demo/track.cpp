@@ -48,7 +48,7 @@ DemoTrack summarise_outcome(const std::vector<TrackedImage>& images, std::size_t
 /// Describes the state at an image.
 std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, double within_m) {
   const std::string number = "image " + std::to_string(image.index + 1) + ": ";
-  if (image.index == kidnapped_after + 1) return number + "the robot was carried away";
+  if (image.index == kidnapped_after + 1) return number + "the robot was moved by hand";
   switch (image.estimate.state) {
     case LocalisationState::localised:
       return number + (is_correct(image, within_m) ? "localised" : "wrong, not yet noticed");
@@ -98,23 +98,23 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
       "each image only the particles that match it remain. They first concentrate in a few places. "
       "After more images with small differences, they concentrate in one place.");
   page.add_text("After " + std::to_string(kidnapped_after + 1) +
-                " images somebody carries the robot to the other crossing. The robot counts as "
-                "correctly localised if it reports a position with an error of at most " +
+                " images the robot is moved by hand to the other crossing (kidnapped). The robot "
+                "counts as correctly localised if it reports a position with an error of at most " +
                 format_fixed(100.0 * spacing_m, 0) + " cm.");
   page.add_figures(
       {{std::to_string(track.places_at_first), "possible places after the first image"},
        {format_image_count(track.until_localised), "until the robot was localised"},
        {format_image_count(track.until_found_again),
-        "until the robot was localised again after it was carried away"},
+        "until the robot was localised again after it was kidnapped"},
        {median_text, "median error of the reported positions"},
        {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
-        "reported positions were wrong; the robot needs some images to notice that it was carried "
-        "away"}});
+        "reported positions were wrong; the robot needs some images to notice that it was "
+        "kidnapped"}});
   page.add_run(played);
   page.add_plots({{whole,
                    "The whole run. Black: the true path, which starts again at the place to which "
-                   "the robot was carried. Blue: the estimated path. Both agree except for the "
-                   "images after the robot was carried away."}});
+                   "the robot was moved. Blue: the estimated path. Both agree except for the "
+                   "images after the robot was kidnapped."}});
 }
 
 }  // namespace
@@ -135,7 +135,7 @@ DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings&
   const std::vector<Point2> at_first = positions_of(
       recordings::resample_systematically(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
-  viewer::RunPage played("A robot that is carried away", run.entries.size());
+  viewer::RunPage played("A kidnapped robot", run.entries.size());
   const ShownReferences shown(memory);
   track(tracker, run, {.particles_kept = particles_kept, .recorded = &file, .shown = &shown},
         session.executor(), [&](TrackedImage&& image) {

@@ -15,7 +15,7 @@ namespace panonav::command {
 /// An image and the memory's answer to it.
 struct LocalisedQuery {
   std::string file;
-  double turned_rad = 0.0;  ///< before it was asked about
+  double turned_rad = 0.0;  ///< rotation of the image before localisation
   Place place;
   std::optional<ReferencePose> pose;  ///< as the data set gives it
   std::string error;                  ///< why it could not be read; empty: it could

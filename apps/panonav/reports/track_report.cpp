@@ -155,7 +155,7 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
   page.add_text(
       "The tracker uses more particles while many positions are possible, and fewer when the "
       "particles are close together. It also adds new particles at random positions, so that it "
-      "finds a robot that was carried away.");
+      "finds a kidnapped robot.");
   page.add_plots(
       {{draw_particles(images), "Number of particles after each image, on a logarithmic scale"}});
   page.write(folder, "index.html", "panonav track");

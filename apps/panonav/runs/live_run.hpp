@@ -49,9 +49,9 @@ struct LiveCounts {
 /// `moments_left_out`: of a record.
 [[nodiscard]] std::string describe_events(const LiveCounts& counts, std::size_t moments_left_out);
 
-/// Processes observations until the source ends, the program is asked to end (SIGINT, SIGTERM), or
-/// the requested number is reached. Printing never delays a live source: a slow reader loses the
-/// oldest lines.
+/// Processes observations until the source ends, the program is to end (SIGINT, SIGTERM), or the
+/// requested number is reached. Printing never delays a live source: a slow reader loses the oldest
+/// lines.
 class LiveRun {
  public:
   /// All must outlive *this. `part`: which pictures of a live source are taken; of others that is

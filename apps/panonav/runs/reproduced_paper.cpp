@@ -46,7 +46,7 @@ std::string introduce_m04(const lab::ReproductionOptions& options) {
 
 std::string introduce_navigation(const lab::ReproductionOptions& options) {
   return "Topics that Menegatti, Maeda, Ishiguro 2004, section 3.5, name as future work: maps of "
-         "drives, changed scenes, a robot that is carried away, blocked paths. " +
+         "drives, changed scenes, a kidnapped robot, blocked paths. " +
          std::to_string(options.runs) +
          " missions from random starts to random goals in each kind of place, " +
          std::to_string(options.scenes) +

@@ -27,7 +27,7 @@ struct TrackedImage {
   std::optional<double> stamp_s;
   std::optional<ReferencePose> truth;
   MonteCarloEstimate estimate;
-  std::vector<Pose2> particles;  ///< an even sample of them, as many as were asked for
+  std::vector<Pose2> particles;  ///< an even sample of them, of the requested size
   std::optional<recordings::RunMoment>
       moment;  ///< what a record holds of it; nullopt: nothing is recorded
 };

@@ -87,8 +87,8 @@ struct CalibrateArguments {
   LensesOptions lenses;
 };
 
-/// The pictures of one input; how they lie is what is asked for. Of a long recording some, evenly
-/// spread: as many as tell the mirror's circle well.
+/// The pictures of one input; their layout is determined. Of a long recording some, evenly
+/// spread: as many as needed to find the mirror's circle.
 std::vector<DatasetEntry> choose_entries(const std::string& input,
                                          const CalibrateArguments& arguments, Session& session) {
   if (is_one_picture(input)) {

@@ -195,7 +195,7 @@ void print_summary(const simulation::MissionRun& run, Session& session) {
   session.print("certain of its position (probability 0.5 or more) in " + std::to_string(sure) +
                 " of " + std::to_string(run.decisions.size()) + " steps");
   if (run.kidnapped_at) {
-    session.print("carried away after step " + std::to_string(*run.kidnapped_at + 1));
+    session.print("kidnapped after step " + std::to_string(*run.kidnapped_at + 1));
   }
 }
 
@@ -247,7 +247,8 @@ void print_graph(const RobotNavigator& robot, Session& session) {
                      : "the memory's " + std::string(name_of(robot.origin()))));
 }
 
-/// A robot is carried away half of its way to the goal, so that the way must be known.
+/// Refuses goals without a known position: the robot is kidnapped in the middle of its path, so
+/// the path must be known.
 void require_known_goal(const NavigateArguments& arguments, const RobotNavigator& robot,
                         const simulation::RememberedPlace& remembered) {
   if (!std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {

@@ -113,7 +113,7 @@ Run declare_serve(Arguments& arguments) {
   arguments.option("--token-file FILE", values->token_file,
                    "Only answer clients that send the first line of this file as bearer token");
   arguments.option("--max-waiting", values->max_waiting, 1,
-                   "Largest number of waiting images; further clients are told to try again");
+                   "Largest number of waiting images; further clients are asked to retry");
   arguments.option(
       "--max-held-views", values->max_held_views, 0,
       "Largest number of views of a memory on a server that is loaded completely; larger memories "

@@ -417,8 +417,8 @@ Verb track_verb() {
   return {"track", "Track the position of a moving robot from images and odometry",
           "The verb uses Monte-Carlo localisation. The start may be unknown. If several places are "
           "similar, all of them are tracked until an image shows the correct one. A robot that was "
-          "carried away is localised again. For a live source, tracking continues until Ctrl-C. "
-          "The exit code is 1 if the robot was never localised.",
+          "moved without odometry (kidnapped) is localised again. For a live source, tracking "
+          "continues until Ctrl-C. The exit code is 1 if the robot was never localised.",
           "  panonav track office.panonav run\n"
           "  panonav track office.panonav run --every 10 --report report\n"
           "  panonav track office.panonav run --tum estimate.tum --json\n"

@@ -20,12 +20,12 @@ struct ImageLimits {
   std::int64_t scanned_px = std::int64_t{16} * 134217728;
 };
 
-/// Reads a PNG or JPEG file, told apart by content, and turns it upright as its EXIF orientation
-/// says. Grey pictures of any bit depth give one channel of 8 bit, colour and palette pictures
-/// three; 16-bit values are scaled, an alpha channel is dropped (the stored colours are what the
-/// camera saw), gamma chunks and colour profiles are ignored. Throws FileError on a file that is
-/// missing, of another format, damaged, cut short or beyond the limits; never crashes, whatever the
-/// bytes.
+/// Reads a PNG or JPEG file, identified by its first bytes, and turns it upright as its EXIF
+/// orientation says. Grey pictures of any bit depth give one channel of 8 bit, colour and palette
+/// pictures three; 16-bit values are scaled, an alpha channel is dropped (the stored colours are
+/// what the camera saw), gamma chunks and colour profiles are ignored. Throws FileError on a file
+/// that is missing, of another format, damaged, cut short or beyond the limits; never crashes,
+/// whatever the bytes.
 [[nodiscard]] Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
 
 /// A format of picture files.

@@ -19,8 +19,8 @@ struct RankedMatch {
 
   /// Returns the re-ranking score; the lowest is the best. It is the difference of the columns
   /// times the dissimilarity to the power of 1/8. The dissimilarity adds brightness, which the
-  /// columns ignore. An occlusion raises the dissimilarity to all references alike, so it hardly
-  /// changes the order.
+  /// columns ignore. An occlusion raises the dissimilarity to all references by similar amounts, so
+  /// it hardly changes the order.
   [[nodiscard]] double score() const { return score_with(columns.difference); }
   /// Returns the score for another difference of the columns than the stored one.
   [[nodiscard]] double score_with(double difference) const;

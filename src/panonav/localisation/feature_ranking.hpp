@@ -25,10 +25,10 @@ using QueryFeatures = std::function<std::optional<LocalFeatures>(Handedness)>;
 /// m apart, few enough that a query takes less than 5 ms.
 inline constexpr int verified_candidates = 24;
 
-/// Sorts the first `verified_candidates` matches by the number of features that they share with the
-/// query (`match_features`), highest first; equal ones keep their order. Sets the verified features
-/// of each, and its rotation if it has any. This is the last stage of re-ranking. Cost: 0.1 ms a
-/// match.
+/// Sorts the first `verified_candidates` matches by the number of features that they share with
+/// the query (`match_features`), highest first; equal ones keep their order. Sets the verified
+/// features of each, and its rotation if it has any. This is the last stage of re-ranking. Cost:
+/// 0.1 ms a match.
 void rank_by_verified_features(const LocalFeatures& query, const FeatureSource& features,
                                std::vector<RankedMatch>& ranked);
 

@@ -200,7 +200,7 @@ class Localiser::Query {
     if (ranked_.empty()) return std::move(place_);
     load_compared_views();
     weigh_columns();                    // evidence of whether the place is known
-    rank_by_support();                  // places that look alike
+    rank_by_support();                  // places that look similar
     rank_by_features();                 // memories with far references
     weigh_features();                   // evidence where columns are inconclusive
     list_matches();                     // headings by the visual compass

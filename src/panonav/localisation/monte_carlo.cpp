@@ -21,7 +21,7 @@ namespace panonav {
 namespace {
 
 /// Number of heading sectors in which particles are clustered: 15 degrees, between the compass's
-/// error of some 5 degrees and the quarter turn after which rooms look alike.
+/// error of some 5 degrees and the quarter turn after which rooms look similar.
 constexpr int heading_bins = 24;
 
 // Limits of the work per image; lower while the robot is localised.

@@ -77,7 +77,7 @@ struct MonteCarloEstimate {
 /// Localises a robot by a particle filter over the posed views of a memory [M03 section 4].
 ///
 /// A robot with an unknown start is localised within a few images, keeps its position while images
-/// are missing or uninformative, and recovers after being kidnapped. Among places that look alike
+/// are missing or uninformative, and recovers after being kidnapped. Among places that look similar
 /// the filter keeps several modes. Runs in the calling thread. Deterministic.
 class MonteCarloLocaliser {
  public:

@@ -9,10 +9,10 @@
 
 namespace panonav {
 
-/// Decides between places that look alike. A view taken between references is explained by several
-/// of them together: what one shows from too far left, another shows from too far right. At a place
-/// that only looks alike, no neighbour explains what the best match does not. Only references with
-/// headings count.
+/// Decides between places that look similar. A view taken between references is explained by
+/// several of them together: what one shows from too far left, another shows from too far right. At
+/// a place that only looks similar, no neighbour explains what the best match does not. Only
+/// references with headings count.
 class NeighbourSupport {
  public:
   /// Indexes the references; neighbours are the 8 nearest ones within 1.5 spacings. `spacing_m`:

@@ -19,7 +19,7 @@ struct PlaceEvidence {
     /// views of the memory.
     int chance = 0;
     /// Largest number that the best match shares with another match: typical of neighbouring views
-    /// in this memory. Places that are only built alike share fewer.
+    /// in this memory. Places that are only built in the same way share fewer.
     int neighbour = 0;
     int seen = 0;  ///< features of the query
   };

@@ -103,11 +103,11 @@ class PlaceCriterion {
   [[nodiscard]] PlaceEvidence evidence(const PackedSignature& query,
                                        std::span<const RankedMatch> matches,
                                        const SearchMask& mask = {}) const;
-  /// Collects evidence by local features: compares the query with the first `verified_candidates`
-  /// of `matches`, best first, unless their `verified_features` are known. Chance comes from the
-  /// first 12 sampled views with features that are not excluded. The best match is compared with
-  /// the first 12 others. nullopt if the query, the first match or all sampled views have no
-  /// features. Cost: 0.1 ms for each compared view.
+  /// Collects evidence by local features: compares the query with the first
+  /// `verified_candidates` of `matches`, best first, unless their `verified_features` are known.
+  /// Chance comes from the first 12 sampled views with features that are not excluded. The best
+  /// match is compared with the first 12 others. nullopt if the query, the first match or all
+  /// sampled views have no features. Cost: 0.1 ms for each compared view.
   [[nodiscard]] std::optional<PlaceEvidence::Features> feature_evidence(
       const LocalFeatures& query, const LocalFeatures& mirrored_query,
       const FeatureSource& features, std::span<const RankedMatch> matches,

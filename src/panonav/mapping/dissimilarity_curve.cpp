@@ -74,7 +74,7 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityCurve::Sampl
                                               : a.distance < b.distance;
   });
   // The pairs limit the number of groups: the deviation of a group's mean and its place on the axis
-  // shrink alike.
+  // shrink by the same factor.
   const std::size_t count = std::clamp<std::size_t>(
       static_cast<std::size_t>(std::sqrt(static_cast<double>(sorted.size()))), 1, 40);
   std::vector<DistanceGroup> groups(count);

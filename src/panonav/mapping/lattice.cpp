@@ -24,7 +24,7 @@ namespace {
 /// Weight of a link at the limit of agreement (`GrownLayout::weights`).
 constexpr double min_grown_weight = 0.25;
 /// Largest error of headings laid out by motion and phases: half of the quarter turn after which
-/// symmetric rooms look alike.
+/// symmetric rooms look similar.
 constexpr double max_heading_error_rad = 0.25 * std::numbers::pi;
 /// Share of the triangles of a spring of which more must close, where no motion shows which views
 /// are near (docs/decisions.md).

@@ -19,7 +19,7 @@ struct SessionAlignmentOptions {
   /// the same frame of the first.
   int min_places = 10;
   /// Share of the places where the maps overlap whose views must match: shelves that are built
-  /// alike match here and there, but not along a whole path.
+  /// similar match here and there, but not along a whole path.
   double min_confirmed = 0.7;
   /// Any other frame must explain fewer places by this factor.
   double distinctness = 2.0;

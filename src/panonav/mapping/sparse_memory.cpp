@@ -87,11 +87,11 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
       if (found == kept.end()) return;
       const double difference = image_difference(found->second, coefficients);
       const bool outdated = distance_m && *distance_m < options.outdated_within_m;
-      const bool alike =
+      const bool is_similar =
           difference <= options.max_difference && (!distance_m || *distance_m <= options.reach_m);
-      if (!outdated && !alike) return;
+      if (!outdated && !is_similar) return;
       if (best && best->difference <= difference) return;
-      best = SparseSelection::Redundant{view, other, difference, !alike};
+      best = SparseSelection::Redundant{view, other, difference, !is_similar};
     };
     if (pose) {
       by_position.visit_near(pose->position(), [&](std::uint32_t other, Point2 position) {

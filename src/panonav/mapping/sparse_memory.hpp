@@ -15,7 +15,7 @@ namespace panonav {
 struct SparseMemoryOptions {
   /// A view is redundant when a kept one differs from it by no more (`image_difference`, 0 .. 1).
   double max_difference = 0.1;
-  /// Largest distance of the kept view where positions are known: far places may look alike.
+  /// Largest distance of the kept view where positions are known: far places may look similar.
   double reach_m = 1.0;
   int reach_links = 10;  ///< links between them, at most, where positions are not known
   /// A view is outdated if a newer one was taken within this distance, however it looks, as the

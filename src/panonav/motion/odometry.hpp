@@ -16,7 +16,7 @@ namespace panonav {
 enum class DriveKind {
   differential,  ///< cannot move sideways: travel errors lie along the heading at the middle of the
                  ///< step
-  holonomic,     ///< moves in every direction: travel errors are alike in x and y
+  holonomic,     ///< moves in every direction: travel errors are equal in x and y
 };
 
 /// Error of odometry. The random part is a random walk: its variance grows with the distance and
@@ -57,7 +57,7 @@ class StepSampler {
 
   /// The step with its heading in [-pi, pi).
   [[nodiscard]] const Pose2& step() const noexcept { return step_; }
-  /// True if its travel errors are alike in x and y.
+  /// True if its travel errors are equal in x and y.
   [[nodiscard]] bool is_holonomic() const noexcept { return is_holonomic_; }
   /// Standard deviation of its travel (m); of each of x and y for a holonomic drive.
   [[nodiscard]] double translation_deviation_m() const noexcept { return translation_deviation_m_; }

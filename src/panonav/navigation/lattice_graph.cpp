@@ -145,7 +145,7 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
 }
 
 // Marks edges whose ends have hardly any neighbour in common: they lead to another place that looks
-// alike, and paths would be planned through them as through a hole in the wall.
+// similar, and paths would be planned through them as through a hole in the wall.
 void mark_isolated_edges(std::size_t views, std::vector<Candidate>& candidates) {
   std::vector<std::vector<std::size_t>> around(views);
   for (const Candidate& candidate : candidates) {

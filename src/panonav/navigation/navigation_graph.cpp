@@ -28,8 +28,8 @@ void require_valid(const NavigationGraph::Edge& edge) {
   }
 }
 
-/// Largest error of the heading of a map where its views are compared: about 30 degrees, less
-/// than half of the quarter turn after which rooms look alike.
+/// Largest error of the heading of a map where its views are compared: about 30 degrees, less than
+/// half of the quarter turn after which rooms look similar.
 constexpr float max_heading_error_rad = 0.5F;
 
 bool agree(const Pose2& a, const Pose2& b) {

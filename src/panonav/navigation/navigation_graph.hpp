@@ -99,7 +99,7 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// Takes the springs that kept `min_weight` of themselves and are at most two spacings of the
 /// references around long, and rejected ones of up to one and a half spacings that three third
 /// views confirm; of these the ones whose ends have about a quarter of their neighbours in common:
-/// others lead to places that look alike. Those left out thereby join what would not be connected
+/// others lead to places that look similar. Those left out thereby join what would not be connected
 /// otherwise. Directions and turns follow from the phases, so that the distortion of the
 /// arrangement bends none. Lengths, in spacings of the references around, are those of the
 /// arrangement, of rejected springs those of the phases. Cost: the springs times those of a view.

@@ -48,7 +48,7 @@ struct RobotReport {
   bool obstacle = false;  ///< something stopped the robot before the last step was done
   /// The reference nearest to the position of another estimate, as of `MonteCarloLocaliser` or
   /// `Localiser`. It replaces the last place, and the navigator searches around it, so it need not
-  /// be exact: for places that look alike, where single views mislead. nullopt where the estimate
+  /// be exact: for places that look similar, where single views mislead. nullopt where the estimate
   /// is not certain: the views decide then.
   std::optional<ViewId> estimate;
   /// The horizon scanline of this observation (route/horizon_scanline.hpp), for legs along routes;

@@ -28,9 +28,9 @@ struct MergedMemory {
 /// Only the largest connected component of each map moves. Without common places both stay apart,
 /// and the second loses its positions.
 ///
-/// A view with the same name and picture in both is stored once, as in the first; other used names
-/// of the second become "STEM/NAME". `memory` appears whole or not at all.
-/// `advance` is called for each view written.
+/// A view with the same name and picture in both is stored once, as in the first; other used
+/// names of the second become "STEM/NAME". `memory` appears whole or not at all. `advance` is
+/// called for each view written.
 ///
 /// Throws FileError: unreadable or unwritable files, something at `memory`, positions without
 /// headings; ContractError: other shape, preprocessing or elevations; OptionError. Holds both

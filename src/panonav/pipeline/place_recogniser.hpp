@@ -26,8 +26,8 @@ struct PlaceRecogniserOptions {
   LocaliserOptions localiser;  ///< number of views compared and listed
   /// Layout of the pictures; empty: that of the memory's own.
   std::optional<PictureSource> source;
-  /// Compute also the area where the robot may be, component by component. This holds the memory,
-  /// as areas are computed from the positions of all views.
+  /// Compute also the area where the robot may be, component by component. This holds the
+  /// memory, as areas are computed from the positions of all views.
   std::optional<LocalisationAccuracy> areas;
   /// Largest number of views for which a memory on a server is held. Larger ones are searched on
   /// the server: 350 bytes a view instead of 2700, but more time for each image (docs/scale.md).

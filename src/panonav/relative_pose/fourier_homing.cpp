@@ -97,7 +97,7 @@ class PairOfViews {
   PerFrequency component_weights_{};
   // Per row: how fast things rise as the robot approaches, and the tangent of the elevation.
   std::vector<float> approach_, tangent_;
-  std::vector<float> row_weights_;  // empty: all alike
+  std::vector<float> row_weights_;  // empty: equal weights
   PairEquations normal_;
   PairSolution best_;      // of the present iteration
   double variance_ = 0.0;  // of its displacement

@@ -46,7 +46,7 @@ struct FourierHomingOptions {
   };
   /// Weights of components and rows.
   enum class Weights {
-    equal,  ///< as published: all alike
+    equal,  ///< as published: equal weights
     /// Weights by the coherence of both views: components fade out where their phases are
     /// unrelated, which happens at lower frequencies the farther the views are apart. A far view is
     /// thus compared coarsely and a near one finely, without a known distance.

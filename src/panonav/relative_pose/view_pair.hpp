@@ -32,7 +32,7 @@ struct PhaseReading {
 };
 
 /// Reads the home vectors from a to b and back. nullopt when a view has no structure. With `window`
-/// only headings of b minus those of a within it are considered, so that places that look alike
+/// only headings of b minus those of a within it are considered, so that places that look similar
 /// after a quarter turn are not mistaken for each other; nullopt also when no heading in it fits.
 /// Throws ContractError when the views differ in shape or have fewer than three components. Cost:
 /// that of two home vectors.

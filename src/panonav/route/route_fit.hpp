@@ -54,8 +54,8 @@ struct RouteFix {
 /// Immutable; several threads may use one.
 class RouteLines {
  public:
-  /// Copies the route: 4 bytes a value and level. Throws OptionError, and ContractError on a route
-  /// of fewer than two lines.
+  /// Copies the route: 4 bytes a value and level. Throws OptionError, and ContractError on a
+  /// route of fewer than two lines.
   explicit RouteLines(const RoutePanorama& route, const RouteFitOptions& options = {});
 
   /// Finds the pose at which the route shows the line: least squares of all directions at once over

@@ -63,8 +63,8 @@ struct Padded {
 
 using Grey = Padded<float>;
 
-// Sums over squares of 2 radius + 1 pixels. All values are whole numbers below 2^24, or rounded
-// alike wherever a column stands: sums run in one order.
+// Sums over squares of 2 radius + 1 pixels. All values are whole numbers below 2^24, or rounded in
+// the same way in each column: sums run in one order.
 Grey compute_box_sums(const Grey& from, int radius, int pad_rows, int pad_columns) {
   Grey columns(from.rows, from.columns, radius, 0);
   for (int y = 0; y < from.rows; ++y) {

@@ -219,8 +219,8 @@ class MemoryFile {
   [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) const;
   /// Returns all links, ascending.
   [[nodiscard]] std::vector<Link> links() const;
-  /// Returns the rows of a server that the functions above left out since the memory was opened,
-  /// as they hold what no program of ours writes, up to 1000; of a file none: it is refused.
+  /// Returns the rows of a server that the functions above left out since the memory was opened, as
+  /// they hold what no program of ours writes, up to 1000; of a file none: it is refused.
   [[nodiscard]] std::vector<Fault> left_out() const;
   /// Returns all faults of the file: of its structure, then view by view. Empty: intact.
   [[nodiscard]] std::vector<Fault> verify() const;

@@ -56,8 +56,8 @@ void set_reply_timeout(std::chrono::milliseconds timeout);
 /// writes; `view` is empty if it is no view. By any thread.
 using LeftOutHandler =
     std::function<void(const std::filesystem::path& memory, const MemoryFile::Fault& row)>;
-/// Sets who is told of bad rows of memories on servers, of each opened memory the first few; by
-/// default nobody. Any thread may call.
+/// Sets the handler that is notified of bad rows of memories on servers, of each opened memory the
+/// first few; by default nobody. Any thread may call.
 void set_left_out_handler(LeftOutHandler handler);
 /// Calls the handler, for schemes.
 void report_left_out(const std::filesystem::path& memory, const MemoryFile::Fault& row);

@@ -13,8 +13,8 @@
 namespace panonav::fleet {
 
 /// Layout of the sketches of views that are not held: sums of packed magnitudes over blocks of
-/// neighbouring rows at three levels, each finer than the one before. A block of a level consists
-/// of blocks of the next one. docs/search.md explains why their differences bound the
+/// neighbouring rows at three levels, each finer than the one before. A block of a level
+/// consists of blocks of the next one. docs/search.md explains why their differences bound the
 /// dissimilarity.
 class SegmentLayout {
  public:

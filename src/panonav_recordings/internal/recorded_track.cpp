@@ -10,7 +10,7 @@ namespace panonav::recordings {
 
 namespace {
 
-/// ROS 1 writes "/odom" and "odom" alike.
+/// Removes a leading slash: ROS 1 writes both "/odom" and "odom".
 std::string normalise_frame_name(std::string_view name) {
   return std::string(name.starts_with('/') ? name.substr(1) : name);
 }

@@ -156,8 +156,9 @@ class ChunkedFile : public RecordingFile {
   /// Appends the messages of unpacked records up to the first damaged one. Whether all were whole.
   virtual bool walk(std::span<const std::uint8_t> block, std::vector<Entry>& entries) const = 0;
 
-  /// Unpacks a chunk during a pass over the file, notes its topics and messages and makes a block
-  /// of it. `is_cut`: the file ends within the chunk; its beginning is kept. Warns of damage.
+  /// Unpacks a chunk during a pass over the file, notes its topics and messages and makes a
+  /// block of it. `is_cut`: the file ends within the chunk; its beginning is kept. Warns of
+  /// damage.
   void add_chunk(std::uint64_t at, bool is_cut);
   /// A message outside of chunks, in the record of `bytes` bytes at `at`.
   void add_loose_message(std::uint64_t at, std::uint64_t bytes, std::int64_t time_ns,

@@ -188,7 +188,7 @@ Scene make_loop(const SceneVariation& variation) {
 namespace {
 
 // A ring of corridors, 2 m wide, whose middle lines are 12 m and 8 m long. Two narrower ones cross
-// the block inside and continue outside to a door: eight junctions that look alike.
+// the block inside and continue outside to a door: eight junctions that look similar.
 constexpr double ring_height_m = 2.5;
 constexpr double ring_half_m = 1.0;
 constexpr double ring_long_m = 12.0;

@@ -36,7 +36,7 @@ class RayTracer {
   RayTracer(const RayTracer&) = delete;
   RayTracer& operator=(const RayTracer&) = delete;
 
-  /// Finds the first hit of each ray. Neighbouring rays should be alike: they are traced in
+  /// Finds the first hit of each ray. Neighbouring rays should be similar: they are traced in
   /// packets.
   void trace(std::span<const Ray> rays, std::span<RayHit> hits) const;
   [[nodiscard]] RayHit first_hit(const Ray& ray) const;

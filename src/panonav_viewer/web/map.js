@@ -324,10 +324,10 @@ class MapPanel extends Drawing {
     context.lineWidth = 0.7;
     context.strokeStyle = colour('soft');
     for (let i = compared.length - 2; i >= 0; i -= 2) {
-      const alike = 1 - (compared[i + 1] - best) / range, at = 2 * compared[i];
+      const similarity = 1 - (compared[i + 1] - best) / range, at = 2 * compared[i];
       if (at >= references.length) continue;
-      context.fillStyle = scale[Math.round(alike * (scale.length - 1))];
-      this.dot(context, references[at], references[at + 1], radius * (1 + 1.2 * alike));
+      context.fillStyle = scale[Math.round(similarity * (scale.length - 1))];
+      this.dot(context, references[at], references[at + 1], radius * (1 + 1.2 * similarity));
       context.stroke();
     }
   }

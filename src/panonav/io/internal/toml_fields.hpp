@@ -36,8 +36,8 @@ struct TomlField {
 [[nodiscard]] TomlTable read_toml(const std::filesystem::path& path);
 
 /// Reads one table of a file, with one clear line for everything that is wrong. Remembers which
-/// fields were asked for, so that `finish` can refuse the others: a misspelt field would otherwise
-/// be silently ignored. The table must outlive it.
+/// fields were read, so that `finish` can refuse the others: a misspelt field would otherwise be
+/// silently ignored. The table must outlive it.
 class TomlFields {
  public:
   /// `section` is its name for messages; empty for the top level.

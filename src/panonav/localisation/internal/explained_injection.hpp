@@ -42,7 +42,7 @@ class ExplainedInjection {
   double log_evidence_ = 0.0;
 };
 
-/// Probability that the robot was carried away, by its prior and the logarithms of the view's
+/// Probability that the robot was kidnapped, by its prior and the logarithms of the view's
 /// likelihood elsewhere and here.
 [[nodiscard]] double kidnap_probability(double prior, double log_elsewhere, double log_here);
 

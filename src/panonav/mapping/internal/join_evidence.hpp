@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// Views nearer than this, in typical links, are adjacent and should look alike.
+/// Views nearer than this, in typical links, are adjacent and should look similar.
 inline constexpr double adjacent_lengths = 0.8;
 /// Distance in typical links from where two components meet up to which their layouts count:
 /// farther off they may have drifted.

@@ -22,7 +22,7 @@ struct GrownLayout {
   int iterations = 0;
 };
 
-/// Lays out `nodes` views by springs of which many may join places that only look alike: grows
+/// Lays out `nodes` views by springs of which many may join places that only look similar: grows
 /// connected components from the most certain ones.
 /// 1. The probability that a spring is right is learnt for each rank (lattice_links.hpp).
 /// 2. The two components are joined whose springs agree best on one relative pose, at odds of 19 to

@@ -14,7 +14,7 @@
 
 namespace panonav {
 
-/// Functions for memories in files and on servers alike: bytes of rows, checksums, refusals.
+/// Functions for memories in files and on servers: bytes of rows, checksums, refusals.
 
 /// Calls work(part) for one part of the rows after the other.
 template <class Row, class Work>
