@@ -191,14 +191,21 @@ std::vector<std::uint8_t> good_memory() {
   return read_file(path, 1U << 24U);
 }
 
+// Opens the tables of a memory that this program wrote.
+std::unique_ptr<sqlite3, int (*)(sqlite3*)> open_database(const fs::path& path) {
+  sqlite3* raw = nullptr;
+  const int opened = sqlite3_open(path.c_str(), &raw);
+  std::unique_ptr<sqlite3, int (*)(sqlite3*)> database(raw, sqlite3_close);
+  if (opened != SQLITE_OK) throw std::logic_error(path.string() + " cannot be opened");
+  return database;
+}
+
 // The bytes are SQL that somebody ran on a good memory.
 void read_memory_sql(Bytes bytes) {
   static const std::vector<std::uint8_t> good = good_memory();
   const fs::path path = new_memory(good);
-  sqlite3* raw = nullptr;
-  const int opened = sqlite3_open(path.c_str(), &raw);
-  const std::unique_ptr<sqlite3, int (*)(sqlite3*)> database(raw, sqlite3_close);
-  if (opened != SQLITE_OK) throw std::logic_error("the good memory cannot be opened");
+  const auto database = open_database(path);
+  sqlite3* raw = database.get();
   // Nothing outside of the file, and no script without an end.
   sqlite3_limit(raw, SQLITE_LIMIT_ATTACHED, 0);
   sqlite3_limit(raw, SQLITE_LIMIT_LENGTH, 1 << 20);
@@ -233,10 +240,8 @@ void undo_changes(Bytes bytes) {
   static const std::vector<std::uint8_t> changed = changed_memory();
   const fs::path path = new_memory(changed);
   {
-    sqlite3* raw = nullptr;
-    const int opened = sqlite3_open(path.c_str(), &raw);
-    const std::unique_ptr<sqlite3, int (*)(sqlite3*)> database(raw, sqlite3_close);
-    if (opened != SQLITE_OK) throw std::logic_error("the changed memory cannot be opened");
+    const auto database = open_database(path);
+    sqlite3* raw = database.get();
     RecordBytes record;
     record.add(std::string_view("all"));
     record.add(5.0);
