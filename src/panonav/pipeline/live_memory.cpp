@@ -25,13 +25,15 @@ namespace {
 
 /// A writer that was killed may have left a memory without views.
 bool holds_views(Memoriser& memoriser) {
-  return memoriser.file() != nullptr && memoriser.file()->info().views > 0;
+  return memoriser.file() != nullptr && !memoriser.file()->views().empty();
 }
 
 /// Stores views on a thread of its own.
 class Storer {
  public:
-  explicit Storer(Memoriser& memoriser) : memoriser_(memoriser), thread_([this] { work(); }) {}
+  /// `has_views`: the memory holds views already.
+  Storer(Memoriser& memoriser, bool has_views)
+      : memoriser_(memoriser), has_views_(has_views), thread_([this] { work(); }) {}
   ~Storer() { join(); }
   Storer(const Storer&) = delete;
   Storer& operator=(const Storer&) = delete;
@@ -70,18 +72,20 @@ class Storer {
     lower_thread_priority();
     std::unique_lock lock(mutex_);
     while (true) {
-      has_views_ = has_views_ || holds_views(memoriser_);
       came_.wait(lock, [this] { return over_ || !waiting_.empty(); });
       if (waiting_.empty()) return;
       Observation next = std::move(waiting_.front());
+      bool has_views = has_views_;
       lock.unlock();
       std::exception_ptr failure;
       try {
         memoriser_.add(std::move(next));
+        has_views = has_views || holds_views(memoriser_);
       } catch (...) {
         failure = std::current_exception();
       }
       lock.lock();
+      has_views_ = has_views;
       waiting_.pop_front();
       if (failure && !failure_) failure_ = failure;
     }
@@ -92,7 +96,7 @@ class Storer {
   std::condition_variable came_;
   std::deque<Observation> waiting_;  // the first one is being stored
   std::exception_ptr failure_;
-  bool has_views_ = false;
+  bool has_views_;
   bool over_ = false;
   std::thread thread_;
 };
@@ -125,7 +129,9 @@ struct LiveMemory::Implementation {
       updater.emplace(path, options.update_options);
     }
     if (exists && (!options.add || holds_views(*memoriser))) recogniser = make_recogniser();
-    if (memoriser && !options.in_step) storer.emplace(*memoriser);  // it alone uses the file now
+    if (memoriser && !options.in_step) {
+      storer.emplace(*memoriser, recogniser != nullptr);  // it alone uses the file now
+    }
   }
 
   /// True if enough views have headings for updates; other memories only grow.
@@ -149,7 +155,7 @@ struct LiveMemory::Implementation {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;
     const bool due = !recogniser || added.size() >= std::max(min_new, views / 5);
-    if (due && !next.valid() && has_views()) {
+    if (due && !next.valid() && (recogniser || has_views())) {
       next = std::async(options.in_step ? std::launch::deferred : std::launch::async, [this] {
         if (!options.in_step) lower_thread_priority();
         return make_recogniser();
