@@ -15,6 +15,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
+#include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/memory_tables.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_fleet/internal/areas_of_views.hpp"
@@ -334,12 +335,10 @@ struct PlaceSearch::Snapshot::Implementation {
     mark_failed_on_throw([&] {
       tables->read_available_views(views, [&](const ViewRow& row) {
         tables->accept_row(row.id, [&] {
-          const auto bytes = tables->checked(row, search->header.shape, scratch).signature;
-          const auto half = static_cast<std::ptrdiff_t>(search->header.shape.size());
-          cached.insert_or_assign(row.id, CachedView{row.info,
-                                                     {search->header.shape,
-                                                      {bytes.begin(), bytes.begin() + half},
-                                                      {bytes.begin() + half, bytes.end()}}});
+          const SignatureShape shape = search->header.shape;
+          CachedView view{row.info, {}};
+          unpack_signature(tables->checked(row, shape, scratch).signature, shape, view.signature);
+          cached.insert_or_assign(row.id, std::move(view));
         });
       });
     });
@@ -417,11 +416,13 @@ VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
   for (const ViewId view : ascending) {
     const auto found = own.cached.find(view);
     if (found == own.cached.end()) continue;
-    try {
-      memory.append_with_id(view, found->second.signature, found->second.info);
-    } catch (const ContractError& error) {
-      own.tables->fail_damaged(error.what());
-    }
+    own.tables->accept_row(view, [&] {
+      try {
+        memory.append_with_id(view, found->second.signature, found->second.info);
+      } catch (const ContractError& error) {
+        own.tables->fail_damaged(error.what());
+      }
+    });
   }
   return memory;
 }

@@ -49,23 +49,6 @@ bool is_valid_memory_name(std::string_view name) {
   });
 }
 
-/// Empty where the text is no name.
-std::string decode_percent(std::string_view text) {
-  std::string decoded;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '%') {
-      decoded += text[i];
-      continue;
-    }
-    unsigned value = 0;
-    const std::string_view digits = text.substr(i + 1, 2);
-    if (digits.size() != 2 || !read_number(digits, value, 16)) return {};
-    decoded += static_cast<char>(value);
-    i += 2;
-  }
-  return decoded;
-}
-
 HttpAnswer make_json_answer(const ordered_json& document, int status = 200) {
   return {.status = status,
           .type = "application/json",
@@ -234,9 +217,9 @@ struct LocalisationServer::Implementation {
     constexpr std::string_view picture = "/picture";
     if (below.starts_with(views) && below.ends_with(picture) &&
         below.size() > views.size() + picture.size()) {
-      return enqueue(
-          name, "",
-          decode_percent(below.substr(views.size(), below.size() - views.size() - picture.size())));
+      const auto view =
+          decode_percent(below.substr(views.size(), below.size() - views.size() - picture.size()));
+      return enqueue(name, "", view.value_or(""));
     }
     return make_error(404, "no such path; allowed: localise and views/NAME/picture");
   }

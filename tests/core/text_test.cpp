@@ -30,6 +30,16 @@ TEST(ToReadableLine, KeepsUtf8AndReplacesTheRest) {
   EXPECT_EQ(to_readable_line("\xF4\x90\x80\x80"), replaced + replaced + replaced + replaced);
 }
 
+TEST(DecodePercent, ReadsEscapesAndRefusesOthers) {
+  EXPECT_EQ(decode_percent("a%20b%2Fc%e4"), "a b/c\xE4");
+  EXPECT_EQ(decode_percent(""), "");
+  for (const char* text : {"%", "%4", "%4g", "%-1", "%+1", "% 1", "a%00b", "%0x41"}) {
+    EXPECT_EQ(decode_percent(text), std::nullopt) << text;
+  }
+  EXPECT_TRUE(is_utf8(decode_percent("%C3%A4").value()));
+  EXPECT_FALSE(is_utf8(decode_percent("%C3").value()));
+}
+
 TEST(ToReadableLine, NoNameTurnsTheDirectionOfWriting) {
   EXPECT_EQ(to_readable_line("a\u202Egnp.exe"), "a gnp.exe");
   for (const std::string mark :

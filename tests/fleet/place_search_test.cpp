@@ -116,6 +116,8 @@ TEST_F(PlaceSearchTest, ASearchSeesOneStateAndLeavesOutWhatIsGone) {
   EXPECT_EQ(loaded.info(nearest[1].view), file.load().info(nearest[1].view));
   EXPECT_EQ(after.find(loaded.info(nearest[1].view).name), nearest[1].view);
   EXPECT_EQ(after.find("nobody"), std::nullopt);
+  EXPECT_EQ(after.find("\xFF"), std::nullopt);
+  EXPECT_EQ(after.find(std::string("a\0b", 3)), std::nullopt);
   const std::vector<PositionBounds> bounds{{-1.0, 1.0, -1.0, 1.0}, {0.0, 2.0, 0.0, 2.0}};
   std::vector<ViewId> within = file.views_within(bounds[0]);
   for (const ViewId view : file.views_within(bounds[1])) within.push_back(view);

@@ -152,6 +152,30 @@ TEST_F(SynchronisedMemory, BadRowsOfOthersAreLeftOutAndNamed) {
       "ADD CHECK (y_m BETWEEN -1e7 AND 1e7)");
 }
 
+// What a row on a server holds is not known while it is bad: files keep what they have.
+TEST_F(SynchronisedMemory, ABadLinkOnTheServerErasesNoLinkOfAFile) {
+  share({"a"}, 4);
+  open("a").link(std::vector<Link>{{ViewId{1}, ViewId{2}, Link::Kind::sequence},
+                                   {ViewId{2}, ViewId{3}, Link::Kind::closure}});
+  (void)sync("a");
+  (void)sync("b");
+  const auto whole = content(folder / "a");
+  PostgresqlConnection connection(parse_server_address(server("x")));
+  const std::string of_memory = " WHERE memory = (SELECT id FROM panonav.memories WHERE name = '" +
+                                memory_name(server("x")) + "')";
+  const PostgresqlRows row = connection.run("SELECT min(a) FROM panonav.links" + of_memory);
+  const std::string of_first = of_memory + " AND a = " + std::to_string(row.integer(0, 0));
+  connection.execute("UPDATE panonav.links SET checksum = checksum + 1" + of_first);
+  for (const char* robot : {"a", "b"}) {
+    (void)sync(robot);
+    EXPECT_TRUE(is_same(content(folder / robot), whole)) << robot;
+  }
+  // A link that is removed there, goes.
+  connection.execute("DELETE FROM panonav.links" + of_first);
+  (void)sync("b");
+  EXPECT_EQ(open("b").links().size(), 1U);
+}
+
 // A curator may write any row that is kept for undo; whoever undoes it may have more rights.
 TEST_F(SynchronisedMemory, UndoChangesNoOtherTableOnTheServer) {
   share({"a"}, 4);

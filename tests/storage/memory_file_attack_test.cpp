@@ -216,6 +216,17 @@ TEST_F(MemoryFileAttack, IsNamed) {
       {keep_change(links_head + "120001000000000000000001000000000000000201" + zeros + "01" +
                    zeros),
        "the id of a view is 0"},
+      // A new setting without its value.
+      {keep_change("540301"
+                   "0000" +
+                   to_hex("settings") +
+                   "00"
+                   "1200"
+                   "03016B"
+                   "00"
+                   "01" +
+                   zeros),
+       "a row has a wrong field"},
   };
   for (const Attack& entry : attacks) {
     SCOPED_TRACE(entry.sql.substr(0, 100));

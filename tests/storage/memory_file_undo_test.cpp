@@ -171,6 +171,34 @@ TEST_F(MemoryFileUndo, IsRefusedWhereItWouldOverwrite) {
   EXPECT_TRUE(file->verify().empty());
 }
 
+// What was made since then refers to a view that would go.
+TEST_F(MemoryFileUndo, IsRefusedWhereALinkOrAMapWouldLackAView) {
+  Random random(6);
+  ViewId added;
+  file->change([&] { added = file->append(random_view(random, small_header().shape, 99)); },
+               "update");
+  const auto expect_refusal = [&](const char* fault) {
+    const VisualMemory now = file->load();
+    const auto message = message_of<FileError>([&] { file->undo(); });
+    EXPECT_TRUE(contains(message, "cannot undo \"update\": the memory would be damaged: "));
+    EXPECT_TRUE(contains(message, fault));
+    EXPECT_TRUE(same_content(file->load(), now));
+    EXPECT_EQ(file->undoable(), "update");
+    EXPECT_TRUE(file->verify().empty());
+  };
+  const Link link{ids[3], added, Link::Kind::sequence};
+  file->link(std::vector<Link>{link});
+  expect_refusal("of which one is missing");
+  file->unlink(link.a, link.b);
+  TopologicalMap with_added = map;
+  with_added.nodes.push_back({added, {20.0, 0.0, 0.0}});
+  file->save_map("since", with_added);
+  expect_refusal("map since");
+  file->remove_map("since");
+  file->undo();
+  EXPECT_TRUE(same_content(file->load(), *before));
+}
+
 TEST_F(MemoryFileUndo, DamageIsNotApplied) {
   forget({ids[4]});
   file.reset();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,6 +22,13 @@ namespace panonav {
 /// characters, also those that turn the direction of writing, become spaces, bytes that are not
 /// UTF-8 the replacement character U+FFFD.
 [[nodiscard]] std::string to_readable_line(std::string_view text);
+
+/// True if the text is valid UTF-8.
+[[nodiscard]] bool is_utf8(std::string_view text);
+
+/// Decodes the escapes of a URL: "%41" is "A". nullopt: a "%" without two hexadecimal digits, or
+/// "%00", which no name holds.
+[[nodiscard]] std::optional<std::string> decode_percent(std::string_view text);
 
 /// Replaces the capital letters of ASCII by small ones; other bytes stay.
 [[nodiscard]] std::string to_lower_case(std::string_view text);

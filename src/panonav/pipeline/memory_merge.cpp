@@ -159,9 +159,9 @@ std::string make_free_name(const std::string& name, const MemoryFile& from,
   return new_name;
 }
 
-/// Files of a memory that is being made: beside its target, or, where that is on a server, among
-/// the temporary files. A locked file reserves their names, so that two processes never use the
-/// same; those that a killed process left are removed.
+/// Files of a memory that is being made: next to its target, or, where that is on a server, in the
+/// folder of temporary files. A locked file reserves their names, so that two processes never use
+/// the same. Files that a killed process left next to a target are removed by the next one.
 class UnfinishedMemory {
  public:
   explicit UnfinishedMemory(const fs::path& target)

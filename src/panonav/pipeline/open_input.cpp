@@ -102,7 +102,7 @@ void reject_topics(const fs::path& path, const InputOptions::Topics& topics) {
 }
 
 /// Throws FileError on a kind of file that is known but not read by this program.
-void throw_unregistered_kind(const fs::path& path) {
+void reject_unregistered_kind(const fs::path& path) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kinds{{
       {".mcap", "recording"},
       {".bag", "recording"},
@@ -169,7 +169,7 @@ Dataset open_dataset_folder(const fs::path& folder, const InputOptions& options)
 }
 
 Dataset open_pictures(const fs::path& path, const InputOptions& options) {
-  throw_unregistered_kind(path);
+  reject_unregistered_kind(path);
   const PictureSource& source =
       choose_source(path, options, "has no dataset.toml; set the type of the images");
   std::error_code ignored;

@@ -77,10 +77,7 @@ struct MemoryFile::Implementation {
   /// Appends a row to a memory. Throws DamageError as `checked`, and on a row that repeats another.
   void append_row(const ViewRow& row, VisualMemory& memory) {
     const auto signature = tables->checked(row, header.shape, scratch).signature;
-    const auto half = static_cast<std::ptrdiff_t>(header.shape.size());
-    packed.shape = header.shape;
-    packed.magnitudes.assign(signature.begin(), signature.begin() + half);
-    packed.phases.assign(signature.begin() + half, signature.end());
+    unpack_signature(signature, header.shape, packed);
     try {
       memory.append_with_id(row.id, packed, row.info);
     } catch (const ContractError& error) {
@@ -91,12 +88,8 @@ struct MemoryFile::Implementation {
   void append_link(const LinkRow& row, VisualMemory& memory) const {
     if (tables->is_left_out(row.a) || tables->is_left_out(row.b)) return;
     const Link link = tables->checked(row);
-    if (!memory.contains(link.a) || !memory.contains(link.b)) fail_incomplete(link);
+    if (!memory.contains(link.a) || !memory.contains(link.b)) tables->fail_incomplete(link);
     memory.link(link);
-  }
-  [[noreturn]] void fail_incomplete(const Link& link) const {
-    tables->fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
-                         std::to_string(link.b.value) + ", of which one is missing");
   }
   /// Returns the attachment; nullopt also if it was left out as bad.
   [[nodiscard]] std::optional<Bytes> read_attachment(ViewAttachment table, ViewId view) const {
@@ -168,9 +161,7 @@ void MemoryFile::copy_to(const std::filesystem::path& path) const {
       std::vector<Link> kept_links;
       for (const Link& link : links()) {
         from.accept_row(std::nullopt, [&] {
-          if (!copied.contains(link.a) || !copied.contains(link.b)) {
-            implementation_->fail_incomplete(link);
-          }
+          if (!copied.contains(link.a) || !copied.contains(link.b)) from.fail_incomplete(link);
           kept_links.push_back(link);
         });
       }
@@ -216,10 +207,15 @@ std::optional<std::string> MemoryFile::undoable() const {
 
 void MemoryFile::undo() {
   implementation_->write([&](MemoryTables& tables) {
-    if (!undoable()) {
-      throw ContractError("undo", "not possible", "after a change that was kept for it");
-    }
+    const auto what = undoable();
+    if (!what) throw ContractError("undo", "not possible", "after a change that was kept for it");
+    const auto faults = verify_links_and_maps(tables, header());
     tables.undo();
+    for (const Fault& fault : verify_links_and_maps(tables, header())) {
+      if (std::ranges::find(faults, fault) != faults.end()) continue;
+      throw FileError(path().string(),
+                      "cannot undo \"" + *what + "\": the memory would be damaged: " + fault.what);
+    }
   });
 }
 

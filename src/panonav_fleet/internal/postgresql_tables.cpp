@@ -387,6 +387,8 @@ void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t by
 }
 
 std::optional<ViewId> PostgresqlTables::find(std::string_view name) {
+  // The server refuses such texts as parameters; no view there has them as a name.
+  if (!is_utf8(name) || name.find('\0') != std::string_view::npos) return std::nullopt;
   const Rows rows = run("SELECT id FROM panonav.views WHERE memory = $1 AND name = $2", name);
   return rows.size() == 0 ? std::nullopt : std::optional(read_view_id(rows, 0, 0));
 }

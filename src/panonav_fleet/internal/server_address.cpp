@@ -4,36 +4,12 @@
 #include <string_view>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/storage/memory_address.hpp"
 
 namespace panonav::fleet {
 
 namespace {
-
-std::optional<int> parse_hexadecimal_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return std::nullopt;
-}
-
-// "%41" is "A". Empty where the text is nothing of the kind.
-std::optional<std::string> decode_percent(std::string_view text) {
-  std::string decoded;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '%') {
-      decoded += text[i];
-      continue;
-    }
-    if (i + 2 >= text.size()) return std::nullopt;
-    const auto high = parse_hexadecimal_digit(text[i + 1]);
-    const auto low = parse_hexadecimal_digit(text[i + 2]);
-    if (!high || !low || (*high == 0 && *low == 0)) return std::nullopt;
-    decoded += static_cast<char>(*high * 16 + *low);
-    i += 2;
-  }
-  return decoded;
-}
 
 // False if a part of a password could be taken for a host, port or database, which libpq names in
 // its messages.

@@ -199,9 +199,9 @@ Blocks ServerExchange::compute_link_blocks(const KeptAreas& areas) {
       bound));
 }
 
-std::vector<Link> ServerExchange::read_links_in_blocks(const KeptAreas& areas,
-                                                       std::span<const std::int64_t> blocks) {
-  std::vector<Link> links;
+ServerLinks ServerExchange::read_links_in_blocks(const KeptAreas& areas,
+                                                 std::span<const std::int64_t> blocks) {
+  ServerLinks links;
   if (blocks.empty()) return links;
   PostgresqlValues bound = values();
   add_areas(bound, areas);
@@ -212,8 +212,12 @@ std::vector<Link> ServerExchange::read_links_in_blocks(const KeptAreas& areas,
       bound.add(blocks));
   for (int i = 0; i < rows.size(); ++i) {
     tables_.accept_row(std::nullopt, [&] {
-      links.push_back(tables_.checked(LinkRow{read_view_id(rows, i, 0), read_view_id(rows, i, 1),
-                                              rows.integer(i, 2), rows.integer(i, 3)}));
+      const std::pair ends(read_view_id(rows, i, 0), read_view_id(rows, i, 1));
+      const bool is_accepted = tables_.accept_row(std::nullopt, [&] {
+        links.accepted.push_back(tables_.checked(
+            LinkRow{ends.first, ends.second, rows.integer(i, 2), rows.integer(i, 3)}));
+      });
+      if (!is_accepted) links.left_out.insert(ends);
     });
   }
   return links;
@@ -232,30 +236,24 @@ std::map<ViewId, std::int64_t> ServerExchange::read_signature_checksums(
   return signatures;
 }
 
-FullServerView ServerExchange::read_full_view(const PostgresqlRows& rows, const ServerView& found,
-                                              SignatureShape shape) {
-  const auto signature = rows.bytes(0, 7);
-  RecordBytes scratch;
-  static_cast<void>(
-      tables_.checked(ViewRow{found.id, found.info, signature, found.checksum}, shape, scratch));
-  FullServerView whole{found.id, {found.info, {}, {}, {}}, found.checksum};
-  const auto half = static_cast<std::ptrdiff_t>(shape.size());
-  whole.view.signature.shape = shape;
-  whole.view.signature.magnitudes.assign(signature.begin(), signature.begin() + half);
-  whole.view.signature.phases.assign(signature.begin() + half, signature.end());
-  const auto read_attachment = [&](int column, std::vector<std::uint8_t>& bytes, const char* what) {
+FullServerView ServerExchange::read_full_view(const PostgresqlRows& rows, SignatureShape shape,
+                                              RecordBytes& scratch) {
+  const ServerView found = read_server_view(rows, 0);
+  ViewRow row{found.id, found.info, rows.bytes(0, 7), found.checksum};
+  tables_.checked(row, shape, scratch);
+  FullServerView whole{row.id, {std::move(row.info), {}, {}, {}}, row.checksum};
+  unpack_signature(row.signature, shape, whole.view.signature);
+  const auto read_attachment = [&](int column, ViewAttachment table,
+                                   std::vector<std::uint8_t>& bytes) {
     if (rows.is_null(0, column)) return;
     tables_.accept_row(std::nullopt, [&] {
-      auto stored = rows.copy(0, column);
-      if (rows.integer(0, column + 1) != attachment_checksum(whole.id, stored)) {
-        tables_.fail_damaged(what + std::to_string(found.id.value) +
-                             " does not match its checksum");
-      }
-      bytes = std::move(stored);
+      StoredBytes stored{rows.copy(0, column), rows.integer(0, column + 1)};
+      tables_.check_attachment(table, whole.id, stored);
+      bytes = std::move(stored.bytes);
     });
   };
-  read_attachment(8, whole.view.thumbnail, "the thumbnail of view ");
-  read_attachment(10, whole.view.features, "the local features of view ");
+  read_attachment(8, ViewAttachment::thumbnails, whole.view.thumbnail);
+  read_attachment(10, ViewAttachment::features, whole.view.features);
   return whole;
 }
 
@@ -264,6 +262,7 @@ std::vector<FullServerView> ServerExchange::read_full_views(std::span<const View
   std::vector<FullServerView> views;
   if (ids.empty()) return views;
   const auto numbers = to_numbers(ids);
+  RecordBytes scratch;
   connection().stream(
       std::string(server_view_fields) +
           ", v.signature, t.bytes, t.checksum, f.bytes, f.checksum FROM panonav.views v "
@@ -271,8 +270,8 @@ std::vector<FullServerView> ServerExchange::read_full_views(std::span<const View
           "LEFT JOIN panonav.features f ON f.memory = v.memory AND f.view = v.id "
           "WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
       values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
-        const ServerView found = read_server_view(rows, 0);
-        tables_.accept_row(found.id, [&] { views.push_back(read_full_view(rows, found, shape)); });
+        tables_.accept_row(read_view_id(rows, 0, 0),
+                           [&] { views.push_back(read_full_view(rows, shape, scratch)); });
       });
   return views;
 }

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -57,6 +58,12 @@ inline void add_to_block(Blocks& blocks, ViewId id, std::int64_t checksum) {
 /// The part of a memory on a server that a file keeps; nullopt: all of it.
 using KeptAreas = std::optional<std::vector<MemoryArea>>;
 
+/// Links of a server's memory.
+struct ServerLinks {
+  std::vector<Link> accepted;
+  std::set<std::pair<ViewId, ViewId>> left_out;  ///< ends of bad rows, whose kind is not known
+};
+
 /// Exchanges many rows with a server in few messages, for a synchronisation. All functions throw
 /// FileError as `MemoryTables` does, and are called within transactions of `tables()`.
 class ServerExchange {
@@ -88,8 +95,8 @@ class ServerExchange {
   [[nodiscard]] std::map<ViewId, std::int64_t> read_checksums_in_blocks(
       const KeptAreas& areas, std::span<const std::int64_t> blocks);
   [[nodiscard]] Blocks compute_link_blocks(const KeptAreas& areas);
-  [[nodiscard]] std::vector<Link> read_links_in_blocks(const KeptAreas& areas,
-                                                       std::span<const std::int64_t> blocks);
+  [[nodiscard]] ServerLinks read_links_in_blocks(const KeptAreas& areas,
+                                                 std::span<const std::int64_t> blocks);
   /// Computes `signature_checksum` of those of the views that exist.
   [[nodiscard]] std::map<ViewId, std::int64_t> read_signature_checksums(
       std::span<const ViewId> views);
@@ -148,8 +155,8 @@ class ServerExchange {
   [[nodiscard]] ServerView read_server_view(const PostgresqlRows& rows, int row) const;
   [[nodiscard]] std::vector<ServerView> read_server_views(const PostgresqlRows& rows) const;
   /// Returns the view of the first row, checked; bad attachments are left out. Throws DamageError.
-  [[nodiscard]] FullServerView read_full_view(const PostgresqlRows& rows, const ServerView& found,
-                                              SignatureShape shape);
+  [[nodiscard]] FullServerView read_full_view(const PostgresqlRows& rows, SignatureShape shape,
+                                              RecordBytes& scratch);
   [[nodiscard]] std::map<ViewId, std::int64_t> to_checksums(const PostgresqlRows& rows) const;
   [[nodiscard]] ViewId read_view_id(const PostgresqlRows& rows, int row, int column) const {
     return tables_.to_view_id(rows.integer(row, column));

@@ -139,7 +139,7 @@ class Synchronisation {
   void add_downloaded_views(std::vector<FullServerView> views);
   /// Applies the links of the compared blocks, and stores the rest.
   void finish_download(const std::vector<std::int64_t>& blocks,
-                       const std::vector<Link>& server_view_links, std::int64_t last_view);
+                       const ServerLinks& server_view_links, std::int64_t last_view);
   /// Counts changes of the file that the login may not make on the server.
   std::size_t count_withheld_changes();
   /// Returns a condition for server ids: true if the links of the view were compared, which is so

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
-#include "panonav/memory/reference_validation.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 
@@ -97,13 +96,8 @@ void Synchronisation::classify_changed_views(const std::vector<ViewId>& changed,
 }
 
 bool Synchronisation::is_acceptable(const ServerView& view) {
-  return server_.tables().accept_row(view.id, [&] {
-    try {
-      validate(view.info);
-    } catch (const ContractError& error) {
-      server_.tables().fail_damaged("view " + std::to_string(view.id.value) + ": " + error.what());
-    }
-  });
+  return server_.tables().accept_row(view.id,
+                                     [&] { server_.tables().check_info(view.id, view.info); });
 }
 
 std::set<ViewId> Synchronisation::find_lost_views(const std::vector<ViewId>& removed) {
@@ -258,13 +252,13 @@ void Synchronisation::add_downloaded_views(std::vector<FullServerView> views) {
 }
 
 void Synchronisation::finish_download(const std::vector<std::int64_t>& blocks,
-                                      const std::vector<Link>& server_view_links,
+                                      const ServerLinks& server_view_links,
                                       std::int64_t last_view) {
   const auto writing = begin_file_change();
   const SynchronisedLinks local = read_local_links();
   SynchronisedLinks server_links;
   std::vector<Link> changed_links;
-  for (const Link& link : server_view_links) {
+  for (const Link& link : server_view_links.accepted) {
     const std::pair ends(link.a, link.b);
     server_links[ends] = link.kind;
     if (!is_in_file(link.a) || !is_in_file(link.b)) continue;
@@ -283,7 +277,8 @@ void Synchronisation::finish_download(const std::vector<std::int64_t>& blocks,
   std::erase_if(links_, [&](const auto& entry) {
     const auto& ends = entry.first;
     if (!is_differing.contains(ends.first.value >> block_bits) || server_links.contains(ends) ||
-        !is_in_scope(ends.first) || !is_in_scope(ends.second)) {
+        server_view_links.left_out.contains(ends) || !is_in_scope(ends.first) ||
+        !is_in_scope(ends.second)) {
       return false;
     }
     if (local.contains(ends)) {

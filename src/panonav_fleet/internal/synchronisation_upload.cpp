@@ -210,18 +210,12 @@ void Synchronisation::upload_views() {
 }
 
 NewView Synchronisation::to_new_view(ViewId view, LocalRow row) {
-  NewView whole{std::move(row.info), {header_.shape, {}, {}}, {}, {}};
-  const auto half = static_cast<std::ptrdiff_t>(header_.shape.size());
-  whole.signature.magnitudes.assign(row.signature.begin(), row.signature.begin() + half);
-  whole.signature.phases.assign(row.signature.begin() + half, row.signature.end());
+  NewView whole{std::move(row.info), {}, {}, {}};
+  unpack_signature(row.signature, header_.shape, whole.signature);
   const auto read = [&](ViewAttachment table, Bytes& bytes) {
     auto stored = file_.bytes(table, view);
     if (!stored) return;
-    if (stored->checksum != attachment_checksum(view, stored->bytes)) {
-      file_.fail_damaged(
-          std::string(table == ViewAttachment::thumbnails ? "thumbnails" : "features") +
-          " of view " + std::to_string(view.value) + ": the checksum does not match");
-    }
+    file_.check_attachment(table, view, *stored);
     bytes = std::move(stored->bytes);
   };
   read(ViewAttachment::thumbnails, whole.thumbnail);

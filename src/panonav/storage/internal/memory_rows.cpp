@@ -4,12 +4,21 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/reference_validation.hpp"
 
 namespace panonav {
 
 void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>& bytes) {
   bytes.assign(signature.magnitudes.begin(), signature.magnitudes.end());
   bytes.insert(bytes.end(), signature.phases.begin(), signature.phases.end());
+}
+
+void unpack_signature(std::span<const std::uint8_t> bytes, SignatureShape shape,
+                      PackedSignature& signature) {
+  const auto half = static_cast<std::ptrdiff_t>(shape.size());
+  signature.shape = shape;
+  signature.magnitudes.assign(bytes.begin(), bytes.begin() + half);
+  signature.phases.assign(bytes.begin() + half, bytes.end());
 }
 
 // The signature is hashed in place; the hash of the short fields is its seed.
@@ -70,15 +79,14 @@ void throw_used_name(std::string_view what, std::string_view name,
 }
 
 void check_new_name(std::string_view what, std::string_view name) {
-  constexpr std::size_t max_bytes = 4096;
   const bool control = std::ranges::any_of(
       name, [](char c) { return static_cast<unsigned char>(c) < 0x20U || c == 0x7F; });
-  if (!name.empty() && !control && name.size() <= max_bytes) return;
+  if (!name.empty() && !control && name.size() <= max_name_bytes) return;
   throw ContractError(std::string(what) + " name",
                       name.empty() ? "empty"
                       : control    ? "a text with control characters"
                                    : std::to_string(name.size()) + " bytes long",
-                      "1 to " + std::to_string(max_bytes) + " bytes, no control characters");
+                      "1 to " + std::to_string(max_name_bytes) + " bytes, no control characters");
 }
 
 void require_undo_bytes(const std::filesystem::path& file, std::int64_t bytes) {

@@ -26,6 +26,9 @@ void for_each_batch(const std::vector<Row>& rows, std::size_t batch_size, const 
 
 /// Magnitudes, then phases, into `bytes`.
 void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>& bytes);
+/// Splits the bytes of `pack_signature`, 2 * shape.size() of them.
+void unpack_signature(std::span<const std::uint8_t> bytes, SignatureShape shape,
+                      PackedSignature& signature);
 
 /// Computes the checksum over all fields of a view. `scratch` saves an allocation a view.
 [[nodiscard]] std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,

@@ -39,16 +39,25 @@ const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
       row.checksum != view_checksum(scratch, row.id, row.info, row.signature)) {
     fail_damaged("view " + std::to_string(row.id.value) + " does not match its checksum");
   }
-  try {
-    validate(row.info);
-  } catch (const ContractError& error) {
-    fail_damaged("view " + std::to_string(row.id.value) + ": " + error.what());
-  }
+  check_info(row.id, row.info);
   return row;
+}
+
+void MemoryTables::check_info(ViewId view, const ReferenceInfo& info) const {
+  try {
+    validate(info);
+  } catch (const ContractError& error) {
+    fail_damaged("view " + std::to_string(view.value) + ": " + error.what());
+  }
 }
 
 void MemoryTables::fail_damaged(std::string_view what) const {
   throw DamageError(message_path().string(), "is damaged: " + std::string(what));
+}
+
+void MemoryTables::fail_incomplete(const Link& link) const {
+  fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+               std::to_string(link.b.value) + ", of which one is missing");
 }
 
 std::string MemoryTables::shorten_message(std::string_view message) const {
@@ -67,7 +76,8 @@ void MemoryTables::leave_out(std::optional<ViewId> view, std::string_view what) 
   if (left_out_.size() < max_reported) {
     report_left_out(message_path(), fault);
   } else if (left_out_.size() == max_reported) {
-    report_left_out(message_path(), {std::nullopt, "there are more bad rows; `verify` lists all"});
+    report_left_out(message_path(),
+                    {std::nullopt, "there are more bad rows (`panonav verify` lists them)"});
   }
   if (left_out_.size() < max_left_out) left_out_.push_back(std::move(fault));
 }
@@ -77,14 +87,18 @@ std::optional<std::vector<std::uint8_t>> MemoryTables::read_checked_bytes(ViewAt
   require_views(std::span(&view, 1));
   auto stored = bytes(table, view);
   if (!stored) return std::nullopt;
-  if (stored->checksum != attachment_checksum(view, stored->bytes)) {
-    fail_damaged(table == ViewAttachment::thumbnails
-                     ? "the thumbnail of view " + std::to_string(view.value) +
-                           " does not match its checksum"
-                     : "the local features of view " + std::to_string(view.value) +
-                           " do not match their checksum");
-  }
+  check_attachment(table, view, *stored);
   return std::move(stored->bytes);
+}
+
+void MemoryTables::check_attachment(ViewAttachment table, ViewId view,
+                                    const StoredBytes& stored) const {
+  if (stored.checksum == attachment_checksum(view, stored.bytes)) return;
+  fail_damaged(table == ViewAttachment::thumbnails
+                   ? "the thumbnail of view " + std::to_string(view.value) +
+                         " does not match its checksum"
+                   : "the local features of view " + std::to_string(view.value) +
+                         " do not match their checksum");
 }
 
 }  // namespace panonav

@@ -106,6 +106,8 @@ class MemoryTables {
   [[nodiscard]] virtual const std::filesystem::path& message_path() const noexcept = 0;
   /// Throws DamageError.
   [[noreturn]] void fail_damaged(std::string_view what) const;
+  /// Throws DamageError on a link of which a view is missing.
+  [[noreturn]] void fail_incomplete(const Link& link) const;
   /// True if others than this program's user may write rows, as on a server: a bad row is then left
   /// out and noted, so that it keeps nobody from the other rows. In a file it is a fault.
   [[nodiscard]] virtual bool tolerates_bad_rows() const noexcept { return false; }
@@ -138,9 +140,13 @@ class MemoryTables {
   [[nodiscard]] std::string shorten_message(std::string_view message) const;
   /// Throws FileError on a number that no view has.
   [[nodiscard]] ViewId to_view_id(std::int64_t number) const;
-  /// The row itself. Throws DamageError when it does not match its checksum, and on values out of
-  /// range (`validate` of reference_validation.hpp).
+  /// Returns the row itself. Throws DamageError when it does not match its checksum, and as
+  /// `check_info`.
   const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
+  /// Throws DamageError on values out of range (`validate` of reference_validation.hpp).
+  void check_info(ViewId view, const ReferenceInfo& info) const;
+  /// Throws DamageError if the bytes do not match their checksum.
+  void check_attachment(ViewAttachment table, ViewId view, const StoredBytes& stored) const;
   /// Returns the link of the row. Throws as above, and on values that no link has.
   [[nodiscard]] Link checked(const LinkRow& row) const;
   [[nodiscard]] virtual std::unique_ptr<Transaction> transaction(Kind kind) = 0;

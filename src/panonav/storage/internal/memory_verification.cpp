@@ -28,9 +28,7 @@ class MemoryVerification {
     for (const ViewAttachment table : {ViewAttachment::thumbnails, ViewAttachment::features}) {
       check([&] { verify_bytes(table); });
     }
-    check([&] { verify_links(); });
-    const auto is_known = [&](ViewId view) { return views_.contains(view); };
-    check([&] { verify_maps(tables_, is_known, check_part); });
+    verify_links_and_maps(check_part);
     check([&] { verify_routes(tables_, check_part); });
     check([&] { static_cast<void>(tables_.history()); });
     // Rows of a server that the functions above left out.
@@ -40,7 +38,20 @@ class MemoryVerification {
     return std::move(faults_);
   }
 
+  std::vector<MemoryFile::Fault> run_for_links_and_maps() {
+    const std::vector<ViewId> all = tables_.views();
+    views_.insert(all.begin(), all.end());
+    verify_links_and_maps([this](const auto& part) { check(part); });
+    return std::move(faults_);
+  }
+
  private:
+  void verify_links_and_maps(const MemoryTables::Check& check_part) {
+    check([&] { verify_links(); });
+    const auto is_known = [&](ViewId view) { return views_.contains(view); };
+    check([&] { verify_maps(tables_, is_known, check_part); });
+  }
+
   void check(const std::function<void()>& part, std::optional<ViewId> view = std::nullopt) {
     try {
       part();
@@ -80,10 +91,7 @@ class MemoryVerification {
       if (ends <= std::exchange(before, ends)) tables_.fail_damaged("links are out of order");
       check([&] {
         const Link link = tables_.checked(row);
-        if (!views_.contains(link.a) || !views_.contains(link.b)) {
-          tables_.fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
-                               std::to_string(link.b.value) + ", of which one is missing");
-        }
+        if (!views_.contains(link.a) || !views_.contains(link.b)) tables_.fail_incomplete(link);
       });
     });
   }
@@ -95,6 +103,11 @@ class MemoryVerification {
 };
 
 }  // namespace
+
+std::vector<MemoryFile::Fault> verify_links_and_maps(MemoryTables& tables,
+                                                     const MemoryHeader& header) {
+  return MemoryVerification(tables, header).run_for_links_and_maps();
+}
 
 std::vector<MemoryFile::Fault> verify_memory(MemoryTables& tables, const MemoryHeader& header) {
   return MemoryVerification(tables, header).run();

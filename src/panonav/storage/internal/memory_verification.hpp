@@ -11,4 +11,8 @@ namespace panonav {
 [[nodiscard]] std::vector<MemoryFile::Fault> verify_memory(MemoryTables& tables,
                                                            const MemoryHeader& header);
 
+/// Finds the faults of links and maps alone, those that lack a view among them.
+[[nodiscard]] std::vector<MemoryFile::Fault> verify_links_and_maps(MemoryTables& tables,
+                                                                   const MemoryHeader& header);
+
 }  // namespace panonav

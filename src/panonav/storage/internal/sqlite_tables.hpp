@@ -82,8 +82,6 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> query_texts(const char* sql);
   /// Drops what exceeds the bounds of `MemoryFile::change`.
   void shorten_history();
-  /// Throws FileError on a link that is damaged or lacks a view.
-  void require_whole_links();
   /// Throws FileError if rows that `undo` changed cannot be read.
   void require_intact(UndoneRows rows);
 

@@ -5,9 +5,10 @@
 #include <sqlite3.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,10 +26,6 @@
 namespace panonav {
 
 namespace {
-
-// Tables whose rows `undo` brings back.
-constexpr std::array<const char*, 8> tables{"views",    "thumbnails", "links",        "maps",
-                                            "settings", "routes",     "route_blocks", "features"};
 
 struct EndSession {
   void operator()(sqlite3_session* session) const noexcept { sqlite3session_delete(session); }
@@ -56,20 +53,19 @@ std::span<const std::uint8_t> changes_in(const Statement& row) {
   return row.blob(3);
 }
 
-// Steps to the next change and checks it, so that only whole changes reach SQLite's reader.
-bool step_checked(Database& database, Statement& row) {
-  if (!row.step()) return false;
-  if (row.integer(4) != undo_checksum(row.text(1), row.real(2), changes_in(row))) {
+// Steps to the next change and returns its rows; nullopt: there is none. Checks it, so that only
+// whole changes reach SQLite's reader.
+std::optional<UndoneRows> step_checked(Database& database, Statement& row) {
+  if (!row.step()) return std::nullopt;
+  const auto changes = changes_in(row);
+  if (row.integer(4) != undo_checksum(row.text(1), row.real(2), changes)) {
     database.fail_damaged("a change that can be undone does not match its checksum");
   }
   try {
-    static_cast<void>(read_undo_changes(changes_in(row)));
-  } catch (const FileError&) {
-    throw;
+    return read_undo_changes(changes);
   } catch (const Error& error) {
     database.fail_damaged(error.what());
   }
-  return true;
 }
 
 double now_s() {
@@ -89,10 +85,6 @@ int on_conflict(void* in_the_way, int, sqlite3_changeset_iter* change) {
   return SQLITE_CHANGESET_ABORT;
 }
 
-int is_undone(void*, const char* table) {
-  return std::ranges::find(tables, std::string_view(table)) != tables.end() ? 1 : 0;
-}
-
 }  // namespace
 
 void SqliteTables::run_with_undo(const std::function<void()>& changes, const std::string& what) {
@@ -102,7 +94,9 @@ void SqliteTables::run_with_undo(const std::function<void()>& changes, const std
   sqlite3_session* started = nullptr;
   check(sqlite3session_create(database_.handle(), "main", &started));
   std::unique_ptr<sqlite3_session, EndSession> session(started);
-  for (const char* table : tables) check(sqlite3session_attach(started, table));
+  for (const std::string_view table : undo_table_names()) {
+    check(sqlite3session_attach(started, table.data()));
+  }
   changes();
   SqliteBytes made;
   void* data = nullptr;
@@ -161,17 +155,6 @@ std::vector<MemoryFile::KeptChange> SqliteTables::history() {
   return changes;
 }
 
-void SqliteTables::require_whole_links() {
-  const std::vector<ViewId> all = views();
-  read_links([&](const LinkRow& row) {
-    const Link link = checked(row);
-    if (!std::ranges::binary_search(all, link.a) || !std::ranges::binary_search(all, link.b)) {
-      fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
-                   std::to_string(link.b.value) + ", of which one is missing");
-    }
-  });
-}
-
 void SqliteTables::require_intact(UndoneRows rows) {
   std::ranges::sort(rows.views);
   rows.views.erase(std::unique(rows.views.begin(), rows.views.end()), rows.views.end());
@@ -179,7 +162,6 @@ void SqliteTables::require_intact(UndoneRows rows) {
     const SignatureShape shape = to_header(settings()).shape;
     RecordBytes scratch;
     read_available_views(rows.views, [&](const ViewRow& row) { checked(row, shape, scratch); });
-    if (rows.has_links) require_whole_links();
     for (const std::string& name : rows.maps) static_cast<void>(read_map(*this, name));
     for (const std::string& name : rows.routes) static_cast<void>(read_route(*this, name));
   } catch (const ContractError& error) {
@@ -189,13 +171,13 @@ void SqliteTables::require_intact(UndoneRows rows) {
 
 void SqliteTables::undo() {
   std::int64_t id = 0;
-  UndoneRows rows;
+  std::optional<UndoneRows> rows;
   {
     Statement row(database_, select_history);
-    if (!step_checked(database_, row) || row.is_null(3)) fail_damaged("table history");
+    rows = step_checked(database_, row);
+    if (!rows || row.is_null(3)) fail_damaged("table history");
     id = row.integer(0);
     const auto changes = row.blob(3);
-    rows = read_undo_changes(changes);
     SqliteBytes inverse;
     void* data = nullptr;
     int code = sqlite3changeset_invert(static_cast<int>(changes.size()), changes.data(),
@@ -203,7 +185,7 @@ void SqliteTables::undo() {
     inverse.data.reset(data);
     std::string in_the_way;
     if (code == SQLITE_OK) {
-      code = sqlite3changeset_apply(database_.handle(), inverse.size, data, is_undone, on_conflict,
+      code = sqlite3changeset_apply(database_.handle(), inverse.size, data, nullptr, on_conflict,
                                     &in_the_way);
     }
     if (code == SQLITE_ABORT) {
@@ -214,7 +196,7 @@ void SqliteTables::undo() {
     if (code != SQLITE_OK) database_.fail(code);
   }
   run_statement(database_, "DELETE FROM history WHERE id = ?", id);
-  require_intact(std::move(rows));
+  require_intact(std::move(*rows));
 }
 
 }  // namespace panonav

@@ -6,9 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <optional>
 #include <string_view>
 
 #include "panonav/core/error.hpp"
@@ -37,18 +35,18 @@ struct UndoTable {
   std::vector<Column> columns;
 };
 
-/// The tables of `create_schema` whose rows are kept.
+/// Tables whose rows are kept, with the columns that `create_schema` gives them.
 const std::array<UndoTable, 8>& undo_tables() {
   static const std::array<UndoTable, 8> tables{{
       {"views",
        {integer_key, text, real_or_null, real_or_null, real_or_null, real_or_null, blob, integer}},
       {"thumbnails", {integer_key, blob, integer}},
-      {"features", {integer_key, blob, integer}},
       {"links", {integer_key, integer_key, integer, integer}},
       {"maps", {text_key, blob, blob, integer}},
       {"settings", {text_key, any, integer}},
       {"routes", {text_key, integer, integer, integer}},
       {"route_blocks", {text_key, integer_key, blob, integer}},
+      {"features", {integer_key, blob, integer}},
   }};
   return tables;
 }
@@ -141,6 +139,7 @@ class ChangeReader {
   }
 
   static bool can_hold(const Column& column, const Field& field) {
+    if (field.type == FieldType::missing) return false;
     if (field.type == FieldType::null) return column.may_be_null;
     if (field.type == FieldType::real && !std::isfinite(std::bit_cast<double>(field.number))) {
       return false;
@@ -192,7 +191,6 @@ class ChangeReader {
       rows_.views.push_back({static_cast<std::uint32_t>(field.number)});
     };
     if (table_->name == "links") {
-      rows_.has_links = true;
       note_view(row[0]);
       note_view(row[1]);
     } else if (table_->name == "maps") {
@@ -210,6 +208,12 @@ class ChangeReader {
 };
 
 }  // namespace
+
+std::vector<std::string_view> undo_table_names() {
+  std::vector<std::string_view> names;
+  for (const UndoTable& table : undo_tables()) names.push_back(table.name);
+  return names;
+}
 
 UndoneRows read_undo_changes(std::span<const std::uint8_t> changes) {
   return ChangeReader(changes).read();

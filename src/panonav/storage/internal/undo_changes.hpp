@@ -4,16 +4,19 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
 
+/// Returns the names of the tables whose rows `undo` brings back, each with a zero byte behind it.
+[[nodiscard]] std::vector<std::string_view> undo_table_names();
+
 /// Rows that kept changes would bring back, replace or drop.
 struct UndoneRows {
-  std::vector<ViewId> views;  ///< with repetitions
-  bool has_links = false;
+  std::vector<ViewId> views;  ///< of all tables, ends of links too; with repetitions
   std::set<std::string, std::less<>> maps;
   std::set<std::string, std::less<>> routes;
 };
