@@ -28,15 +28,27 @@ void report(std::string_view verb, std::string_view message) {
             << '\n';
 }
 
+/// Prints rows of memories on servers that are left out as bad, as long as the session lives.
+class LeftOutWarnings {
+ public:
+  LeftOutWarnings(panonav::command::Session& session, std::string_view verb) {
+    panonav::set_left_out_handler([&session, verb](const auto& memory, const auto& row) {
+      session.note("panonav " + std::string(verb) + ": warning: " +
+                   panonav::to_readable_line(memory.string() + ": left out: " + row.what));
+    });
+  }
+  ~LeftOutWarnings() { panonav::set_left_out_handler({}); }
+  LeftOutWarnings(const LeftOutWarnings&) = delete;
+  LeftOutWarnings& operator=(const LeftOutWarnings&) = delete;
+};
+
 ExitCode run(std::string_view& verb, std::span<const std::string> words) {
-  panonav::command::register_outbuildings();
+  panonav::command::register_components();
   const auto verbs = panonav::command::all_verbs();
   if (const auto* known = panonav::command::find_verb(verbs, words)) verb = known->name;
-  panonav::set_left_out_handler([&verb](const auto& memory, const auto& row) {
-    report(verb, "warning: " + memory.string() + ": left out: " + row.what);
-  });
   const auto command = panonav::command::parse(verbs, words);
   panonav::command::Session session(command.session);
+  const LeftOutWarnings warnings(session, verb);
   session.detail("panonav " PANONAV_VERSION " " + std::string(command.verb) + " on " +
                  std::to_string(session.executor().threads()) + " threads");
   const ExitCode code = command.run(session);

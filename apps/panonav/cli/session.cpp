@@ -61,12 +61,14 @@ Session::Session(const SessionOptions& options)
       executor_(options.threads) {}
 
 void Session::write_line(std::string_view line) {
-  clear_bar();
+  const std::lock_guard lock(mutex_);
+  erase_bar();
   std::cerr << escape_control_characters(name_flags(mask_passwords(line))) << '\n';
 }
 
 void Session::print(std::string_view text) {
-  clear_bar();
+  const std::lock_guard lock(mutex_);
+  erase_bar();
   const std::string line = mask_passwords(text);
   std::cout << (options_.json ? line : escape_control_characters(line)) << '\n';
 }
@@ -95,11 +97,17 @@ void Session::suggest(std::initializer_list<std::string_view> command, std::stri
 }
 
 void Session::draw_bar(std::string_view bar) {
+  const std::lock_guard lock(mutex_);
   std::cerr << "\r\033[K" << bar << std::flush;
   bar_drawn_ = true;
 }
 
 void Session::clear_bar() {
+  const std::lock_guard lock(mutex_);
+  erase_bar();
+}
+
+void Session::erase_bar() {
   if (!bar_drawn_) return;
   std::cerr << "\r\033[K" << std::flush;
   bar_drawn_ = false;

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <initializer_list>
+#include <mutex>
 #include <string>
 #include <string_view>
 
@@ -59,8 +60,10 @@ class Session {
  private:
   [[nodiscard]] std::string apply_style(std::string_view text, std::string_view code) const;
   void write_line(std::string_view line);
+  void erase_bar();
   SessionOptions options_;
   bool colours_;
+  std::mutex mutex_;  // of what is written: warnings come from any thread
   bool bar_drawn_ = false;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   Executor executor_;
