@@ -96,7 +96,7 @@ void plan_around(benchmark::State& state) {
   Random random(3);
   for (auto _ : state) {
     const std::size_t node = random.index(graph().size());
-    const std::size_t area = planning.areas().to_memory_area[node];
+    const std::size_t area = planning.areas().area_of[node];
     const std::size_t shut = graph().exits(node).front().edge;
     planning.block({&shut, 1});
     benchmark::DoNotOptimize(planning.field(area));

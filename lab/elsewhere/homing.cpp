@@ -25,17 +25,22 @@ namespace {
 constexpr double homing_radius_m = 1.5;
 constexpr double arrived_m = 0.1;
 
-/// A home vector between two views, and its angular error where the true direction is known.
-struct HomeAnswered {
-  bool answered = false;
-  double direction_error_rad = 0.0;
+/// A home vector between two views of one place.
+struct HomeAnswer {
+  std::optional<double> direction_error_rad;  ///< nullopt: no direction
   double probability = 0.0;
 };
 
-HomeAnswered find_home(const Panorama& goal, const Panorama& current) {
-  const HomingGuide guide(Observation(goal), PictureSource{});
-  const HomingResult way = guide.home(Observation(current));
-  return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.probability};
+bool has_direction(const HomeAnswer& answer) {
+  return answer.direction_error_rad.has_value();
+}
+
+bool has_direction(const HomingResult& home) {
+  return home.direction_rad.has_value();
+}
+
+HomingResult compute_home(const Panorama& goal, const Panorama& current) {
+  return HomingGuide(Observation(goal), PictureSource{}).home(Observation(current));
 }
 
 /// Returns the angle between `direction_rad`, in the frame of a robot at `from`, and the direction
@@ -45,10 +50,12 @@ double direction_error_rad(double direction_rad, const Pose2& from, const Pose2&
   return std::abs(angle_difference(direction_rad + from.heading_rad, truth));
 }
 
-HomeAnswered find_home(const simulation::PlacedView& goal, const simulation::PlacedView& current) {
-  HomeAnswered answer = find_home(goal.panorama, current.panorama);
-  answer.direction_error_rad =
-      direction_error_rad(answer.direction_error_rad, current.pose, goal.pose);
+HomeAnswer find_home(const simulation::PlacedView& goal, const simulation::PlacedView& current) {
+  const HomingResult home = compute_home(goal.panorama, current.panorama);
+  HomeAnswer answer{std::nullopt, home.probability};
+  if (home.direction_rad) {
+    answer.direction_error_rad = direction_error_rad(*home.direction_rad, current.pose, goal.pose);
+  }
   return answer;
 }
 
@@ -99,10 +106,12 @@ std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t lev
          std::to_string(wrongly) + " say that they arrived";
 }
 
+/// Adds how many of the answers have a direction. `Answer`: HomeAnswer or HomingResult.
+template <class Answer>
 void add_answers(Reproduction& result, const std::string& id, const std::string& what,
-                 std::span<const HomeAnswered> answers, std::optional<Target> target) {
+                 const std::vector<Answer>& answers, std::optional<Target> target) {
   add_rate(result, id, what,
-           count_where(answers, [](const HomeAnswered& answer) { return answer.answered; }),
+           count_where(answers, [](const Answer& answer) { return has_direction(answer); }),
            answers.size(), target);
 }
 
@@ -136,12 +145,13 @@ class HomeVectors {
     std::size_t off = 0;
     std::map<std::string, std::size_t> off_in;
     for (std::size_t i = 0; i < answers.size(); ++i) {
-      const bool is_right = answers[i].direction_error_rad <= radians(45.0);
-      if (answers[i].answered && answers[i].probability >= 0.9) {
+      const bool is_right =
+          answers[i].direction_error_rad.value_or(std::numbers::pi) <= radians(45.0);
+      if (has_direction(answers[i]) && answers[i].probability >= 0.9) {
         ++sure_;
         surely_right_ += is_right ? 1 : 0;
       }
-      if (!answers[i].answered || is_right) continue;
+      if (!has_direction(answers[i]) || is_right) continue;
       ++off;
       ++off_in[pairs[i].ground->name];
     }
@@ -152,7 +162,7 @@ class HomeVectors {
     add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
                 std::nullopt);
     const std::size_t answered =
-        count_where(answers, [](const HomeAnswered& answer) { return answer.answered; });
+        count_where(answers, [](const HomeAnswer& answer) { return has_direction(answer); });
     if (answered == 0) return;
     add_rate(result, id + ".off", what + "of these, off by more than 45 degrees", off, answered,
              at_most(0.05));
@@ -186,8 +196,8 @@ class HomeVectors {
                 "views of two scenes or worlds: home vectors with a direction",
                 simulation::make_each(elsewhere_.executor, foreign.size(),
                                       [&](std::size_t i) {
-                                        return find_home(foreign[i].first->panorama,
-                                                         foreign[i].second->panorama);
+                                        return compute_home(foreign[i].first->panorama,
+                                                            foreign[i].second->panorama);
                                       }),
                 at_most(0.02));
   }
@@ -202,9 +212,10 @@ class HomeVectors {
                     (smoothed > 1 ? " smoothed over " + std::to_string(smoothed) + " columns"
                                   : std::string()) +
                     ": home vectors with a direction",
-                simulation::make_each(
-                    elsewhere_.executor, pairs_,
-                    [&](std::size_t i) { return find_home(noise_of(2 * i), noise_of(2 * i + 1)); }),
+                simulation::make_each(elsewhere_.executor, pairs_,
+                                      [&](std::size_t i) {
+                                        return compute_home(noise_of(2 * i), noise_of(2 * i + 1));
+                                      }),
                 at_most(0.02));
   }
 

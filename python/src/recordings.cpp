@@ -45,7 +45,7 @@ std::optional<PictureSource> remembered_source(const std::filesystem::path& memo
 
 namespace {
 
-py::object to_image(const Observation& observation) {
+py::object get_picture(const Observation& observation) {
   if (const auto* panorama = std::get_if<Panorama>(&observation.picture))
     return py::cast(*panorama);
   return array_of(std::get<Image>(observation.picture));
@@ -72,7 +72,7 @@ void bind_observations(py::module_& m) {
            "`picture`: a Panorama, an array of pixels as the camera delivers them (uint8), or the "
            "path of a picture. `odometry`: absolute, in a frame that drifts. `pose`: in the world "
            "frame, where it is known. `tilt`: (roll, pitch) in radians.")
-      .def_property_readonly("picture", &to_image, "A Panorama, or an array of pixels.")
+      .def_property_readonly("picture", &get_picture, "A Panorama, or an array of pixels.")
       .def_readonly("name", &Observation::name,
                     "Of the view that a memory keeps; messages name it.")
       .def_readonly("stamp_s", &Observation::stamp_s, "When it was taken, seconds, or None.")

@@ -167,8 +167,7 @@ void GoalDriver::publish_areas() {
   const auto& planner = navigator_->planner();
   for (std::size_t node = 0; node < planner.graph().size(); ++node) {
     const auto& pose = memory_->tracker.memory().info(planner.graph().view(node)).pose;
-    if (pose)
-      cloud.add(pose->position(), static_cast<double>(planner.areas().to_memory_area[node]));
+    if (pose) cloud.add(pose->position(), static_cast<double>(planner.areas().area_of[node]));
   }
   areas_.publish(cloud.message(now_ns_(), setup_.frames.map, "area"));
 }

@@ -44,7 +44,7 @@ void expect_like(const Panorama& a, const Panorama& b, double tolerance) {
 
 // The kept band is level however the robot leans: what lies beside it in the picture is looked at.
 TEST(PanoramaReader, LevelsTheBandOfASphere) {
-  const auto to_image = [](const Tilt& tilt) {
+  const auto make_image = [](const Tilt& tilt) {
     Image picture(512, 256, 1);
     for (int v = 0; v < 256; ++v) {
       for (int u = 0; u < 512; ++u) {
@@ -62,8 +62,8 @@ TEST(PanoramaReader, LevelsTheBandOfASphere) {
     if (cut) source.layout.kept_elevations = ElevationBand{radians(-30.0), radians(40.0)};
     if (!cut) source.layout.kept_elevations.reset();
     const PanoramaReader reader(source, {cut ? 60 : 0, 256});
-    const Image level = to_image({});
-    const Image tilted = to_image(leaning);
+    const Image level = make_image({});
+    const Image tilted = make_image(leaning);
     const Panorama truth = reader.convert(level.view());
     expect_like(reader.convert(tilted.view(), leaning), truth, 0.01);
     EXPECT_EQ(reader.convert(level.view(), {}), truth);
@@ -77,7 +77,7 @@ TEST(PanoramaReader, LevelsMirrorPicturesBeyondTheBandThatIsKept) {
   camera.centre = {240.0, 240.0};
   camera.inner_radius_px = 20.0;
   camera.rim_radius_px = 235.0;
-  const auto to_image = [&](const Tilt& tilt) {
+  const auto make_image = [&](const Tilt& tilt) {
     Image picture(480, 480, 1);
     for (int v = 0; v < 480; ++v) {
       for (int u = 0; u < 480; ++u) {
@@ -95,8 +95,8 @@ TEST(PanoramaReader, LevelsMirrorPicturesBeyondTheBandThatIsKept) {
   source.camera = camera;
   source.layout.kept_elevations = ElevationBand{radians(-20.0), radians(30.0)};
   const PanoramaReader reader(source, {50, 256});
-  const Image level = to_image({});
-  const Image tilted = to_image(leaning);
+  const Image level = make_image({});
+  const Image tilted = make_image(leaning);
   const Panorama truth = reader.convert(level.view());
   expect_like(reader.convert(tilted.view(), leaning), truth, 0.03);
   // Without the sensor it is another picture.

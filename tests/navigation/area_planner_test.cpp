@@ -24,7 +24,7 @@ bool is_connected(const NavigationGraph& graph, const SubAreas& areas, std::size
     open.pop_back();
     ++count;
     for (const auto& exit : graph.exits(node)) {
-      if (seen[exit.node] != 0 || areas.to_memory_area[exit.node] != area) continue;
+      if (seen[exit.node] != 0 || areas.area_of[exit.node] != area) continue;
       seen[exit.node] = 1;
       open.push_back(exit.node);
     }
@@ -39,15 +39,15 @@ void expect_partition(const NavigationGraph& graph, const SubAreas& areas) {
     EXPECT_TRUE(is_connected(graph, areas, a)) << "area " << a;
     views += areas.nodes[a].size();
     for (std::size_t place = 0; place < areas.nodes[a].size(); ++place) {
-      EXPECT_EQ(areas.to_memory_area[areas.nodes[a][place]], a);
+      EXPECT_EQ(areas.area_of[areas.nodes[a][place]], a);
       EXPECT_EQ(areas.place_of[areas.nodes[a][place]], place);
     }
   }
   EXPECT_EQ(views, graph.size());
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {
     const NavigationGraph::Edge& edge = graph.edges()[p];
-    const bool crosses = areas.to_memory_area[*graph.node_of(edge.a)] !=
-                         areas.to_memory_area[*graph.node_of(edge.b)];
+    const bool crosses =
+        areas.area_of[*graph.node_of(edge.a)] != areas.area_of[*graph.node_of(edge.b)];
     EXPECT_EQ(std::ranges::binary_search(areas.gates, p), crosses);
   }
 }

@@ -51,7 +51,7 @@ TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
   for (const std::size_t node : way) {
     const auto decision = navigator.observe(memory.signature(graph.view(node)));
     EXPECT_EQ(decision.nearest, graph.view(node));
-    EXPECT_EQ(decision.area, areas.to_memory_area[node]);
+    EXPECT_EQ(decision.area, areas.area_of[node]);
     entered.insert(decision.area);
     // An area and those views of its neighbours that its gates lead to.
     EXPECT_LT(navigator.loaded_views(), 600U);

@@ -135,18 +135,18 @@ double area(const Scene& scene) {
 }
 
 TEST_F(MeshFile, ColladaPolygonsMayHaveHoles) {
-  const auto to_memory_area = [&](const std::string& polygons) {
+  const auto polygon_area = [&](const std::string& polygons) {
     return area(load_mesh(folder_.write(
         "holes.dae",
         collada("<polygons count='1'><input semantic='VERTEX' source='#v' offset='0'/>" + polygons +
                 "</polygons>"))));
   };
-  EXPECT_NEAR(to_memory_area("<p>0 1 2 3</p>"), 16.0, 1e-5);
-  EXPECT_NEAR(to_memory_area("<ph><p>0 1 2 3</p><h>4 7 6 5</h></ph>"), 12.0, 1e-5);
+  EXPECT_NEAR(polygon_area("<p>0 1 2 3</p>"), 16.0, 1e-5);
+  EXPECT_NEAR(polygon_area("<ph><p>0 1 2 3</p><h>4 7 6 5</h></ph>"), 12.0, 1e-5);
   // Turned the same way as the outline, which exporters do as well.
-  EXPECT_NEAR(to_memory_area("<ph><p>0 1 2 3</p><h>4 5 6 7</h></ph>"), 12.0, 1e-5);
-  EXPECT_NEAR(to_memory_area("<ph><p>0 1 2 3</p><h>4 7 6 5</h><h>8 9 10</h></ph>"), 11.7, 1e-5);
-  EXPECT_THROW((void)to_memory_area("<ph><p>0 1 2 3</p><h>4 5 99</h></ph>"), FileError);
+  EXPECT_NEAR(polygon_area("<ph><p>0 1 2 3</p><h>4 5 6 7</h></ph>"), 12.0, 1e-5);
+  EXPECT_NEAR(polygon_area("<ph><p>0 1 2 3</p><h>4 7 6 5</h><h>8 9 10</h></ph>"), 11.7, 1e-5);
+  EXPECT_THROW((void)polygon_area("<ph><p>0 1 2 3</p><h>4 5 99</h></ph>"), FileError);
 }
 
 TEST_F(MeshFile, ColladaNumbersMayHaveBlanksBeforeThem) {

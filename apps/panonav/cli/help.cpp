@@ -83,7 +83,7 @@ std::string format_help_line(const ArgumentInfo& argument) {
   return argument.help + (notes.empty() ? "" : " (" + notes + ")");
 }
 
-std::string format_forms(const ArgumentInfo& argument) {
+std::string format_flags_and_value(const ArgumentInfo& argument) {
   return (argument.short_form.empty() ? "" : argument.short_form + ", ") + argument.name +
          (argument.value.empty() ? "" : " " + argument.value);
 }
@@ -130,7 +130,7 @@ std::string format_help(const Description& description, bool all) {
                                            : "Options";
       if (group != title) text += "\n" + group + ":\n";
       title = group;
-      text += format_row(format_forms(argument), format_help_line(argument), 28);
+      text += format_row(format_flags_and_value(argument), format_help_line(argument), 28);
     }
   }
   if (!verb.details.empty()) text.append("\n").append(wrap_text(verb.details, 0, 0)).append("\n");

@@ -103,7 +103,7 @@ std::string manual_page(const Description& description) {
       if (group != title)
         text += (positional ? ".SH ARGUMENTS\n" : ".SS \"" + escape_roff(group) + "\"\n");
       title = group;
-      text += format_entry(format_forms(argument), format_help_line(argument) + ".");
+      text += format_entry(format_flags_and_value(argument), format_help_line(argument) + ".");
     }
   }
   text += ".SH EXAMPLES\n.nf\n";
@@ -128,7 +128,7 @@ std::string manual_overview(std::span<const Description> verbs) {
   text += ".SH OPTIONS\n";
   for (const auto& argument : verbs.front().arguments) {
     if (argument.of_every_verb)
-      text += format_entry(format_forms(argument), format_help_line(argument) + ".");
+      text += format_entry(format_flags_and_value(argument), format_help_line(argument) + ".");
   }
   text += format_exit_status() + format_entries("ENVIRONMENT", environment) +
           format_entries("FILES", files) + ".SH SEE ALSO\n";

@@ -12,8 +12,8 @@ namespace panonav::command {
 
 namespace {
 
-[[noreturn]] void throw_wrong_option(std::string_view flag, std::string_view text,
-                                     std::string_view allowed) {
+[[noreturn]] void throw_invalid_value(std::string_view flag, std::string_view text,
+                                      std::string_view allowed) {
   throw UsageError(std::string(flag) + " is '" + std::string(text) +
                    "'; allowed: " + std::string(allowed));
 }
@@ -48,7 +48,7 @@ bool looks_like_flag(std::string_view word) {
 double parse_number(std::string_view flag, std::string_view text) {
   double value = 0.0;
   if (!read_number(text, value) || !std::isfinite(value))
-    throw_wrong_option(flag, text, "a number");
+    throw_invalid_value(flag, text, "a number");
   return value;
 }
 
@@ -61,7 +61,7 @@ void TextApplier::visit(const OptionInfo& info, int& value) {
   const std::string* typed = text(info);
   if (typed == nullptr) return;
   if (!read_number(*typed, value)) {
-    throw_wrong_option(info.name, *typed, "whole numbers " + describe_range(info));
+    throw_invalid_value(info.name, *typed, "whole numbers " + describe_range(info));
   }
 }
 
@@ -72,7 +72,7 @@ void TextApplier::visit(const OptionInfo& info, double& value) {
 void TextApplier::visit(const OptionInfo& info, bool& value) {
   const std::string* typed = text(info);
   if (typed == nullptr) return;
-  if (*typed != "true" && *typed != "false") throw_wrong_option(info.name, *typed, "true, false");
+  if (*typed != "true" && *typed != "false") throw_invalid_value(info.name, *typed, "true, false");
   value = *typed == "true";
 }
 
@@ -81,7 +81,7 @@ void TextApplier::visit(const OptionInfo& info, std::span<const std::string_view
   const std::string* typed = text(info);
   if (typed == nullptr) return;
   const auto found = std::ranges::find(choices, *typed);
-  if (found == choices.end()) throw_wrong_option(info.name, *typed, join_texts(choices));
+  if (found == choices.end()) throw_invalid_value(info.name, *typed, join_texts(choices));
   value = static_cast<int>(found - choices.begin());
 }
 

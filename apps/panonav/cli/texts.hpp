@@ -27,7 +27,7 @@ struct ExitMeaning {
 /// "Highest speed (default 0.3; > 0 and <= 100)".
 [[nodiscard]] std::string format_help_line(const ArgumentInfo& argument);
 /// "-o, --out FILE".
-[[nodiscard]] std::string format_forms(const ArgumentInfo& argument);
+[[nodiscard]] std::string format_flags_and_value(const ArgumentInfo& argument);
 /// "[OPTIONS] -o FILE IMAGE..."
 [[nodiscard]] std::string usage(const Description& description);
 /// The title above the arguments of its group in full texts: "Options of [localiser]".

@@ -18,7 +18,7 @@ namespace panonav::command {
 
 /// Registers the components of this build (recordings, fleet, ...) with the library; called once,
 /// before a verb runs.
-void register_outbuildings();
+void register_components();
 
 /// Returns every verb of this build, in the order in which a newcomer meets them.
 [[nodiscard]] std::vector<Verb> all_verbs();

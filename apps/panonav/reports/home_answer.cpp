@@ -8,7 +8,7 @@
 
 namespace panonav::command {
 
-std::string describe_angle(double direction_rad) {
+std::string describe_direction(double direction_rad) {
   const double off = std::abs(degrees(direction_rad));
   if (off < 0.5) return "straight ahead";
   if (off >= 179.5) return "straight behind";
@@ -22,7 +22,7 @@ std::string describe_rotation(double heading_rad) {
   const double turned = wrap_angle(-heading_rad);
   if (std::abs(degrees(turned)) < 0.5) return "same heading as at home";
   if (std::abs(degrees(turned)) >= 179.5) return "opposite heading to the heading at home";
-  return "the robot has rotated by " + describe_angle(turned);
+  return "the robot has rotated by " + describe_direction(turned);
 }
 
 std::string explain_no_direction(const HomingResult& way) {

@@ -26,7 +26,7 @@ struct HomeAnswer {
 };
 
 /// "34 degrees to the left", "straight ahead".
-[[nodiscard]] std::string describe_angle(double direction_rad);
+[[nodiscard]] std::string describe_direction(double direction_rad);
 /// Describes the robot's rotation relative to the home view.
 [[nodiscard]] std::string describe_rotation(double heading_rad);
 /// Why there is no direction.

@@ -28,7 +28,7 @@ std::set<std::size_t> choose_shown(std::size_t count) {
 std::string make_caption(const HomeAnswer& answer) {
   const HomingResult& way = answer.way;
   if (!way.direction_rad) return answer.file + ": no direction home, " + explain_no_direction(way);
-  return answer.file + ": home is " + describe_angle(*way.direction_rad) + ", about " +
+  return answer.file + ": home is " + describe_direction(*way.direction_rad) + ", about " +
          format_fixed(way.distance_r, 2) + " R away; " + describe_rotation(way.vector.heading_rad);
 }
 
@@ -101,14 +101,14 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
   if (answers.size() == 1 && !first.known) {
     page.add_figures({{"no answer", explain_no_direction(first)}});
   } else if (answers.size() == 1) {
-    page.add_figures(
-        {{first.direction_rad ? describe_angle(*first.direction_rad) : "none", "direction home"},
-         {format_fixed(first.distance_r, 2) + " R",
-          "distance; R is the typical distance of the objects around"},
-         {format_fixed(degrees(first.turn_rad), 0) + " degrees",
-          "rotation of the robot since then, left positive"},
-         {format_fixed(first.probability, 2),
-          "probability that the direction is right within 45 degrees"}});
+    page.add_figures({{first.direction_rad ? describe_direction(*first.direction_rad) : "none",
+                       "direction home"},
+                      {format_fixed(first.distance_r, 2) + " R",
+                       "distance; R is the typical distance of the objects around"},
+                      {format_fixed(degrees(first.turn_rad), 0) + " degrees",
+                       "rotation of the robot since then, left positive"},
+                      {format_fixed(first.probability, 2),
+                       "probability that the direction is right within 45 degrees"}});
   }
   page.begin_section(goal.panorama ? "Both views" : "Current image");
   page.add_text(std::string(goal.panorama ? "Above: the view at home, rotated to the current "
@@ -131,7 +131,8 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
     const auto if_known = [&](double value, int digits) {
       return way.known ? format_fixed(value, digits) : std::string("no answer");
     };
-    rows.push_back({answer.file, way.direction_rad ? describe_angle(*way.direction_rad) : "none",
+    rows.push_back({answer.file,
+                    way.direction_rad ? describe_direction(*way.direction_rad) : "none",
                     if_known(way.distance_r, 3), if_known(degrees(way.turn_rad), 1),
                     format_fixed(way.vector.correlation, 3), format_fixed(way.vector.residual, 3),
                     format_fixed(way.probability, 3)});

@@ -94,7 +94,7 @@ void MissionMoments::add_field(recordings::RunMoment& moment) const {
     moment.reference_views.push_back(
         {robot_.info(remembered_.graph.view(i)).name,
          std::isfinite(pose.heading_rad) ? std::optional(pose.heading_rad) : std::nullopt});
-    areas.push_back(robot_.planner().areas().to_memory_area[i]);
+    areas.push_back(robot_.planner().areas().area_of[i]);
     if (!guides[i].direction_rad || !std::isfinite(pose.heading_rad)) continue;
     moment.directions.push_back(
         {pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + *guides[i].direction_rad)});

@@ -55,7 +55,7 @@ std::string format_line(const HomeAnswer& answer, Session& session) {
     return answer.file + "  " + session.red("no answer") + ": " + explain_no_direction(way);
   const std::string sure = "; probability " + format_fixed(way.probability, 2);
   if (way.direction_rad) {
-    return answer.file + "  home is " + session.green(describe_angle(*way.direction_rad)) +
+    return answer.file + "  home is " + session.green(describe_direction(*way.direction_rad)) +
            ", about " + format_fixed(way.distance_r, 2) + " R away; " +
            describe_rotation(way.vector.heading_rad) + sure;
   }

@@ -42,14 +42,13 @@ AreaPlanner::AreaPlanner(NavigationGraph graph, SubAreas areas, const PlannerOpt
       blocked_(graph_.edges().size(), 0),
       ends_(areas_.nodes.size()) {
   validate(options_);
-  require(areas_.to_memory_area.size() == graph_.size() && areas_.place_of.size() == graph_.size(),
-          "views in areas", static_cast<double>(areas_.to_memory_area.size()),
-          "those of the graph");
+  require(areas_.area_of.size() == graph_.size() && areas_.place_of.size() == graph_.size(),
+          "views in areas", static_cast<double>(areas_.area_of.size()), "those of the graph");
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> known;
   for (const std::size_t gate : areas_.gates) {
     const NavigationGraph::Edge& edge = graph_.edges()[gate];
-    const auto [low, high] = std::minmax(areas_.to_memory_area[*graph_.node_of(edge.a)],
-                                         areas_.to_memory_area[*graph_.node_of(edge.b)]);
+    const auto [low, high] = std::minmax(areas_.area_of[*graph_.node_of(edge.a)],
+                                         areas_.area_of[*graph_.node_of(edge.b)]);
     const auto [found, is_new] = known.try_emplace({low, high}, borders_.size());
     if (is_new) {
       ends_[low].borders.push_back(borders_.size());
@@ -71,7 +70,7 @@ std::size_t AreaPlanner::used_gates() const noexcept {
 std::pair<std::size_t, std::size_t> AreaPlanner::ends_of(std::size_t edge, std::size_t area) const {
   const std::size_t a = *graph_.node_of(graph_.edges()[edge].a);
   const std::size_t b = *graph_.node_of(graph_.edges()[edge].b);
-  return areas_.to_memory_area[a] == area ? std::pair(a, b) : std::pair(b, a);
+  return areas_.area_of[a] == area ? std::pair(a, b) : std::pair(b, a);
 }
 
 std::vector<Guide> AreaPlanner::search_from(std::size_t area, std::size_t node) const {
@@ -82,7 +81,7 @@ std::vector<Guide> AreaPlanner::search_from(std::size_t area, std::size_t node) 
 // Returns the index among the gate ends of the next area of the one to which the exit leads.
 std::optional<std::size_t> AreaPlanner::find_end_beyond(std::size_t area,
                                                         const NavigationGraph::Exit& exit) const {
-  const std::size_t beyond = areas_.to_memory_area[exit.node];
+  const std::size_t beyond = areas_.area_of[exit.node];
   if (beyond == area || blocked_[exit.edge] != 0) return std::nullopt;
   const auto& nodes = ends_[beyond].nodes;
   const auto found = std::ranges::lower_bound(nodes, exit.node);
@@ -159,7 +158,7 @@ void AreaPlanner::plan_over_areas() {
     known = length;
     open.push({length, area, end});
   };
-  const std::size_t goal_area = areas_.to_memory_area[*goal_];
+  const std::size_t goal_area = areas_.area_of[*goal_];
   const auto guides = search_from(goal_area, *goal_);
   for (std::size_t end = 0; end < ends_[goal_area].nodes.size(); ++end) {
     relax(guides[areas_.place_of[ends_[goal_area].nodes[end]]].path_length, goal_area, end);
@@ -175,7 +174,7 @@ void AreaPlanner::plan_over_areas() {
     }
     for (const NavigationGraph::Exit& exit : graph_.exits(ends.nodes[at.end])) {
       if (const auto end = find_end_beyond(at.area, exit)) {
-        relax(at.length + graph_.edges()[exit.edge].length, areas_.to_memory_area[exit.node], *end);
+        relax(at.length + graph_.edges()[exit.edge].length, areas_.area_of[exit.node], *end);
       }
     }
   }
@@ -187,7 +186,7 @@ void AreaPlanner::block(std::span<const std::size_t> edges) {
     require(edge < blocked_.size(), "edge", static_cast<double>(edge), "an edge of the graph");
     blocked_[edge] = 1;
     for (const ViewId view : {graph_.edges()[edge].a, graph_.edges()[edge].b}) {
-      changed.insert(areas_.to_memory_area[*graph_.node_of(view)]);
+      changed.insert(areas_.area_of[*graph_.node_of(view)]);
     }
   }
   // Another gate of the border replaces a blocked one.
@@ -205,7 +204,7 @@ void AreaPlanner::unblock_all() {
   for (std::size_t edge = 0; edge < blocked_.size(); ++edge) {
     if (std::exchange(blocked_[edge], std::uint8_t{0}) == 0) continue;
     for (const ViewId view : {graph_.edges()[edge].a, graph_.edges()[edge].b}) {
-      changed.insert(areas_.to_memory_area[*graph_.node_of(view)]);
+      changed.insert(areas_.area_of[*graph_.node_of(view)]);
     }
   }
   for (Border& border : borders_) {
@@ -222,13 +221,13 @@ std::size_t AreaPlanner::blocked_edges() const noexcept {
 std::vector<Guide> AreaPlanner::field(std::size_t area) const {
   require(area < ends_.size(), "area", static_cast<double>(area), "one of the areas");
   std::vector<SearchRoot> roots;
-  if (goal_ && areas_.to_memory_area[*goal_] == area) roots.push_back({*goal_, 0.0, *goal_, 0});
+  if (goal_ && areas_.area_of[*goal_] == area) roots.push_back({*goal_, 0.0, *goal_, 0});
   for (const std::size_t node : ends_[area].nodes) {
     for (const NavigationGraph::Exit& exit : graph_.exits(node)) {
       const auto end = find_end_beyond(area, exit);
       if (!end) continue;
-      const double length = ends_[areas_.to_memory_area[exit.node]].lengths_to_goal[*end] +
-                            graph_.edges()[exit.edge].length;
+      const double length =
+          ends_[areas_.area_of[exit.node]].lengths_to_goal[*end] + graph_.edges()[exit.edge].length;
       if (length < unreachable) roots.push_back({node, length, exit.node, exit.edge});
     }
   }
@@ -242,7 +241,7 @@ std::vector<std::size_t> AreaPlanner::plan_path(std::size_t start) const {
   std::map<std::size_t, std::vector<Guide>> fields;
   std::vector<std::size_t> path;
   for (std::size_t node = start;;) {
-    const std::size_t area = areas_.to_memory_area[node];
+    const std::size_t area = areas_.area_of[node];
     const auto [found, is_new] = fields.try_emplace(area);
     if (is_new) found->second = field(area);
     const Guide& guide = found->second[areas_.place_of[node]];

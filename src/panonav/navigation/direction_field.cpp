@@ -34,7 +34,7 @@ std::vector<Guide> search_area(const NavigationGraph& graph, const SubAreas& are
   using Open = std::pair<double, std::size_t>;
   std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
   for (const SearchRoot& root : roots) {
-    require(root.node < graph.size() && areas.to_memory_area[root.node] == area, "node of a root",
+    require(root.node < graph.size() && areas.area_of[root.node] == area, "node of a root",
             static_cast<double>(root.node), "a node of the area");
     Guide& guide = guides[areas.place_of[root.node]];
     if (!(root.path_length < guide.path_length)) continue;
@@ -46,7 +46,7 @@ std::vector<Guide> search_area(const NavigationGraph& graph, const SubAreas& are
     open.pop();
     if (length > guides[areas.place_of[node]].path_length) continue;
     for (const NavigationGraph::Exit& exit : graph.exits(node)) {
-      if (areas.to_memory_area[exit.node] != area) continue;
+      if (areas.area_of[exit.node] != area) continue;
       if (!blocked.empty() && blocked[exit.edge] != 0) continue;
       const double longer = length + graph.edges()[exit.edge].length;
       Guide& guide = guides[areas.place_of[exit.node]];
@@ -69,8 +69,7 @@ std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas&
   Pose2 node_from_here;
   std::optional<double> first;
   std::size_t here = node;
-  for (int i = 0;
-       i < options.links_ahead && areas.to_memory_area[here] == areas.to_memory_area[node]; ++i) {
+  for (int i = 0; i < options.links_ahead && areas.area_of[here] == areas.area_of[node]; ++i) {
     const Guide& guide = guides[areas.place_of[here]];
     if (!guide.is_reachable() || guide.next == here) break;
     const auto motion = graph.motion_from(here, guide.edge);

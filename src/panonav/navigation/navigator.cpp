@@ -182,7 +182,7 @@ bool Navigator::Core::return_to_known_place(Step& step) {
   if (!direction_rad) return false;
   const SubAreas& areas = planner.areas();
   if (place.doubt.unknown_steps == options.min_agreeing_steps &&
-      areas.to_memory_area[node] == views.area()) {
+      areas.area_of[node] == views.area()) {
     // Something hides the place that should come next, as an obstacle does.
     const Guide& ahead = plan.field.at(areas.place_of[node]);
     if (ahead.is_reachable() && ahead.next != node) {

@@ -190,7 +190,7 @@ std::vector<std::vector<std::size_t>> find_pieces(const NavigationGraph& graph,
 
 SubAreas make_single_area(const NavigationGraph& graph) {
   SubAreas areas;
-  areas.to_memory_area.assign(graph.size(), 0);
+  areas.area_of.assign(graph.size(), 0);
   areas.place_of.resize(graph.size());
   std::iota(areas.place_of.begin(), areas.place_of.end(), 0U);
   areas.nodes.push_back(areas.place_of);
@@ -200,7 +200,7 @@ SubAreas make_single_area(const NavigationGraph& graph) {
 SubAreas divide_into_areas(const NavigationGraph& graph, const SubAreaOptions& options) {
   validate(options);
   SubAreas areas;
-  areas.to_memory_area.resize(graph.size());
+  areas.area_of.resize(graph.size());
   areas.place_of.resize(graph.size());
   std::vector<std::size_t> number(graph.size(), none);
   std::vector<std::size_t> all(graph.size());
@@ -229,14 +229,13 @@ SubAreas divide_into_areas(const NavigationGraph& graph, const SubAreaOptions& o
   std::ranges::sort(areas.nodes);
   for (std::size_t a = 0; a < areas.nodes.size(); ++a) {
     for (std::size_t place = 0; place < areas.nodes[a].size(); ++place) {
-      areas.to_memory_area[areas.nodes[a][place]] = a;
+      areas.area_of[areas.nodes[a][place]] = a;
       areas.place_of[areas.nodes[a][place]] = place;
     }
   }
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {
     const NavigationGraph::Edge& edge = graph.edges()[p];
-    if (areas.to_memory_area[*graph.node_of(edge.a)] !=
-        areas.to_memory_area[*graph.node_of(edge.b)]) {
+    if (areas.area_of[*graph.node_of(edge.a)] != areas.area_of[*graph.node_of(edge.b)]) {
       areas.gates.push_back(p);
     }
   }
@@ -252,8 +251,7 @@ std::vector<std::uint8_t> find_bottlenecks(const NavigationGraph& graph, const S
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> widths;
   const auto border_of = [&](std::size_t gate) {
     const auto [a, b] = ends_of(gate);
-    return std::pair<std::size_t, std::size_t>(
-        std::minmax(areas.to_memory_area[a], areas.to_memory_area[b]));
+    return std::pair<std::size_t, std::size_t>(std::minmax(areas.area_of[a], areas.area_of[b]));
   };
   for (const std::size_t gate : areas.gates) ++widths[border_of(gate)];
   std::vector<std::size_t> ends;

@@ -28,7 +28,7 @@ struct Navigator::Core::PlaceCandidates {
 
 void Navigator::Core::set_place(std::size_t node, Step& step) {
   place.node = node;
-  const std::size_t area = planner.areas().to_memory_area[node];
+  const std::size_t area = planner.areas().area_of[node];
   if (views.area() == area) return;
   views.enter(graph(), planner.areas(), area);
   plan.field = planner.field(area);
@@ -207,12 +207,12 @@ void Navigator::Core::prefetch_next_area() {
   const SubAreas& areas = planner.areas();
   const std::size_t here = *views.area();
   std::size_t node = *place.node;
-  while (areas.to_memory_area[node] == here) {
+  while (areas.area_of[node] == here) {
     const std::size_t next = plan.field[areas.place_of[node]].next;
     if (next == node) return;  // the goal
     node = next;
   }
-  views.prefetch(graph(), areas, areas.to_memory_area[node], options.views_ahead);
+  views.prefetch(graph(), areas, areas.area_of[node], options.views_ahead);
 }
 
 }  // namespace panonav
