@@ -152,7 +152,7 @@ TEST_F(SynchronisedMemory, BadRowsOfOthersAreLeftOutAndNamed) {
       "ADD CHECK (y_m BETWEEN -1e7 AND 1e7)");
 }
 
-// What a row on a server holds is not known while it is bad: files keep what they have.
+// Nobody knows what a bad row on a server held: files keep what they have.
 TEST_F(SynchronisedMemory, ABadLinkOnTheServerErasesNoLinkOfAFile) {
   share({"a"}, 4);
   open("a").link(std::vector<Link>{{ViewId{1}, ViewId{2}, Link::Kind::sequence},

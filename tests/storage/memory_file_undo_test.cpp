@@ -171,7 +171,7 @@ TEST_F(MemoryFileUndo, IsRefusedWhereItWouldOverwrite) {
   EXPECT_TRUE(file->verify().empty());
 }
 
-// What was made since then refers to a view that would go.
+// A later link or map may refer to a view that would go.
 TEST_F(MemoryFileUndo, IsRefusedWhereALinkOrAMapWouldLackAView) {
   Random random(6);
   ViewId added;
