@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <mutex>
 #include <optional>
@@ -14,6 +15,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
+#include "panonav/geometry/position_bound.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/memory_tables.hpp"
@@ -233,7 +235,7 @@ struct PlaceSearch::Implementation {
       for (const MemoryArea& area : changed_areas) {
         const double x_m = area.column * memory_area_side_m;
         const double y_m = area.row * memory_area_side_m;
-        for (const PositionRow& row :
+        for (const PosedView& row :
              own->views_within({x_m, x_m + memory_area_side_m, y_m, y_m + memory_area_side_m})) {
           if (to_memory_area(row.pose.x_m, row.pose.y_m) != area) continue;
           there.push_back(row.id);
@@ -438,11 +440,24 @@ std::vector<ViewId> PlaceSearch::Snapshot::views_within(std::span<const Position
   std::vector<ViewId> views;
   own.mark_failed_on_throw([&] {
     for (const PositionBounds& each : bounds) {
-      for (const PositionRow& row : own.tables->views_within(each)) views.push_back(row.id);
+      for (const PosedView& row : own.tables->views_within(each)) views.push_back(row.id);
     }
   });
   std::ranges::sort(views);
   views.erase(std::unique(views.begin(), views.end()), views.end());
+  return views;
+}
+
+std::vector<PosedView> PlaceSearch::Snapshot::posed_views() {
+  Implementation& own = *implementation_;
+  std::vector<PosedView> views;
+  own.mark_failed_on_throw([&] {
+    views = own.tables->views_within(
+        {-max_position_m, max_position_m, -max_position_m, max_position_m});
+  });
+  std::erase_if(views, [](const PosedView& view) {  // a bad row, which a search would leave out
+    return view.pose.heading_rad && !std::isfinite(*view.pose.heading_rad);
+  });
   return views;
 }
 

@@ -59,6 +59,7 @@ class PlaceSearch final : public IndexedMemory {
     [[nodiscard]] VisualMemory load(std::span<const ViewId> views) override;
     [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
     [[nodiscard]] std::vector<ViewId> views_within(std::span<const PositionBounds> bounds) override;
+    [[nodiscard]] std::vector<PosedView> posed_views() override;
 
    private:
     friend class PlaceSearch;

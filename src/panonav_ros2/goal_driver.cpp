@@ -67,26 +67,17 @@ void GoalDriver::make_route_driver(const Mission& mission) {
 }
 
 void GoalDriver::set_goal(Point2 goal) {
-  const std::string name = memory_->tracker.memory().info(find_nearest_view(goal)).name;
+  const Tracker& tracker = memory_->tracker;
+  const ViewId nearest = tracker.localiser().find_nearest_view(goal);
+  const VisualMemory loaded = tracker.index()->load({&nearest, 1});
+  if (loaded.empty()) throw Error("the view nearest to the goal was removed; set the goal again");
+  const std::string& name = loaded.info(nearest).name;
   if (navigator_) {
     navigator_->set_goal(name);
   } else {
     navigator_.emplace(memory_->path, name, setup_.navigator);
     publish_areas();
   }
-}
-
-ViewId GoalDriver::find_nearest_view(Point2 position) const {
-  const VisualMemory& memory = memory_->tracker.memory();
-  ViewId nearest;  // there is one: no tracker is made of a memory without positions
-  double nearest_m = std::numeric_limits<double>::infinity();
-  for (const ViewId view : memory.views()) {
-    const auto& pose = memory.info(view).pose;
-    if (!pose || distance(pose->position(), position) >= nearest_m) continue;
-    nearest_m = distance(pose->position(), position);
-    nearest = view;
-  }
-  return nearest;
 }
 
 void GoalDriver::drive(const Observation& observation, const std::optional<Pose2>& pose) {
@@ -101,7 +92,7 @@ void GoalDriver::drive(const Observation& observation, const std::optional<Pose2
 
 void GoalDriver::drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose) {
   RobotReport report;
-  if (pose) report.estimate = find_nearest_view(pose->position());
+  if (pose) report.estimate = memory_->tracker.localiser().find_nearest_view(pose->position());
   const RobotNavigator::Step step = navigator_->step(observation, report);
   const NavigationDecision& decision = step.decision;
   const std::string state(name_of(decision.state));
@@ -165,9 +156,9 @@ void GoalDriver::stop_if_silent() {
 void GoalDriver::publish_areas() {
   recordings::PointValues cloud;
   const auto& planner = navigator_->planner();
-  for (std::size_t node = 0; node < planner.graph().size(); ++node) {
-    const auto& pose = memory_->tracker.memory().info(planner.graph().view(node)).pose;
-    if (pose) cloud.add(pose->position(), static_cast<double>(planner.areas().area_of[node]));
+  for (const auto& [view, pose] : memory_->tracker.index()->posed_views()) {
+    const auto node = planner.graph().node_of(view);
+    if (node) cloud.add(pose.position(), static_cast<double>(planner.areas().area_of[*node]));
   }
   areas_.publish(cloud.message(now_ns_(), setup_.frames.map, "area"));
 }

@@ -53,7 +53,6 @@ class GoalDriver {
   static constexpr std::uint8_t warning = 1;
   static constexpr std::uint8_t error = 2;
 
-  [[nodiscard]] ViewId find_nearest_view(Point2 position) const;
   void make_route_driver(const Mission& mission);
   void set_goal(Point2 goal);
   void drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose);

@@ -30,7 +30,7 @@ LoadedMemory& MemoryLocaliser::loaded() const {
 
 void MemoryLocaliser::load(std::filesystem::path path) {
   MemoryFile file = MemoryFile::open(path, Access::read_only);
-  Tracker tracker(file, setup_.tracker);
+  Tracker tracker(path, setup_.tracker);
   std::unique_ptr<LoadedMemory> memory(
       new LoadedMemory{std::move(path), std::move(file), std::move(tracker)});
   driver_.set_memory(*memory);
@@ -53,8 +53,12 @@ void MemoryLocaliser::load_neighbour(const std::string& name) {
   motion_.set_map_from_path(std::nullopt);  // it was in the frame of the other memory
 }
 
-/// Loads the memory again, with the robot where it is.
+/// Takes over what changed in the memory, with the robot where it is.
 void MemoryLocaliser::reload() {
+  if (!loaded().tracker.is_held()) {
+    if (loaded().tracker.refresh()) publish_references();
+    return;
+  }
   const auto pose = last_pose_;
   load(loaded().path);
   if (pose) start_tracker_at(*pose);
@@ -108,6 +112,7 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
                                                 const RobotMotion::Motion& moved) {
   if (interrupted_) resume(*std::exchange(interrupted_, std::nullopt), moved);
   Tracker& tracker = loaded().tracker;
+  refresh_if_due();
   tracker.move_to(*observation.odometry);
   const PackedSignature view = tracker.encoder().packed(observation);
   MonteCarloEstimate estimate = tracker.observe(view);
@@ -121,6 +126,15 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
   last_observation_ = std::move(observation);
   publish_estimate(moment, stamp_ns, view);
   return moment;
+}
+
+/// Takes over what other robots changed in a memory that is not held, from time to time.
+void MemoryLocaliser::refresh_if_due() {
+  constexpr std::chrono::seconds interval(10);  // a view that is new need not count at once
+  const auto now = std::chrono::steady_clock::now();
+  if (memory_->tracker.is_held() || now - last_refresh_ < interval) return;
+  last_refresh_ = now;
+  reload();
 }
 
 /// Takes the robot to be where its odometry puts it since the mission was stored.
@@ -154,7 +168,7 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
     particles_.publish(recordings::poses_message(moment.particles, stamp_ns, setup_.frames.map));
   }
   if (best_matches_.subscribers() > 0) {
-    const auto found = tracker.memory().search(view, {.top = 1});
+    const auto found = tracker.index()->search(view, {.top = 1}, {});
     const auto thumbnail = memory_->file.thumbnail(found.matches.front().view);
     if (thumbnail) best_matches_.publish({{stamp_ns, setup_.frames.base}, "png", *thumbnail});
   }
@@ -163,10 +177,8 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
 /// Publishes the positions of the views, with the number of each.
 void MemoryLocaliser::publish_references() const {
   recordings::PointValues cloud;
-  const VisualMemory& memory = memory_->tracker.memory();
-  for (const ViewId view : memory.views()) {
-    const auto& pose = memory.info(view).pose;
-    if (pose) cloud.add(pose->position(), static_cast<double>(cloud.values.size() / 4));
+  for (const PosedView& view : memory_->tracker.index()->posed_views()) {
+    cloud.add(view.pose.position(), static_cast<double>(cloud.values.size() / 4));
   }
   references_.publish(cloud.message(now_ns_(), setup_.frames.map, "number"));
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -44,6 +45,7 @@ class MemoryLocaliser {
  private:
   [[nodiscard]] LoadedMemory& loaded() const;
   void reload();
+  void refresh_if_due();
   void start_tracker_at(const Pose2& map_from_camera);
   void resume(const Mission& mission, const RobotMotion::Motion& now);
   void correct_motion(const Pose2& map_from_base, const Pose2& path_from_base,
@@ -64,6 +66,7 @@ class MemoryLocaliser {
   std::unique_ptr<LoadedMemory> memory_;
   std::optional<Mission> interrupted_;  // until the first picture
   std::optional<Observation> last_observation_;
+  std::chrono::steady_clock::time_point last_refresh_ = std::chrono::steady_clock::now();
   std::optional<Pose2> last_pose_;  // of the camera in the map; `nullopt`: not localised then
 };
 

@@ -8,6 +8,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/memory/view_index.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/tracker.hpp"
 #include "panonav_fleet/place_search.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/temporary_folder.hpp"
@@ -133,6 +134,47 @@ TEST_F(RecogniserOfAnIndexTest, AnswersAlikeBeyondAThousandViews) {
   rows_ = 6;
   memorise(33, 1);  // 1089: more than are ranked again, or whose columns are kept
   expect_same_answers();
+}
+
+TEST_F(RecogniserOfAnIndexTest, ATrackerEstimatesAsInTheHeldMemory) {
+  memorise(9, 1);
+  // Another seed than that of the stored models: the model is learnt from all views.
+  for (const int seed : {1, 2}) {
+    const TrackerOptions options{.filter = {.max_particles = 1000, .seed = seed}};
+    Tracker held(path_, options);
+    Tracker searched(std::make_unique<PlaceSearch>(path_), path_, options);
+    EXPECT_TRUE(held.is_held());
+    EXPECT_FALSE(searched.is_held());
+    EXPECT_THROW((void)searched.memory(), ContractError);
+    EXPECT_EQ(searched.localiser().model(), held.localiser().model());
+    for (int i = 0; i < 6; ++i) {
+      Observation seen(landmark_picture(world_, {0.5 + 0.2 * i, 1.0, 0.1 * i}, columns_, rows_));
+      seen.odometry = Pose2{0.2 * i, 0.0, 0.1 * i};
+      const MonteCarloEstimate expected = held.observe(seen);
+      const MonteCarloEstimate found = searched.observe(seen);
+      EXPECT_EQ(found.pose, expected.pose);
+      EXPECT_EQ(found.probability, expected.probability);
+      EXPECT_EQ(searched.localiser().particles().x_m, held.localiser().particles().x_m);
+    }
+  }
+}
+
+TEST_F(RecogniserOfAnIndexTest, ATrackerKeepsItsParticlesWhileViewsComeAndGo) {
+  memorise(9, 1);
+  Tracker tracker(std::make_unique<PlaceSearch>(path_), path_, {.max_learnt_views = 50});
+  EXPECT_FALSE(tracker.refresh());
+  const Observation seen(landmark_picture(world_, {1.0, 1.5, 0.0}, columns_, rows_));
+  const MonteCarloEstimate before = tracker.observe(seen);
+  ASSERT_TRUE(before.pose);
+  const ViewId nearest = tracker.localiser().find_nearest_view(before.pose->position());
+  const std::vector<double> x_m = tracker.localiser().particles().x_m;
+  MemoryFile file = MemoryFile::open(path_, Access::read_write);
+  file.remove({&nearest, 1});
+  EXPECT_TRUE(tracker.refresh());
+  EXPECT_EQ(tracker.localiser().particles().x_m, x_m);
+  EXPECT_NE(tracker.localiser().find_nearest_view(before.pose->position()), nearest);
+  EXPECT_EQ(tracker.index()->posed_views().size(), 80U);
+  EXPECT_TRUE(tracker.observe(seen).pose);
 }
 
 TEST_F(RecogniserOfAnIndexTest, OfALargeMemoryWhatIsKeptIsTaken) {

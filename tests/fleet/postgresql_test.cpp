@@ -9,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/mapping/topological_map.hpp"
+#include "panonav/pipeline/tracker.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -140,6 +141,18 @@ TEST_F(MemoryOnServer, CopiesAreTheSameThereAndBack) {
     EXPECT_GT(other.views_within(bounds).size(), 20U);
     EXPECT_TRUE(other.verify().empty());
   }
+}
+
+TEST_F(MemoryOnServer, ATrackerHoldsOnlyMemoriesThatAreSmallEnough) {
+  MemoryFile file = MemoryFile::create(path, small_header());
+  file.append(random_views(0, 60));
+  const Tracker held(path);
+  const Tracker searched(path, {.max_held_views = 59});
+  EXPECT_TRUE(held.is_held());
+  EXPECT_FALSE(searched.is_held());
+  EXPECT_EQ(searched.localiser().model(), held.localiser().model());
+  EXPECT_EQ(searched.localiser().particles().x_m, held.localiser().particles().x_m);
+  EXPECT_EQ(searched.index()->posed_views().size(), 40U);
 }
 
 TEST_F(MemoryOnServer, StatementsInNamesAreNames) {

@@ -143,6 +143,54 @@ TEST(MonteCarlo, SameSeedSameBits) {
   EXPECT_NE(bits(3), bits(4));
 }
 
+// Views that lie elsewhere: an index is opened for each image, and may fail.
+TEST(MonteCarlo, ViewsThatAreNotHeldGiveTheSameBitsAndMayComeAndGo) {
+  RememberedRoom place(72, {}, 0.4);
+  const auto ranking = std::make_shared<const ColumnRanking>(place.memory);
+  const ObservationModel model = learn_observation_model(*ranking, {.sampled_views = 8});
+  VisualMemory elsewhere = place.memory;
+  int opened = 0;
+  bool is_reachable = true;
+  const auto open_index = [&]() -> std::unique_ptr<ViewIndex> {
+    if (!is_reachable) throw FileError("elsewhere", "cannot be reached");
+    ++opened;
+    return std::make_unique<HeldViewIndex>(elsewhere);
+  };
+  MonteCarloLocaliser held(ranking, model);
+  MonteCarloLocaliser filter(open_index, elsewhere.shape(), model);
+  EXPECT_EQ(opened, 1);
+  const Walk run = walk(place, 12, 300);
+  for (std::size_t k = 0; k < run.poses.size(); ++k) {
+    if (k > 0) held.move(run.step(k));
+    if (k > 0) filter.move(run.step(k));
+    const MonteCarloEstimate expected = held.observe(run.views[k]);
+    const MonteCarloEstimate found = filter.observe(run.views[k]);
+    EXPECT_EQ(found.pose, expected.pose);
+    EXPECT_EQ(found.views_compared, expected.views_compared);
+    EXPECT_EQ(filter.particles().weight, held.particles().weight);
+  }
+  EXPECT_EQ(opened, 1 + static_cast<int>(run.poses.size()));
+  const ViewId nearest = filter.find_nearest_view(place.grid[5]);
+  EXPECT_EQ(elsewhere.info(nearest).pose->position(), place.grid[5]);
+
+  const MonteCarloEstimate before = filter.estimate();
+  is_reachable = false;
+  EXPECT_THROW(filter.observe(run.views.back()), FileError);
+  EXPECT_THROW(filter.update_views(), FileError);
+  EXPECT_EQ(filter.estimate().pose, before.pose);
+  is_reachable = true;
+
+  // A view that is gone is not compared, before the filter knows it and after.
+  elsewhere.remove(nearest);
+  EXPECT_NO_THROW(filter.observe(run.views.back()));
+  filter.update_views();
+  EXPECT_NE(filter.find_nearest_view(place.grid[5]), nearest);
+  EXPECT_EQ(filter.observe(run.views.back()).state, before.state);
+  elsewhere = VisualMemory(elsewhere.shape(), elsewhere.full_scale(), elsewhere.elevations());
+  EXPECT_THROW(filter.update_views(), ContractError);
+  EXPECT_NE(filter.find_nearest_view(place.grid[5]), nearest);
+}
+
 TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const RememberedRoom place(74, {}, 0.3);

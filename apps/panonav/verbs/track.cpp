@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "cli/verbs.hpp"
@@ -331,10 +332,15 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   std::vector<double> seconds;
   if (arguments.tum)
     seconds = trajectory_stamps(run, "track", arguments.dataset, *arguments.tum, session);
-  Tracker tracker(
-      file, {arguments.filter,
-             visual && !declared.is_set("odometry") ? visual_odometry_noise() : arguments.odometry,
-             run.source});
+  TrackerOptions options{
+      arguments.filter,
+      visual && !declared.is_set("odometry") ? visual_odometry_noise() : arguments.odometry,
+      run.source};
+  // These use all views of the memory, whatever its size.
+  if (visual || arguments.report || arguments.record.file || arguments.record.view) {
+    options.max_held_views = std::numeric_limits<std::size_t>::max();
+  }
+  Tracker tracker(arguments.memory, options);
   if (visual) read_motion(run, arguments.dataset, tracker, session);
   set_start(tracker, arguments);
   TrackSettings settings{.every = arguments.every};

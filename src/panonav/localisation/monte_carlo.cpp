@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -71,7 +73,6 @@ double position_variance_m2(const ParticleModes& modes) {
 }  // namespace
 
 struct MonteCarloLocaliser::Implementation {
-  std::shared_ptr<const ColumnRanking> ranking;
   ObservationModel model;
   MonteCarloOptions options;
   OdometryNoise odometry;
@@ -87,13 +88,12 @@ struct MonteCarloLocaliser::Implementation {
   double inside = p_inside_at_start;  // belief that the robot is in the memorised area
   MonteCarloEstimate latest;
 
-  Implementation(std::shared_ptr<const ColumnRanking> ranking_, const ObservationModel& model_,
+  Implementation(std::unique_ptr<ComparedViews> views, const ObservationModel& model_,
                  const MonteCarloOptions& options_, const OdometryNoise& odometry_)
-      : ranking(std::move(ranking_)),
-        model(model_),
+      : model(model_),
         options(options_),
         odometry(odometry_),
-        likelihood(*ranking, model, options.compass),
+        likelihood(std::move(views), model, options.compass),
         sampler(likelihood, model, options.compass),
         random(static_cast<std::uint64_t>(options.seed)) {
     validate(options);
@@ -137,6 +137,7 @@ struct MonteCarloLocaliser::Implementation {
     update_error(before, after, exponent, correlation);
     fill_estimate(latest, after);
     resample_if_needed(after.occupied_bins);  // [Fox 2003]
+    likelihood.release();
     return latest;
   }
 
@@ -150,11 +151,12 @@ struct MonteCarloLocaliser::Implementation {
   /// those around the particles.
   void compare_views(const PackedSignature& view, bool was_localised) {
     likelihood.set_view(view);
-    compare_searched_views(view, was_localised ? searched_views_when_localised : searched_views);
+    likelihood.compare(
+        likelihood.search(was_localised ? searched_views_when_localised : searched_views));
     const std::size_t max_followed =
         was_localised ? max_followed_sites_when_localised : max_followed_sites;
     const auto followed = likelihood.heaviest_sites(particles, max_followed, min_followed_weight);
-    for (const std::uint32_t site : followed) likelihood.compare(site);
+    likelihood.compare(followed);
 
     const auto here = likelihood.min_difference(followed);
     const auto anywhere = likelihood.min_difference(likelihood.compared_sites());
@@ -162,25 +164,18 @@ struct MonteCarloLocaliser::Implementation {
     const bool is_unexplained =
         !is_followed && anywhere && *anywhere > model.neighbouring_difference;
     if (knows_nothing || is_unexplained) {
-      const auto sites = static_cast<std::uint32_t>(likelihood.sites().size());
-      if (sites <= static_cast<std::size_t>(options.reranked_views)) {
-        for (std::uint32_t site = 0; site < sites; ++site) likelihood.compare(site);
+      if (likelihood.sites().size() <= static_cast<std::size_t>(options.reranked_views)) {
+        std::vector<std::uint32_t> all(likelihood.sites().size());
+        std::iota(all.begin(), all.end(), 0U);
+        likelihood.compare(all);
       } else if (options.reranked_views > searched_views) {
-        compare_searched_views(view, options.reranked_views);
+        likelihood.compare(likelihood.search(options.reranked_views));
       }
     }
     compare_views_near_best();
     latest.difference_here = likelihood.min_difference(followed);
     latest.difference_anywhere = likelihood.min_difference(likelihood.compared_sites());
     latest.views_compared = likelihood.compared_sites().size();
-  }
-
-  void compare_searched_views(const PackedSignature& view, int count) {
-    const SearchResult found =
-        ranking->memory().search(view, {.top = count, .components = ranking->components()});
-    for (const Match& match : found.matches) {
-      if (const auto site = likelihood.site_of(match.view)) likelihood.compare(*site);
-    }
   }
 
   void compare_views_near_best() {
@@ -190,8 +185,7 @@ struct MonteCarloLocaliser::Implementation {
       if (!best || sites[site].similarity > sites[*best].similarity) best = site;
     }
     if (!best) return;
-    const Point2 place = sites[*best].position;
-    for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
+    likelihood.compare(likelihood.sites_near(sites[*best].position));
   }
 
   /// Replaces random particles by new ones according to the caller's rule.
@@ -211,7 +205,7 @@ struct MonteCarloLocaliser::Implementation {
         pose = sampler.sample_anywhere(particles, random);
       } else {
         const std::uint32_t site = sites[random.index(sites.size())];
-        likelihood.compare(site);
+        likelihood.compare(std::span(&site, 1));
         pose = sampler.sample_around({site, false}, particles, random);
       }
       particles.set(replaced, pose, 1.0 / static_cast<double>(size));
@@ -348,7 +342,8 @@ MonteCarloLocaliser::MonteCarloLocaliser(const VisualMemory& memory,
   validate(options);
   auto ranking = std::make_shared<const ColumnRanking>(memory, 0);
   const ObservationModel model = learn_observation_model(*ranking, {.seed = options.seed});
-  implementation_ = std::make_unique<Implementation>(ranking, model, options, odometry);
+  implementation_ =
+      std::make_unique<Implementation>(make_compared_views(ranking), model, options, odometry);
   start_globally();
 }
 
@@ -356,8 +351,18 @@ MonteCarloLocaliser::MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ra
                                          const ObservationModel& model,
                                          const MonteCarloOptions& options,
                                          const OdometryNoise& odometry)
-    : implementation_(
-          std::make_unique<Implementation>(std::move(ranking), model, options, odometry)) {
+    : implementation_(std::make_unique<Implementation>(make_compared_views(std::move(ranking)),
+                                                       model, options, odometry)) {
+  start_globally();
+}
+
+MonteCarloLocaliser::MonteCarloLocaliser(std::function<std::unique_ptr<ViewIndex>()> open_index,
+                                         SignatureShape shape, const ObservationModel& model,
+                                         const MonteCarloOptions& options,
+                                         const OdometryNoise& odometry)
+    : implementation_(std::make_unique<Implementation>(
+          make_compared_views(std::move(open_index), shape), model, options, odometry)) {
+  implementation_->likelihood.release();
   start_globally();
 }
 
@@ -409,8 +414,29 @@ void MonteCarloLocaliser::move(const Pose2& step) {
   move_particles(own.particles, StepSampler(step, own.odometry), own.random);
 }
 
+void MonteCarloLocaliser::update_views() {
+  implementation_->likelihood.update_sites();
+  implementation_->likelihood.release();
+}
+
+ViewId MonteCarloLocaliser::find_nearest_view(Point2 position) const {
+  const auto sites = implementation_->likelihood.sites();
+  return std::ranges::min_element(
+             sites, {},
+             [&](const ViewLikelihood::Site& site) { return distance(site.position, position); })
+      ->view;
+}
+
 MonteCarloEstimate MonteCarloLocaliser::observe(const PackedSignature& view) {
-  return implementation_->observe(view);
+  Implementation& own = *implementation_;
+  const MonteCarloEstimate before = own.latest;
+  try {
+    return own.observe(view);
+  } catch (const FileError&) {
+    own.likelihood.release();
+    own.latest = before;
+    throw;
+  }
 }
 
 MonteCarloEstimate MonteCarloLocaliser::estimate() const {

@@ -12,7 +12,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/localisation/particles.hpp"
-#include "panonav/memory/visual_memory.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/motion/odometry.hpp"
 
 namespace panonav {
@@ -97,6 +97,12 @@ class MonteCarloLocaliser {
   /// Uses a model learnt before.
   MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking, const ObservationModel& model,
                       const MonteCarloOptions& options = {}, const OdometryNoise& odometry = {});
+  /// Uses views that lie elsewhere: only their positions are held, 200 bytes for each.
+  /// `open_index` opens an index of the views for each image (`IndexedMemory::index`); what it
+  /// throws is passed on by all functions that read views. `shape`: of their signatures.
+  MonteCarloLocaliser(std::function<std::unique_ptr<ViewIndex>()> open_index, SignatureShape shape,
+                      const ObservationModel& model, const MonteCarloOptions& options = {},
+                      const OdometryNoise& odometry = {});
   ~MonteCarloLocaliser();
   /// The source of a move may only be destroyed or assigned to.
   MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept;
@@ -116,8 +122,15 @@ class MonteCarloLocaliser {
   /// number of steps may come between two images.
   void move(const Pose2& step);
 
+  /// Uses the views that have positions now, after some came or went. The particles stay. Throws
+  /// ContractError when there is none; then all stays as it was.
+  void update_views();
+  /// Returns the view that is nearest to the position. Cost: linear in the views.
+  [[nodiscard]] ViewId find_nearest_view(Point2 position) const;
+
   /// Weighs the particles by an image and returns the new estimate. Throws ContractError on a
-  /// signature of another shape than the memory's.
+  /// signature of another shape than the memory's, FileError when views that lie elsewhere cannot
+  /// be read; then the estimate stays as it was.
   MonteCarloEstimate observe(const PackedSignature& view);
   /// Returns the present estimate, without a new image.
   [[nodiscard]] MonteCarloEstimate estimate() const;

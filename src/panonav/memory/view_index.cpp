@@ -38,4 +38,12 @@ std::vector<ViewId> HeldViewIndex::views_within(std::span<const PositionBounds> 
   return found;
 }
 
+std::vector<PosedView> HeldViewIndex::posed_views() {
+  std::vector<PosedView> posed;
+  for (const ViewId view : memory_->views()) {
+    if (const auto& pose = memory_->info(view).pose) posed.push_back({view, *pose});
+  }
+  return posed;
+}
+
 }  // namespace panonav

@@ -20,6 +20,12 @@ struct PositionBounds {
       max_y_m = 0.0;     ///< largest y, included
 };
 
+/// A view whose position is known.
+struct PosedView {
+  ViewId id;           ///< its id in the memory
+  ReferencePose pose;  ///< its position, and its heading if known
+};
+
 /// Finds the views of a memory at one moment by appearance or position: those of a
 /// memory that is held (`HeldViewIndex`), or of one that lies elsewhere (`IndexedMemory`). One
 /// thread uses it, for the questions of one query. An index of views that lie elsewhere throws
@@ -39,6 +45,8 @@ class ViewIndex {
   /// Returns the views with positions within one of the rectangles, ascending, each once.
   [[nodiscard]] virtual std::vector<ViewId> views_within(
       std::span<const PositionBounds> bounds) = 0;
+  /// Returns all views with positions, ascending. Cost: 40 bytes for each.
+  [[nodiscard]] virtual std::vector<PosedView> posed_views() = 0;
 };
 
 /// Searches a memory that is held, which must outlive it.
@@ -54,6 +62,7 @@ class HeldViewIndex final : public ViewIndex {
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
   /// Cost: a pass over all views.
   [[nodiscard]] std::vector<ViewId> views_within(std::span<const PositionBounds> bounds) override;
+  [[nodiscard]] std::vector<PosedView> posed_views() override;
 
  private:
   const VisualMemory* memory_;

@@ -1,33 +1,42 @@
 #include "panonav/pipeline/tracker.hpp"
 
-#include <algorithm>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/position_bound.hpp"
+#include "panonav/localisation/place_model.hpp"
+#include "panonav/localisation/sample.hpp"
+#include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 
 namespace panonav {
 
 namespace {
 
+void require_positions(const MemoryFile& file, std::size_t posed) {
+  if (posed >= static_cast<std::size_t>(ObservationModel::min_views)) return;
+  throw FileError(file.path().string(),
+                  "holds " + std::to_string(posed) + " views with a position; allowed: " +
+                      std::to_string(ObservationModel::min_views) +
+                      " or more; memorise a data set whose table has the columns "
+                      "'x_m' and 'y_m'");
+}
+
+// Stored models were learnt with the default seed, and the filter's seed is that of learning too.
+bool can_use_stored_models(const TrackerOptions& options) {
+  return options.filter.seed == LearningOptions{}.seed;
+}
+
 MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& memory,
                                    const TrackerOptions& options) {
-  const auto posed = std::ranges::count_if(
-      memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
-  if (posed < ObservationModel::min_views) {
-    throw FileError(file.path().string(),
-                    "holds " + std::to_string(posed) + " views with a position; allowed: " +
-                        std::to_string(ObservationModel::min_views) +
-                        " or more; memorise a data set whose table has the columns "
-                        "'x_m' and 'y_m'");
-  }
+  require_positions(file, HeldViewIndex(memory).posed_views().size());
   validate(options.filter);
   try {
-    // Stored models were learnt with the default seed, and the filter's seed is that of learning
-    // too.
-    if (options.filter.seed == LearningOptions{}.seed) {
+    if (can_use_stored_models(options)) {
       if (const auto models = load_stored_models(file, memory); models && models->observation) {
         return {std::make_shared<const ColumnRanking>(memory), *models->observation, options.filter,
                 options.odometry};
@@ -39,24 +48,76 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& m
   }
 }
 
+/// Returns the model of a memory that is not held: of a small one as if it were held; of a large
+/// one the model stored last, else one learnt from a part of the views.
+ObservationModel find_model(const MemoryFile& file, const IndexedMemory& memory,
+                            const TrackerOptions& options) {
+  const std::vector<ViewId> views = memory.views();
+  const std::unique_ptr<ViewIndex> index = memory.index();
+  const bool is_small = views.size() <= options.max_learnt_views;
+  std::optional<VisualMemory> sample;
+  if (is_small) sample.emplace(index->load(views));
+  if (can_use_stored_models(options)) {
+    const auto models = is_small ? load_stored_models(file, *sample) : load_stored_models(file);
+    if (models && models->observation) return *models->observation;
+  }
+  if (!sample) {
+    sample.emplace(load_learning_sample(*index, views, sample_reference_views(views),
+                                        options.max_learnt_views));
+  }
+  return learn_observation_model(ColumnRanking(*sample), {.seed = options.filter.seed});
+}
+
+MonteCarloLocaliser make_localiser(const MemoryFile& file, const IndexedMemory& memory,
+                                   const TrackerOptions& options) {
+  require_positions(file, memory.index()->posed_views().size());
+  validate(options.filter);
+  try {
+    return {[&memory] { return memory.index(); }, file.header().shape,
+            find_model(file, memory, options), options.filter, options.odometry};
+  } catch (const ContractError& error) {
+    throw FileError(file.path().string(), error.what());
+  }
+}
+
 }  // namespace
 
 struct Tracker::Implementation {
   Implementation(const MemoryFile& file, const TrackerOptions& options)
       : memory(file.load()),
         encoder(file.header(), options.source.value_or(file.header().source)),
-        localiser(make_localiser(file, memory, options)) {}
+        localiser(make_localiser(file, *memory, options)) {}
+  Implementation(std::unique_ptr<IndexedMemory> index, const MemoryFile& file,
+                 const TrackerOptions& options)
+      : indexed(std::move(index)),
+        encoder(file.header(), options.source.value_or(file.header().source)),
+        localiser(make_localiser(file, *indexed, options)) {}
+  /// Holds the memory if it is a file or small enough.
+  static std::unique_ptr<Implementation> make(const std::filesystem::path& memory,
+                                              const TrackerOptions& options) {
+    const MemoryFile file = MemoryFile::open(memory, Access::read_only);
+    if (!is_server_address(memory) || file.info().views <= options.max_held_views) {
+      return std::make_unique<Implementation>(file, options);
+    }
+    return std::make_unique<Implementation>(find_memory_scheme(memory)->open_index(memory), file,
+                                            options);
+  }
 
-  VisualMemory memory;
+  std::optional<VisualMemory> memory;      // nullopt: not held
+  std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
   MonteCarloLocaliser localiser;
   std::optional<Pose2> odometry;  ///< the last one
 };
 
 Tracker::Tracker(const std::filesystem::path& memory, const TrackerOptions& options)
-    : Tracker(MemoryFile::open(memory, Access::read_only), options) {}
+    : implementation_(Implementation::make(memory, options)) {}
 Tracker::Tracker(const MemoryFile& file, const TrackerOptions& options)
     : implementation_(std::make_unique<Implementation>(file, options)) {}
+Tracker::Tracker(std::unique_ptr<IndexedMemory> index, const std::filesystem::path& memory,
+                 const TrackerOptions& options)
+    : implementation_(std::make_unique<Implementation>(
+          std::move(index), MemoryFile::open(memory, Access::read_only), options)) {}
 Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
@@ -85,8 +146,24 @@ void Tracker::move_to(const Pose2& odometry) {
   last = odometry;
 }
 
-const VisualMemory& Tracker::memory() const noexcept {
-  return implementation_->memory;
+bool Tracker::refresh() {
+  Implementation& own = *implementation_;
+  if (!own.indexed || !own.indexed->refresh()) return false;
+  own.localiser.update_views();
+  return true;
+}
+
+bool Tracker::is_held() const noexcept {
+  return implementation_->memory.has_value();
+}
+const VisualMemory& Tracker::memory() const {
+  if (!is_held()) throw ContractError("memory", "not held", "one that is held");
+  return *implementation_->memory;
+}
+std::unique_ptr<ViewIndex> Tracker::index() const {
+  const Implementation& own = *implementation_;
+  if (own.indexed) return own.indexed->index();
+  return std::make_unique<HeldViewIndex>(*own.memory);
 }
 const ViewEncoder& Tracker::encoder() const noexcept {
   return implementation_->encoder;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -16,6 +18,12 @@ struct TrackerOptions {
   OdometryNoise odometry;    ///< errors of the wheel odometry
   /// Layout of the pictures; empty: that of the memory's own.
   std::optional<PictureSource> source;
+  /// A memory on a server with more views is not held: the server is searched for each image. Files
+  /// are held.
+  std::size_t max_held_views = 200'000;
+  /// Largest number of views from which the model of a memory that is not held is learnt, if it
+  /// stores none; as many whole areas as fit.
+  std::size_t max_learnt_views = 20'000;
 };
 
 /// Follows a moving robot through its pictures and odometry by a memory file
@@ -25,7 +33,8 @@ struct TrackerOptions {
 ///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
 /// Pictures become signatures as the file says, and the observation model is that of the file
 /// (`learn_and_store_models`); one that does not fit the views any more is learnt again. Holds the
-/// whole memory; the file is not needed afterwards. Same file, options and observations: same bits.
+/// whole memory, unless it lies on a server and is larger than `max_held_views`; a file is not
+/// needed afterwards. Same views, options and observations: same bits.
 class Tracker {
  public:
   /// Starts with the robot anywhere in the memorised area. Throws FileError if the file is missing
@@ -33,6 +42,9 @@ class Tracker {
   explicit Tracker(const std::filesystem::path& memory, const TrackerOptions& options = {});
   /// Uses an open file.
   explicit Tracker(const MemoryFile& file, const TrackerOptions& options = {});
+  /// Tracks in a memory that is not held; `memory` is its address or file. Throws as above.
+  Tracker(std::unique_ptr<IndexedMemory> index, const std::filesystem::path& memory,
+          const TrackerOptions& options = {});
   ~Tracker();
   /// A moved-from object may only be destroyed or assigned to.
   Tracker(Tracker&&) noexcept;
@@ -52,7 +64,18 @@ class Tracker {
   /// `odometry`: absolute, in its own frame. Throws ContractError beyond `max_position_m`.
   void move_to(const Pose2& odometry);
 
-  [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< Returns the held views.
+  /// Takes over what others changed in a memory that is not held; the particles stay. Returns
+  /// whether anything changed; never for one that is held. Throws FileError if the server cannot be
+  /// reached; then all stays as it was. Cost: a question to the server, and a pass over the
+  /// positions if views came or went.
+  bool refresh();
+
+  /// True if all views are held.
+  [[nodiscard]] bool is_held() const noexcept;
+  /// Returns the held views. Throws ContractError if they are not held.
+  [[nodiscard]] const VisualMemory& memory() const;
+  /// Opens an index of the views for one query. Throws FileError if the server cannot be reached.
+  [[nodiscard]] std::unique_ptr<ViewIndex> index() const;
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Returns the encoder.
   /// Returns the filter, with its particles and its observation model.
   [[nodiscard]] const MonteCarloLocaliser& localiser() const noexcept;

@@ -427,7 +427,7 @@ std::vector<ViewId> MemoryFile::views() const {
 
 std::vector<ViewId> MemoryFile::views_within(const PositionBounds& bounds) const {
   std::vector<ViewId> views;
-  for (const PositionRow& row : implementation_->tables->views_within(bounds)) {
+  for (const PosedView& row : implementation_->tables->views_within(bounds)) {
     views.push_back(row.id);
   }
   return views;

@@ -408,8 +408,8 @@ std::vector<ViewId> PostgresqlTables::views() {
   return views;
 }
 
-std::vector<PositionRow> PostgresqlTables::views_within(const PositionBounds& bounds) {
-  std::vector<PositionRow> views;
+std::vector<PosedView> PostgresqlTables::views_within(const PositionBounds& bounds) {
+  std::vector<PosedView> views;
   const Rows rows = connection_.run(
       "SELECT id, x_m, y_m, heading_rad FROM panonav.views WHERE memory = $1 AND x_m IS NOT NULL "
       "AND "

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <tuple>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 
@@ -20,32 +21,43 @@ constexpr double near_spacings = 2.0;
 constexpr double nearest_spacings = 0.3826;
 /// References near a cell: a grid's square and the ring around it.
 constexpr std::size_t max_near = 12;
+/// Largest number of cached column profiles of 2.5 kB: 50 MB, more than a robot passes in an hour.
+constexpr std::size_t max_cached_profiles = 20'000;
+/// Number of sites whose profiles are loaded together: 2.4 MB of signatures.
+constexpr std::size_t sites_per_load = 1000;
 constexpr auto lane_count = static_cast<std::size_t>(kernels::similarity_lanes);
 static_assert(max_near <= lane_count);
 
 }  // namespace
 
-ViewLikelihood::ViewLikelihood(const ColumnRanking& ranking, const ObservationModel& model,
+ViewLikelihood::ViewLikelihood(std::unique_ptr<ComparedViews> views, const ObservationModel& model,
                                bool compass)
-    : ranking_(&ranking), model_(model), compass_(compass) {
-  const VisualMemory& memory = ranking.memory();
-  for (const ViewId view : memory.views()) {
-    const auto& pose = memory.info(view).pose;
-    if (!pose) continue;
-    Site& site = sites_.emplace_back();
-    site.view = view;
-    site.position = pose->position();
-    site.reference_heading_rad = pose->heading_rad ? static_cast<float>(*pose->heading_rad)
-                                                   : std::numeric_limits<float>::quiet_NaN();
-    site.heading_rad = site.reference_heading_rad;
-    views_.push_back(view);
-    profiles_.push_back(ranking.profiles(view));
-  }
-  differences_.resize(sites_.size());
-  require(!sites_.empty(), "views with a pose", 0.0, ">= 1");
+    : views_(std::move(views)), model_(model), compass_(compass) {
   require(model.spacing_m > 0.0, "spacing of the references", model.spacing_m, "> 0 m");
   require(model.range_m > 0.0, "range of similarity", model.range_m, "> 0 m");
   fall_.per_metre = static_cast<float>(1.0 / model.range_m);
+  update_sites();
+}
+
+void ViewLikelihood::update_sites() {
+  std::vector<Site> sites;
+  for (const auto& [view, pose] : views_->posed_views()) {
+    Site& site = sites.emplace_back();
+    site.view = view;
+    site.position = pose.position();
+    site.reference_heading_rad = pose.heading_rad ? static_cast<float>(*pose.heading_rad)
+                                                  : std::numeric_limits<float>::quiet_NaN();
+    site.heading_rad = site.reference_heading_rad;
+  }
+  require(!sites.empty(), "views with a pose", 0.0, ">= 1");
+  sites_ = std::move(sites);
+  differences_.assign(sites_.size(), 0.0);
+  profiles_.clear();
+  profiles_.resize(sites_.size());
+  cached_profiles_ = 0;
+  compared_sites_.clear();
+  signature_.reset();
+  view_.reset();
   index_sites();
 }
 
@@ -55,6 +67,10 @@ void ViewLikelihood::index_sites() {
   const double reach_m =
       std::max(near_spacings * model_.spacing_m, std::min(model_.range_m, 4 * model_.spacing_m));
   const auto around = static_cast<std::int32_t>(std::ceil(reach_m / cell_m_));
+  table_ = {};
+  cells_.clear();
+  near_.clear();
+  lanes_.clear();
   // (cell, distance from the cell's centre, site)
   std::vector<std::tuple<std::int32_t, std::int32_t, float, std::uint32_t>> entries;
   for (std::uint32_t s = 0; s < sites_.size(); ++s) {
@@ -95,12 +111,13 @@ Point2 ViewLikelihood::centre_of(GridCell cell) const noexcept {
 }
 
 void ViewLikelihood::set_view(const PackedSignature& view) {
-  const SignatureShape shape = ranking_->memory().shape();
+  const SignatureShape shape = views_->shape();
   if (view.shape != shape) {
     throw ContractError("rows of the view's signature", view.shape.rows,
                         to_text(shape.rows) + " with " + to_text(shape.components) + " components");
   }
-  view_.emplace(view, ranking_->components());
+  signature_ = view;
+  view_.emplace(view, views_->components());
   compared_sites_.clear();
   max_similarity_ = 0.0;
   fall_.blur_square_m2 = 0.0F;
@@ -109,10 +126,46 @@ void ViewLikelihood::set_view(const PackedSignature& view) {
   ++number_;
 }
 
-double ViewLikelihood::compare(std::uint32_t site) {
+std::vector<std::uint32_t> ViewLikelihood::search(int count) {
+  std::vector<std::uint32_t> sites;
+  for (const Match& match : views_->search(signature_.value(), count)) {
+    if (const auto site = site_of(match.view)) sites.push_back(*site);
+  }
+  return sites;
+}
+
+void ViewLikelihood::compare(std::span<const std::uint32_t> sites) {
+  for (; !sites.empty(); sites = sites.subspan(std::min(sites.size(), sites_per_load))) {
+    const auto part = sites.first(std::min(sites.size(), sites_per_load));
+    load_profiles(part);
+    for (const std::uint32_t site : part) {
+      if (profiles_[site] && !is_compared(site)) compare_loaded(site);
+    }
+  }
+}
+
+void ViewLikelihood::load_profiles(std::span<const std::uint32_t> sites) {
+  if (cached_profiles_ + sites.size() > max_cached_profiles) {
+    for (auto& profiles : profiles_) profiles.reset();
+    cached_profiles_ = 0;
+  }
+  std::vector<std::uint32_t> loaded;
+  std::vector<ViewId> views;
+  for (const std::uint32_t site : sites) {
+    if (profiles_[site]) continue;
+    loaded.push_back(site);
+    views.push_back(sites_[site].view);
+  }
+  if (views.empty()) return;
+  views_->load(views, [&](std::size_t i, ColumnProfiles&& profiles) {
+    profiles_[loaded[i]] = std::move(profiles);
+    ++cached_profiles_;
+  });
+}
+
+void ViewLikelihood::compare_loaded(std::uint32_t site) {
   Site& s = sites_[site];
-  if (s.compared_at == number_) return differences_[site];
-  const auto [match, other] = match_columns_twice(*view_, profiles_[site]);
+  const auto [match, other] = match_columns_twice(*view_, *profiles_[site]);
   const double far = model_.far_difference;
   s.compared_at = number_;
   const auto to_similarity = [far](const ColumnMatch& m) {
@@ -135,7 +188,6 @@ double ViewLikelihood::compare(std::uint32_t site) {
   compared_sites_.push_back(site);
   lanes_.clear();
   ++revision_;
-  return match.difference;
 }
 
 std::optional<double> ViewLikelihood::min_difference(std::span<const std::uint32_t> sites) const {
@@ -282,9 +334,9 @@ std::vector<std::uint32_t> ViewLikelihood::heaviest_sites(const Particles& parti
 }
 
 std::optional<std::uint32_t> ViewLikelihood::site_of(ViewId view) const noexcept {
-  const auto at = std::ranges::lower_bound(views_, view);
-  if (at == views_.end() || *at != view) return std::nullopt;
-  return static_cast<std::uint32_t>(at - views_.begin());
+  const auto at = std::ranges::lower_bound(sites_, view, {}, &Site::view);
+  if (at == sites_.end() || at->view != view) return std::nullopt;
+  return static_cast<std::uint32_t>(at - sites_.begin());
 }
 
 }  // namespace panonav

@@ -1,16 +1,16 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "panonav/kernels/similarity.hpp"
-#include "panonav/localisation/column_ranking.hpp"
 #include "panonav/localisation/internal/cell_table.hpp"
+#include "panonav/localisation/internal/compared_views.hpp"
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/localisation/particles.hpp"
-#include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
 
@@ -23,9 +23,13 @@ namespace panonav {
 /// compared count as dissimilar.
 class ViewLikelihood {
  public:
-  /// Covers the posed views of the ranking's memory; the ranking must outlive *this. Without
-  /// `compass` headings do not count. Cost: linear in the views.
-  ViewLikelihood(const ColumnRanking& ranking, const ObservationModel& model, bool compass);
+  /// Covers the posed views of a memory. Without `compass` headings do not count. Cost: linear in
+  /// the views.
+  ViewLikelihood(std::unique_ptr<ComparedViews> views, const ObservationModel& model, bool compass);
+
+  /// Covers the views that have positions now; nothing is compared then. Throws ContractError when
+  /// there is none, FileError as a `ViewIndex`; then all stays as it was.
+  void update_sites();
 
   /// The position of a posed view.
   struct Site {
@@ -43,13 +47,19 @@ class ViewLikelihood {
 
   /// Sets the view to compare. Throws ContractError on a signature of another shape.
   void set_view(const PackedSignature& view);
-  /// Returns the difference of the view and a site's reference; compares them if needed. Cost: 1
-  /// microsecond.
-  double compare(std::uint32_t site);
+  /// Searches all views for the most similar ones, at most `count`; returns those with a site.
+  [[nodiscard]] std::vector<std::uint32_t> search(int count);
+  /// Compares the view with the references of the sites, except those that are compared already and
+  /// those that no longer exist. Cost: 1 microsecond each, and 10 for one whose profiles are not
+  /// cached. Throws FileError as a `ViewIndex`.
+  void compare(std::span<const std::uint32_t> sites);
+  /// Ends the work with the view: the next one sees what others changed in the memory.
+  void release() { views_->release(); }
   [[nodiscard]] bool is_compared(std::uint32_t site) const noexcept {
     return sites_[site].compared_at == number_;
   }
-  /// Smallest difference to those of the sites that were compared; nullopt when none was.
+  /// Returns the smallest difference to those of the sites that were compared; nullopt when none
+  /// was.
   [[nodiscard]] std::optional<double> min_difference(std::span<const std::uint32_t> sites) const;
 
   /// Computes the log-likelihood of the view at each pose, over that of an unexplained view; >= 0.
@@ -86,21 +96,23 @@ class ViewLikelihood {
     double weight;
   };
   void index_sites();
+  void load_profiles(std::span<const std::uint32_t> sites);
+  void compare_loaded(std::uint32_t site);
   /// Fills `groups_`, in the order of their first particles, and `group_of_`.
   void group_particles(const Particles& particles);
   [[nodiscard]] GridCell cell_of(Point2 position) const noexcept;
   [[nodiscard]] Point2 centre_of(GridCell cell) const noexcept;
   [[nodiscard]] const kernels::SimilarityLanes& get_or_create_lanes(Cell& cell);
 
-  const ColumnRanking* ranking_;
+  std::unique_ptr<ComparedViews> views_;
   ObservationModel model_;
   bool compass_;
   std::vector<Site> sites_;
   std::vector<double> differences_;
-  std::vector<ColumnProfiles> profiles_;
-  std::vector<ViewId> views_;  ///< of the sites, ascending
-  CellTable table_;            ///< of the cells with references near
-  std::vector<Cell> cells_;    ///< as `table_` numbers them
+  std::vector<std::optional<ColumnProfiles>> profiles_;  ///< cached ones
+  std::size_t cached_profiles_ = 0;
+  CellTable table_;          ///< of the cells with references near
+  std::vector<Cell> cells_;  ///< as `table_` numbers them
   std::vector<std::uint32_t> near_;
   std::vector<kernels::SimilarityLanes> lanes_;  ///< made since the last comparison
   std::vector<Group> groups_;
@@ -109,6 +121,7 @@ class ViewLikelihood {
   Particles arranged_;
   std::uint32_t revision_ = 1;
   std::vector<std::uint32_t> compared_sites_;
+  std::optional<PackedSignature> signature_;  ///< of the view
   std::optional<ColumnProfiles> view_;
   double max_similarity_ = 0.0;
   kernels::SimilarityLanes::Fall fall_{1.0F, 0.0F};

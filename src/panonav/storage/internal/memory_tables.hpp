@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/memory_header.hpp"
@@ -32,12 +33,6 @@ struct MagnitudesRow {
   ViewId id;
   std::optional<Point2> position;
   std::span<const std::uint8_t> magnitudes;  ///< valid until the next row is read
-};
-
-/// The pose of a view.
-struct PositionRow {
-  ViewId id;
-  ReferencePose pose;
 };
 
 struct LinkRow {
@@ -183,7 +178,7 @@ class MemoryTables {
   /// Returns the ids of all views, ascending.
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;
   /// Returns the views within the bounds, ascending.
-  [[nodiscard]] virtual std::vector<PositionRow> views_within(const PositionBounds& bounds) = 0;
+  [[nodiscard]] virtual std::vector<PosedView> views_within(const PositionBounds& bounds) = 0;
   /// Returns the views that have one, ascending.
   [[nodiscard]] virtual std::vector<ViewId> views_with_attachment(ViewAttachment table) = 0;
   [[nodiscard]] virtual bool has_attachments(ViewAttachment table) = 0;

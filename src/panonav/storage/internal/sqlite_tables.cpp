@@ -249,8 +249,8 @@ std::vector<ViewId> SqliteTables::views() {
   return views;
 }
 
-std::vector<PositionRow> SqliteTables::views_within(const PositionBounds& bounds) {
-  std::vector<PositionRow> views;
+std::vector<PosedView> SqliteTables::views_within(const PositionBounds& bounds) {
+  std::vector<PosedView> views;
   Statement rows(database_,
                  "SELECT id, x_m, y_m, heading_rad FROM views WHERE x_m BETWEEN ? AND ? AND y_m "
                  "BETWEEN ? AND ? ORDER BY id",

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "panonav/localisation/column_ranking.hpp"
+#include "panonav/memory/view_index.hpp"
+
+namespace panonav {
+
+/// The views of a memory as a particle filter uses them: all positions, and for each image a search
+/// and the column profiles of some views. They may be held or lie elsewhere.
+class ComparedViews {
+ public:
+  /// Called with the index of a view in the list that was asked for.
+  using TakeProfiles = std::function<void(std::size_t, ColumnProfiles&&)>;
+
+  virtual ~ComparedViews() = default;
+  [[nodiscard]] virtual SignatureShape shape() const = 0;
+  /// Number of Fourier components compared; 0: all.
+  [[nodiscard]] virtual int components() const = 0;
+  /// Returns all views with positions, ascending.
+  [[nodiscard]] virtual std::vector<PosedView> posed_views() = 0;
+  /// Returns the most similar views, at most `count`.
+  [[nodiscard]] virtual std::vector<Match> search(const PackedSignature& view, int count) = 0;
+  /// Passes the profiles of those views that exist.
+  virtual void load(std::span<const ViewId> views, const TakeProfiles& take) = 0;
+  /// Ends the work with one image; the next one sees what others changed meanwhile.
+  virtual void release() {}
+};
+
+/// Returns the views of a ranking's memory.
+[[nodiscard]] std::unique_ptr<ComparedViews> make_compared_views(
+    std::shared_ptr<const ColumnRanking> ranking);
+
+/// Returns views of an index that `open_index` opens for each image.
+[[nodiscard]] std::unique_ptr<ComparedViews> make_compared_views(
+    std::function<std::unique_ptr<ViewIndex>()> open_index, SignatureShape shape);
+
+}  // namespace panonav
