@@ -12,6 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "support/skips.hpp"
 #include "support/test_cameras.hpp"
 #include "support/text.hpp"
 
@@ -88,6 +89,7 @@ std::string reason(const std::variant<DualFisheyeCalibration, std::string>& answ
 TEST(CalibrateDualFisheye, RecoversTheLensesFromTurnedPictures) {
   Camera camera = dual_fisheye_camera();
   for (const auto direction : {ColumnDirection::clockwise, ColumnDirection::counter_clockwise}) {
+    if (sanitized && direction == ColumnDirection::counter_clockwise) continue;  // takes minutes
     camera.direction = direction;
     const auto pictures = turned_pictures(camera, 5, {0, 80, 170});
     DualFisheyeCalibration::Knowledge known;

@@ -310,6 +310,7 @@ TEST(Navigator, IsLostInAnotherPlace) {
 
 // The limit of the difference alone lets foreign views through; the robot drove on for 30 steps.
 TEST(Navigator, SaysHowProbableItsPlaceIsAndStopsWhereNoneIs) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const NavigatorOptions options;
   Scene scene(1, true, options);
   int sure = 0;

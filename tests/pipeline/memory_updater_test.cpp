@@ -26,6 +26,7 @@
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "support/landmark_pictures.hpp"
+#include "support/skips.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/text.hpp"
 
@@ -293,6 +294,7 @@ TEST_F(MemoryUpdating, NoiseAndAnotherBuildingLeaveTheFileAsItIs) {
 }
 
 TEST_F(MemoryUpdating, NoiseInTheMidstOfARunDropsNothingAndHasNoAnswersOfItsOwn) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const Remembered untouched = remembered();
   for (const bool smoothed : {false, true}) {
     SCOPED_TRACE(smoothed);

@@ -13,6 +13,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/relative_pose/chance_match.hpp"
 #include "support/random_views.hpp"
+#include "support/skips.hpp"
 #include "support/toy_world.hpp"
 
 namespace panonav::testing {
@@ -433,6 +434,7 @@ Panorama picture_of_nothing(int kind, std::uint64_t seed) {
 }
 
 TEST(ChanceMatch, PicturesOfNothingMatchNoBetterThanNoise) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   int known = 0;
   int confident = 0;
   constexpr int pairs = 60;
@@ -449,6 +451,7 @@ TEST(ChanceMatch, PicturesOfNothingMatchNoBetterThanNoise) {
 }
 
 TEST(ChanceMatch, ViewsOfOnePlaceAreKnownWhicheverWayTheRobotFaces) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   int known = 0;
   int queries = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
