@@ -6,7 +6,7 @@ namespace panonav::command {
 
 void add_story(DemoStory story, viewer::ReportPage& page) {
   page.add_story(
-      {{.title = "One omnidirectional camera",
+      {{.title = "Omnidirectional camera",
         .shown = std::move(story.mirror),
         .value = "2.4 kB",
         .meaning = "per stored view. From one view the robot recognises the place at any heading. "
@@ -18,11 +18,11 @@ void add_story(DemoStory story, viewer::ReportPage& page) {
         .meaning = "median error from one image. Orange: possible positions, for an increasing "
                    "number of Fourier components. Cross: true position.",
         .part = 2},
-       {.title = "Tracking after the robot was moved by hand",
+       {.title = "Kidnapped robot",
         .shown = viewer::ReportPlot{std::move(story.gathering), ""},
         .value = std::move(story.found_again),
-        .meaning =
-            "until the robot was localised again. Dots: possible positions. Ring: true position.",
+        .meaning = "until the robot was localised again after it was moved by hand. Dots: possible "
+                   "positions. Ring: true position.",
         .part = 4},
        {.title = "Navigation",
         .shown = viewer::ReportPlot{std::move(story.missions), ""},
@@ -30,7 +30,7 @@ void add_story(DemoStory story, viewer::ReportPage& page) {
         .meaning = "robots reached their goal, a stored view. Squares: starts. Crosses: goals. "
                    "Blue: driven paths.",
         .part = 8}},
-      "Commands for your own images",
+      "Your own images",
       {"panonav memorise photos place.panonav --kind equirectangular --elevation-deg -30 40",
        "panonav localise place.panonav now.jpg"});
 }

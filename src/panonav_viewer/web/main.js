@@ -17,8 +17,8 @@ const skeleton = `
 <button class="forth" type="button" aria-label="Next image" aria-keyshortcuts="ArrowRight">&#9654;</button>
 <input class="slider" type="range" min="0" max="0" value="0" aria-label="Image of the run">
 <label>Speed <select class="speed"><option>0.5</option><option selected>1</option><option>2</option><option>5</option><option>20</option></select></label>
-<span class="hint">Space: pause. Arrows: one picture. Home, End: first, last. Digits: panels. Plus, minus, 0: zoom of the map; on it, arrows and Enter: views.</span></div>`;
-const panels = { map: 'Map', pictures: 'Pictures', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
+<span class="hint">Space: pause. Arrows: one image. Home, End: first, last. Digits: panels. Plus, minus, 0: zoom of the map; on it, arrows and Enter: views.</span></div>`;
+const panels = { map: 'Map', pictures: 'Images', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
 
 // Returns the names of the panels that have something to show.
 function choosePanels({ live, moments = [], retained = {}, route }) {
