@@ -39,8 +39,8 @@ TEST_F(Arrange, TheReportUnfolds) {
   run_well({"arrange", memory, "--no-save", "--report", report});
   const std::string page = bytes_of(report + "/index.html");
   (void)text_of_page(page);
-  EXPECT_EQ(plots_of(page), (std::vector<std::string>{"Arrangement, step by step", "true positions",
-                                                      "computed positions"}));
+  EXPECT_EQ(plots_of(page), (std::vector<std::string>{"Arrangement, step by step", "True positions",
+                                                      "Computed positions"}));
   const json frames = panels_of(page).front().data["frames"];
   ASSERT_GE(frames.size(), 5U);
   const auto views = [](const json& frame) {

@@ -165,8 +165,6 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
     std::vector<viewer::ReportPlot> plots;
     for (viewer::MapPlot& plot : draw_lattice(lattice, memory))
       plots.push_back({std::move(plot), ""});
-    plots.front().caption = "True positions";
-    plots.back().caption = "Computed positions";
     page.add_plots(plots);
   }
   page.begin_section("Groups");

@@ -56,7 +56,7 @@ std::vector<std::optional<Point2>> align_to_truth(const Lattice& lattice,
 }
 
 std::vector<viewer::MapPlot> draw_lattice(const Lattice& lattice, const VisualMemory& memory) {
-  viewer::MapPlot map = draw_plot("computed positions", lattice, align_to_truth(lattice, memory));
+  viewer::MapPlot map = draw_plot("Computed positions", lattice, align_to_truth(lattice, memory));
   if (!has_true_positions(lattice, memory)) {
     if (!lattice.metric) map.unit = "median distance to the nearest view";
     return {map};
@@ -67,7 +67,7 @@ std::vector<viewer::MapPlot> draw_lattice(const Lattice& lattice, const VisualMe
     const auto& pose = memory.info(node.view).pose;
     if (node.component == 0 && pose) truth.back() = pose->position();
   }
-  return {draw_plot("true positions", lattice, truth), map};
+  return {draw_plot("True positions", lattice, truth), map};
 }
 
 void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,

@@ -71,12 +71,12 @@ viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
   std::vector<Point2> map = nodes.map;
   if (is_comparable(nodes.map, nodes.truth)) {
     map = apply_alignment(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
-    plot.title = "map and ground truth";
+    plot.title = "Map and ground truth";
     plot.layers.push_back(
         {.label = "ground truth", .colour = viewer::PlotColour::black, .lines = {nodes.truth}});
     if (is_comparable(nodes.odometry, nodes.truth)) {
       plot.layers.push_back(
-          {.label = "wheels",
+          {.label = "odometry",
            .colour = viewer::PlotColour::vermilion,
            .lines = {apply_alignment(nodes.odometry, align(nodes.odometry, nodes.truth))}});
     }
