@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -124,21 +125,16 @@ struct PlaceSearch::Implementation {
       sketchers[part].flush();
       store_areas();
     };
+    const auto try_part = [&](std::size_t part) {
+      try {
+        read_part(part, part == 0 ? *own : *connect());
+      } catch (...) {
+        faults[part] = std::current_exception();
+      }
+    };
     std::vector<std::thread> threads;
-    for (std::size_t part = 1; part < parts; ++part) {
-      threads.emplace_back([&, part] {
-        try {
-          read_part(part, *connect());
-        } catch (...) {
-          faults[part] = std::current_exception();
-        }
-      });
-    }
-    try {
-      read_part(0, *own);
-    } catch (...) {
-      faults[0] = std::current_exception();
-    }
+    for (std::size_t part = 1; part < parts; ++part) threads.emplace_back(try_part, part);
+    try_part(0);
     for (std::thread& thread : threads) thread.join();
     for (const std::exception_ptr& fault : faults) {
       if (fault) std::rethrow_exception(fault);
@@ -333,6 +329,14 @@ struct PlaceSearch::Snapshot::Implementation {
     }
   }
 
+  /// Reads those of the views that are not cached.
+  void read_if_needed(std::span<const ViewId> views) {
+    std::vector<ViewId> unread;
+    std::ranges::copy_if(views, std::back_inserter(unread),
+                         [this](ViewId view) { return !cached.contains(view); });
+    if (!unread.empty()) read(unread);
+  }
+
   void read(std::span<const ViewId> views) {
     mark_failed_on_throw([&] {
       tables->read_available_views(views, [&](const ViewRow& row) {
@@ -388,11 +392,7 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
   SearchResult result = own.sketched->sketches.search(
       query, options, mask,
       [&own](std::span<const ViewId> views, const ViewSketches::TakeView& take) {
-        std::vector<ViewId> unread;
-        for (const ViewId view : views) {
-          if (!own.cached.contains(view)) unread.push_back(view);
-        }
-        if (!unread.empty()) own.read(unread);
+        own.read_if_needed(views);
         for (const ViewId view : views) {
           const auto found = own.cached.find(view);
           if (found != own.cached.end()) take(view, found->second.signature.magnitudes);
@@ -405,14 +405,8 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
 
 VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
   Implementation& own = *implementation_;
-  std::vector<ViewId> ascending(views.begin(), views.end());
-  std::ranges::sort(ascending);
-  ascending.erase(std::unique(ascending.begin(), ascending.end()), ascending.end());
-  std::vector<ViewId> unread;
-  for (const ViewId view : ascending) {
-    if (!own.cached.contains(view)) unread.push_back(view);
-  }
-  if (!unread.empty()) own.read(unread);
+  const std::set<ViewId> ascending(views.begin(), views.end());
+  own.read_if_needed(views);
   const MemoryHeader& header = own.search->header;
   VisualMemory memory(header.shape, header.full_scale, header.elevations);
   for (const ViewId view : ascending) {
@@ -437,15 +431,13 @@ std::optional<ViewId> PlaceSearch::Snapshot::find(std::string_view name) {
 
 std::vector<ViewId> PlaceSearch::Snapshot::views_within(std::span<const PositionBounds> bounds) {
   Implementation& own = *implementation_;
-  std::vector<ViewId> views;
+  std::set<ViewId> views;
   own.mark_failed_on_throw([&] {
     for (const PositionBounds& each : bounds) {
-      for (const PosedView& row : own.tables->views_within(each)) views.push_back(row.id);
+      for (const PosedView& row : own.tables->views_within(each)) views.insert(row.id);
     }
   });
-  std::ranges::sort(views);
-  views.erase(std::unique(views.begin(), views.end()), views.end());
-  return views;
+  return {views.begin(), views.end()};
 }
 
 std::vector<PosedView> PlaceSearch::Snapshot::posed_views() {

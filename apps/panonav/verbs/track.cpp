@@ -199,6 +199,20 @@ bool start_at_viewer_pose(Tracker& tracker, RunRecord& record) {
   return true;
 }
 
+/// `visual`: the motion is read from the images.
+TrackerOptions make_tracker_options(const Arguments& declared, const TrackArguments& arguments,
+                                    const PictureSource& source, bool visual) {
+  TrackerOptions options{
+      arguments.filter,
+      visual && !declared.is_set("odometry") ? visual_odometry_noise() : arguments.odometry,
+      source};
+  // These use all views of the memory, whatever its size.
+  if (visual || arguments.report || arguments.record.file || arguments.record.view) {
+    options.max_held_views = std::numeric_limits<std::size_t>::max();
+  }
+  return options;
+}
+
 /// Follows a robot through images of a live source, which has no odometry: motion is read from the
 /// images.
 class LiveTrack {
@@ -207,9 +221,7 @@ class LiveTrack {
             const PictureSource& source, Session& session)
       : arguments_(arguments),
         session_(session),
-        tracker_(file, {arguments.filter,
-                        declared.is_set("odometry") ? arguments.odometry : visual_odometry_noise(),
-                        source}),
+        tracker_(file, make_tracker_options(declared, arguments, source, true)),
         odometry_(visual_odometry(tracker_.memory())),
         record_(arguments.record, std::span(&arguments.memory, 1), true, session,
                 {.memory = arguments.memory, .takes = viewer::ViewerInput::pose}) {
@@ -332,15 +344,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   std::vector<double> seconds;
   if (arguments.tum)
     seconds = trajectory_stamps(run, "track", arguments.dataset, *arguments.tum, session);
-  TrackerOptions options{
-      arguments.filter,
-      visual && !declared.is_set("odometry") ? visual_odometry_noise() : arguments.odometry,
-      run.source};
-  // These use all views of the memory, whatever its size.
-  if (visual || arguments.report || arguments.record.file || arguments.record.view) {
-    options.max_held_views = std::numeric_limits<std::size_t>::max();
-  }
-  Tracker tracker(arguments.memory, options);
+  Tracker tracker(arguments.memory, make_tracker_options(declared, arguments, run.source, visual));
   if (visual) read_motion(run, arguments.dataset, tracker, session);
   set_start(tracker, arguments);
   TrackSettings settings{.every = arguments.every};
