@@ -130,6 +130,9 @@ def synchronised(server, folder):
     for file in one, folder / "new.panonav":
         done = subprocess.run([PANONAV, "synchronise", file, address], capture_output=True, text=True, timeout=120)
         assert done.returncode == 0 and "left out: view 3 does not match its checksum" in done.stderr, done
+    checked = subprocess.run([PANONAV, "verify", server.memory("fleet")], capture_output=True, text=True, timeout=120)
+    assert checked.returncode == 2 and "left out" not in checked.stderr, checked
+    assert checked.stdout.count("view 3 does not match its checksum") == 1, checked
     assert names(one) == before
     assert names(folder / "new.panonav") == names(server.memory("fleet"))
     server.sql(f"DELETE FROM panonav.views WHERE memory = {identity} AND id = 3")

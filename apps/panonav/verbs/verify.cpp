@@ -1,11 +1,13 @@
 #include "cli/verbs.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 
 namespace panonav::command {
 
 namespace {
 
 ExitCode verify(const std::string& path, Session& session) {
+  set_left_out_handler({});  // `verify` lists these rows itself
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto faults = memory.verify();
   if (session.json()) {
