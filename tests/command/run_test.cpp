@@ -81,6 +81,10 @@ TEST_F(Walk, PartsOfAVideoAreTaken) {
   expect_refusal({"localise", path("a.panonav"), path("walk/view_000.png"), "--every", "2"},
                  "one image");
   expect_refusal({"memorise", path("walk.mp4"), path("c.panonav")}, "--kind");
+  expect_refusal(with({"catchment", path("walk.mp4")}, panoramas_),
+                 "a recording of topics needs poses");
+  expect_refusal(with({"route", "record", path("walk.mp4"), path("c.panonav")}, panoramas_),
+                 "a recording of topics needs odometry");
 }
 
 TEST_F(Walk, StandardInputGivesTheMemoryOfItsPictures) {

@@ -275,11 +275,13 @@ std::vector<double> trajectory_stamps(const Dataset& run, const std::string& ver
   return seconds;
 }
 
+bool can_have_table(const std::string& input) {
+  std::error_code ignored;
+  return fs::is_directory(input, ignored) && !recordings::is_recording(input);
+}
+
 std::string explain_columns(const std::string& folder, const std::string& columns,
                             const std::string& values) {
-  if (recordings::is_recording(folder)) {
-    return "; a recording needs odometry (nav_msgs/Odometry or TF) or poses (/ground_truth)";
-  }
   const bool described = has_dataset_file(folder);
   const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});
   const std::string table = "the columns file," + columns + " and a line for each image, such as " +
@@ -295,9 +297,7 @@ Dataset read_dataset_with_columns(const std::string& folder, const PictureArgume
                                   const std::optional<PictureSource>& remembered,
                                   const std::string& columns, const std::string& values,
                                   Session& session) {
-  std::error_code ignored;
-  if (fs::is_directory(folder, ignored) && !has_dataset_file(folder) &&
-      !recordings::is_recording(folder) && !picture_source(pictures)) {
+  if (can_have_table(folder) && !has_dataset_file(folder) && !picture_source(pictures)) {
     throw FileError(folder, "has no dataset.toml, so the positions of its images are unknown" +
                                 explain_columns(folder, columns, values));
   }

@@ -86,8 +86,12 @@ void require_later_stamp(const std::string& dataset, const std::string& file, do
                                                     const std::string& dataset,
                                                     const std::string& tum, Session& session);
 
-/// Explains how to add columns to a recording, for the end of an error message: the table of a data
-/// set gets them, a folder of images needs a dataset.toml first. `values`: an example of a line.
+/// True for data sets and folders of images, whose poses a table gives; false for recordings of
+/// topics and videos.
+[[nodiscard]] bool can_have_table(const std::string& input);
+/// Explains how to add columns to a data set or folder of images, for the end of an error message:
+/// the table of a data set gets them, a folder of images needs a dataset.toml first. `values`: an
+/// example of a line.
 [[nodiscard]] std::string explain_columns(const std::string& folder, const std::string& columns,
                                           const std::string& values);
 /// Opens a data set as `open_recording`. Throws FileError on a folder without a table and says

@@ -165,10 +165,13 @@ ExitCode compare_ahead(const CatchmentArguments& arguments, const RecordedViews&
 void check_posed(const RecordedViews& views, const std::string& name) {
   for (std::size_t i = 0; i < views.files.size(); ++i) {
     if (views.poses[i] && views.poses[i]->heading_rad) continue;
-    throw FileError(name, "image " + views.files[i] + " has no " +
-                              (views.poses[i] ? "heading" : "position") +
-                              ", and both are needed; with --ahead N they are not needed" +
-                              explain_columns(name, pose_columns, pose_values));
+    throw FileError(
+        name, "image " + views.files[i] + " has no " + (views.poses[i] ? "heading" : "position") +
+                  "; the positions and headings of all images are needed, except "
+                  "with --ahead N" +
+                  (can_have_table(name) ? explain_columns(name, pose_columns, pose_values)
+                                        : "; a recording of topics needs poses (PoseStamped on "
+                                          "/ground_truth)"));
   }
 }
 
@@ -283,10 +286,14 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
 
 Run declare_catchment(Arguments& arguments) {
   auto values = std::make_shared<CatchmentArguments>();
-  arguments.positional("DATASET", values->dataset,
-                       "Data set with positions and headings; each view is used as a home");
-  arguments.option("--current DATASET", values->current,
-                   "Data set of the current views; default: the same data set");
+  arguments.positional(
+      "DATASET", values->dataset,
+      "Data set, folder of images, video or recording; each view is used as a home. The "
+      "positions and headings of all images are needed (of a recording: poses on "
+      "/ground_truth), except with --ahead N");
+  arguments.option(
+      "--current DATASET", values->current,
+      "Data set of the current views, also with positions and headings; default: DATASET");
   declare_pictures(arguments, values->pictures);
   arguments.option("--up-to-m", values->settings.up_to_m,
                    "Largest distance of two views whose results are averaged");
@@ -299,9 +306,10 @@ Run declare_catchment(Arguments& arguments) {
   arguments.option(
       "--stages K,K,...", values->stages,
       "Drive home in stages; each K is the highest frequency of a stage, for example 2,4,10");
-  arguments.option("--ahead N", values->ahead, 1,
-                   "Only compare each view with the view N images later; this measures the "
-                   "direction of travel relative to the camera and needs no positions");
+  arguments.option(
+      "--ahead N", values->ahead, 1,
+      "Only compare each view with the view N images later; this measures the "
+      "direction of travel relative to the camera and needs no positions and headings");
   arguments.option(
       "--goal IMAGE", values->goal,
       "Image for which the report shows home vectors; default: the image in the middle");

@@ -8,7 +8,6 @@
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "panonav_recordings/recording.hpp"
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
 #include "runs/memorising.hpp"
@@ -73,10 +72,11 @@ std::vector<Pose2> choose_poses(const RecordArguments& arguments, const Dataset&
             ? "has no odometry; allowed for --odometry: a table with the columns "
               "'odom_x_m', 'odom_y_m' and 'odom_heading_deg'"
             : "has neither positions nor odometry" +
-                  explain_columns(arguments.dataset, position_columns, position_values) +
-                  (recordings::is_recording(arguments.dataset)
-                       ? ""
-                       : "; or odom_x_m,odom_y_m,odom_heading_deg instead"));
+                  (can_have_table(arguments.dataset)
+                       ? explain_columns(arguments.dataset, position_columns, position_values) +
+                             "; or odom_x_m,odom_y_m,odom_heading_deg instead"
+                       : "; a recording of topics needs odometry (nav_msgs/Odometry or TF) or "
+                         "poses (/ground_truth)"));
   }
   from_odometry = true;
   return poses;
