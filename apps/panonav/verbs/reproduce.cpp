@@ -9,13 +9,14 @@ namespace panonav::command {
 
 namespace {
 
-// "-0.056 (..)  holds", a line each.
+/// Prints a line for each row: "  WHAT: FIGURE", and after it, if there is a target, "  holds" or
+/// "  MISSED: by DIFFERENCE, REASON".
 void print_rows(const lab::Reproduction& reproduction, Session& session) {
   for (const lab::ResultRow& row : reproduction.rows) {
     std::string line = "  " + row.what + ": " + session.bold(lab::format_figure(row));
     if (row.target) {
       line += "  " + (row.holds() ? session.green("holds")
-                                  : session.red("MISSED") + ", missed " + lab::explain_miss(row));
+                                  : session.red("MISSED") + ": " + lab::explain_miss(row));
     }
     session.print(line);
   }

@@ -70,7 +70,8 @@ std::vector<std::string> translate_ros_arguments(std::span<const std::string> ty
       continue;
     } else if (info.value.empty()) {
       if (values.size() != 1 || (values[0] != "true" && values[0] != "false")) {
-        throw UsageError(where + ": " + name + " is not valid; allowed: true, false");
+        throw UsageError(where + ": " + name + " is '" + to_readable_line(join_texts(values)) +
+                         "'; allowed: true, false");
       }
       if (values[0] == "true") words.push_back(info.name);
     } else {

@@ -39,7 +39,7 @@ std::string describe_report(const fleet::SynchronisationReport& report) {
       {report.updated_in_file, "changed in the file"},
       {report.removed_on_server, "removed on the server"},
       {report.removed_in_file, "removed from the file"},
-      {report.left, "skipped, because they lie outside of its areas"},
+      {report.left, "kept only on the server, because they lie outside the areas of the file"},
       {report.renamed, "renamed, because other views had the same names"},
       {report.links_uploaded, "links changed on the server"},
       {report.links_downloaded, "links changed in the file"},
@@ -93,9 +93,9 @@ ExitCode synchronise(const SynchroniseArguments& arguments, Session& session) {
   session.print(arguments.memory + " and " + arguments.server + ": " + describe_report(report) +
                 ". " + arguments.memory + " holds " + std::to_string(report.views) + " views.");
   if (report.conflicts > 0) {
-    session.note("of " + std::to_string(report.conflicts) +
-                 " views changes of this file were discarded, because others had changed or "
-                 "removed these views first");
+    session.note(std::to_string(report.conflicts) +
+                 " changes of this file were discarded, because others had changed or removed the "
+                 "same views first");
   }
   if (report.restored) {
     session.note(
@@ -109,10 +109,12 @@ Run declare_synchronise(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file of the robot, new or existing");
   arguments.positional("ADDRESS", values->server,
                        "Address of a memory on a server, new or existing");
-  arguments.option("--around", "X_M Y_M", values->around,
-                   "Keep only the areas (squares of 10 m) around this position");
+  arguments.option(
+      "--around", "X_M Y_M", values->around,
+      "Keep in the file only the views in areas (squares of 10 m) near this position, and "
+      "views without a position");
   arguments.option("--within-m", values->within_m,
-                   "Distance from the position of --around in metres");
+                   "Largest distance of these areas from the position of --around in metres");
   return [values](Session& session) { return synchronise(*values, session); };
 }
 

@@ -59,8 +59,8 @@ void check_arguments(const Arguments& declared, const TrackArguments& arguments)
   const bool y = arguments.start_y_m.has_value();
   if (x != y || (x && !arguments.start_heading_deg)) {
     throw UsageError(
-        "--start-x-m and --start-y-m need --start-heading-deg; --start-heading-deg can be used "
-        "alone");
+        "--start-x-m and --start-y-m must be set together and need --start-heading-deg; "
+        "--start-heading-deg can be used alone");
   }
   if (!x && declared.is_set("start")) {
     throw UsageError(
