@@ -441,9 +441,10 @@ bool Arguments::is_set(const std::string& section, const std::string& name) cons
 }
 
 std::string Arguments::config_template(std::string_view verb) const {
-  std::string text = "# Options for panonav " + std::string(verb) +
-                     " --config FILE. Remove '# ' at the start of a line to set its option;\n# the "
-                     "values shown are the defaults. Options on the command line have priority.\n";
+  std::string text = "# Options of panonav " + std::string(verb) +
+                     ", for --config FILE. Options on the command line have priority.\n# A line "
+                     "'# NAME = VALUE' shows a default; to change it, remove '# ' and replace the "
+                     "value.\n";
   for (const auto& section : implementation_->sections) {
     text += "\n[" + section.name + "]\n";
     OptionLister lister([&](const ListedOption& option) {

@@ -21,7 +21,7 @@ std::string describe_rotation(double heading_rad) {
   // negative.
   const double turned = wrap_angle(-heading_rad);
   if (std::abs(degrees(turned)) < 0.5) return "same heading as at home";
-  if (std::abs(degrees(turned)) >= 179.5) return "opposite heading to the heading at home";
+  if (std::abs(degrees(turned)) >= 179.5) return "heading opposite to that at home";
   return "the robot has rotated by " + describe_direction(turned);
 }
 

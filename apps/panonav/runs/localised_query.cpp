@@ -76,7 +76,7 @@ std::string format_line(const LocalisedQuery& answer, Session& session) {
   if (found.heading_rad) {
     line += "  heading " + format_fixed(degrees(*found.heading_rad), 1) + " degrees";
   } else if (nearest.heading_rad) {
-    line += "  turned " + format_fixed(degrees(*nearest.heading_rad), 1) +
+    line += "  rotated by " + format_fixed(degrees(*nearest.heading_rad), 1) +
             " degrees relative to this view";
   }
   for (const auto& level : found.areas) {

@@ -64,8 +64,9 @@ ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
   const auto evaluation = evaluate_estimate(arguments.estimate, arguments.truth, arguments.options);
   if (!evaluation) {
     return session.no_answer("panonav evaluate: fewer than two poses of " + arguments.estimate +
-                             " have a stamp within " + arguments.truth +
-                             "; check that both use the same clock");
+                             " are in the time range of " + arguments.truth +
+                             ", without its gaps longer than --max-gap-s; check that both use the "
+                             "same clock");
   }
   if (session.json()) {
     session.print(json_line(to_json(*evaluation)));
@@ -109,9 +110,9 @@ Run declare_evaluate(Arguments& arguments) {
 
 Verb evaluate_verb() {
   return {"evaluate", "Compare an estimated trajectory or map with the true trajectory",
-          "Poses with the same stamp are compared. The estimate is first aligned with the true "
-          "trajectory by least squares, unless --align is false. The exit code is 1 if no stamps "
-          "match.",
+          "The true poses are interpolated to the stamps of the estimate. The estimate is first "
+          "aligned with the true trajectory by least squares, unless --align is false. The exit "
+          "code is 1 if fewer than two estimated poses have a true pose.",
           "  panonav evaluate estimate.tum truth.tum\n"
           "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
           "  panonav evaluate office.panonav run/poses.csv",

@@ -120,7 +120,7 @@ ExitCode gallery(const GalleryArguments& arguments, Session& session) {
   views.resize(std::min(found, max_views));
 
   viewer::ReportPage page(
-      "What " + memory_name(arguments.memory) + " remembers",
+      "Views of " + memory_name(arguments.memory),
       "This page shows the stored image (thumbnail) of each view of the memory. The forward "
       "direction is in the middle, and the direction behind the robot is at both edges. Below each "
       "image are the view's id, name, position and heading.");

@@ -51,8 +51,7 @@ ExitCode rename(const RenameArguments& arguments, Session& session) {
 Run declare_rename(Arguments& arguments) {
   auto values = std::make_shared<RenameArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positional("VIEW", values->name,
-                       "Name or id of a view; with --route: name or id of a route");
+  arguments.positional("VIEW", values->name, "Name or id of a view; with --route: name of a route");
   arguments.positional("NEW_NAME", values->new_name, "New name, not yet used in the memory");
   arguments.flag("--route", values->route, "Rename a route instead of a view");
   return [values](Session& session) { return rename(*values, session); };

@@ -126,7 +126,7 @@ Run declare_serve(Arguments& arguments) {
 }  // namespace
 
 Verb serve_verb() {
-  return {"serve", "Run an HTTP server that finds the position and heading of images",
+  return {"serve", "Run an HTTP server that finds the position and heading of a robot from images",
           "Clients send a PNG or JPEG with POST to /v1/memories/NAME/localise and get the same "
           "JSON as from panonav localise. GET /v1/memories lists the memories. GET /health reports "
           "whether the server is ready. GET /metrics is for Prometheus. If the file of a memory "

@@ -137,9 +137,9 @@ Run declare_simulate_verb(Arguments& arguments) {
       "Built-in scene (" + join_texts(scenes) + "), Gazebo world (.world, .sdf) or mesh file",
       {scenes.begin(), scenes.end()});
   arguments.optional_positionals("OUT", values->out, "New or empty folder for the data set");
-  arguments.flag(
-      "--ros2", values->ros2,
-      "Simulate a robot for ROS 2 instead of a data set; ROS 2 reads its images and drives it");
+  arguments.flag("--ros2", values->ros2,
+                 "Simulate a robot for ROS 2 instead of making a data set; ROS 2 reads its images "
+                 "and drives it");
   arguments.option(
       "--grid METRES", values->grid_m,
       "Take images at all free places of a grid; same as --path grid --spacing-m METRES");
