@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "cli/arguments.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/mapping/map_measures.hpp"
 #include "panonav/pipeline/mapper.hpp"
@@ -11,6 +12,16 @@
 #include "panonav_viewer/plot.hpp"
 
 namespace panonav::command {
+
+/// Files for the map that a verb makes.
+struct MapFileArguments {
+  std::optional<std::string> tum;
+  std::optional<std::string> graph;
+  std::optional<std::string> picture;
+};
+
+/// Adds --tum, --graphml and --picture.
+void declare_map_files(Arguments& arguments, MapFileArguments& files);
 
 /// The largest component of the map with its closures; where the recording knows positions, the map
 /// is laid over them, and so is the odometry of its wheels.

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "cli/arguments.hpp"
 #include "cli/session.hpp"
 #include "panonav/core/error.hpp"
 
@@ -33,6 +34,15 @@ bool is_free(const std::filesystem::path& folder, const std::string& page) {
 
 }  // namespace
 
+void declare_report(Arguments& arguments, std::optional<std::string>& report,
+                    std::string_view content) {
+  arguments.option("--report FOLDER", report,
+                   "Write " + std::string(content) +
+                       " into this folder; the folder must be new, empty or contain an earlier "
+                       "report");
+  arguments.writes({"--report"});
+}
+
 void prepare_report_folder(const std::filesystem::path& folder, std::string_view verb,
                            std::string_view page) {
   namespace fs = std::filesystem;
@@ -41,9 +51,10 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
   const bool ours = is_made_by(folder / page, "panonav " + std::string(verb));
   if (there &&
       (!fs::is_directory(folder, error) || (!ours && !is_free(folder, std::string(page))))) {
-    throw FileError(folder.string(),
-                    "exists and was not made by panonav " + std::string(verb) +
-                        "; allowed: a new folder, or the folder of an earlier report of this verb");
+    throw FileError(
+        folder.string(),
+        "exists and was not made by panonav " + std::string(verb) +
+            "; allowed: a new or empty folder, or the folder of an earlier report of this verb");
   }
   fs::create_directories(folder, error);
   if (error) throw FileError(folder.string(), "cannot be created: " + error.message());

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -9,8 +11,12 @@
 
 namespace panonav::command {
 
+class Arguments;
 class Session;
 
+/// Adds --report, whose help says what is written into the folder ("a page with both views").
+void declare_report(Arguments& arguments, std::optional<std::string>& report,
+                    std::string_view content);
 /// Makes the folder of a report. Throws FileError when something is there that is neither empty nor
 /// has a `page` whose generator is "panonav VERB".
 void prepare_report_folder(const std::filesystem::path& folder, std::string_view verb,

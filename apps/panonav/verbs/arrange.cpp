@@ -11,6 +11,7 @@
 #include "reports/arrange_report.hpp"
 #include "reports/lattice_picture.hpp"
 #include "reports/map_measures.hpp"
+#include "reports/map_picture.hpp"
 #include "reports/report_page.hpp"
 #include "runs/recording.hpp"
 
@@ -22,9 +23,7 @@ struct ArrangeArguments {
   std::string memory;
   std::optional<std::string> odometry;
   PictureArguments pictures;  // of a recording of topics, whose pictures are not read
-  std::optional<std::string> tum;
-  std::optional<std::string> graph;
-  std::optional<std::string> picture;
+  MapFileArguments files;
   std::optional<std::string> report;
   bool no_save = false;
   LatticeOptions lattice;
@@ -145,12 +144,12 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
                                   session.executor(), watch);
   session.detail("views arranged");
   if (!arguments.no_save) store_lattice(lattice, memory, file);
-  if (arguments.tum) write_trajectory(*arguments.tum, make_trajectory(lattice, memory));
-  if (arguments.graph) {
-    write_graph(*arguments.graph, to_topological_map(lattice),
+  if (arguments.files.tum) write_trajectory(*arguments.files.tum, make_trajectory(lattice, memory));
+  if (arguments.files.graph) {
+    write_graph(*arguments.files.graph, to_topological_map(lattice),
                 [&](ViewId view) { return memory.info(view).name; });
   }
-  if (arguments.picture) write_lattice_picture(*arguments.picture, lattice, memory);
+  if (arguments.files.picture) write_lattice_picture(*arguments.files.picture, lattice, memory);
   if (arguments.report) {
     write_arrange_report(*arguments.report, memory_name(file.path()), lattice, memory, steps);
   }
@@ -158,8 +157,9 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
     session.print(json_line(to_json(arguments, lattice, memory)));
   } else {
     print_result(lattice, memory, session);
-    if (arguments.picture && lattice.components.size() > 1) {
-      session.print(*arguments.picture + " shows the largest connected component of the map, " +
+    if (arguments.files.picture && lattice.components.size() > 1) {
+      session.print(*arguments.files.picture +
+                    " shows the largest connected component of the map, " +
                     std::to_string(lattice.components.front().views) + " of " +
                     std::to_string(lattice.nodes.size()) + " views.");
     }
@@ -175,23 +175,14 @@ Run declare_arrange(Arguments& arguments) {
                    "Read the robot's motion between views from this data set or recording; images "
                    "are assigned to views by their names");
   declare_topics(arguments, values->pictures.topics);
-  arguments.option("--tum FILE", values->tum,
-                   "Write the poses of the largest connected component to this file: as CSV if the "
-                   "name ends in .csv, otherwise as TUM text");
-  arguments.option("--graphml FILE", values->graph, "Write the map as a graph to this file");
-  arguments.option(
-      "--picture FILE", values->picture,
-      "Draw the map into this PNG or SVG file, next to the true positions if they are known");
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page that shows the arrangement step by step into this folder; the "
-                   "folder must be new or contain an earlier report");
+  declare_map_files(arguments, values->files);
+  declare_report(arguments, values->report, "a page that shows the arrangement step by step");
   arguments.flag("--no-save", values->no_save, "Do not change the memory file");
   arguments.options("lattice", values->lattice);
   arguments.options("coarse_motion", values->motion, "motion");
   arguments.show_in_help({"--neighbours"});
   arguments.reject_options_unless(
       {"[coarse_motion]"}, [values] { return values->odometry.has_value(); }, "without --odometry");
-  arguments.writes({"--tum", "--graphml", "--picture", "--report"});
   return [values](Session& session) { return arrange_views(*values, session); };
 }
 

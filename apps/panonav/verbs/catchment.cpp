@@ -313,9 +313,7 @@ Run declare_catchment(Arguments& arguments) {
   arguments.option(
       "--goal IMAGE", values->goal,
       "Image for which the report shows home vectors; default: the image in the middle");
-  arguments.option("--report FOLDER", values->report,
-                   "Write curves and maps into this folder; the folder must be new or contain an "
-                   "earlier report");
+  declare_report(arguments, values->report, "curves and maps");
   declare_homing(arguments, values->homing);
   arguments.options("run", values->settings.run);
   arguments.hide_from_help({"--bin-m", "--goal"});
@@ -325,7 +323,6 @@ Run declare_catchment(Arguments& arguments) {
       "with --ahead, which compares the images of one recording in their order");
   arguments.reject_options_unless(
       {"--goal"}, [values] { return values->report.has_value(); }, "without --report");
-  arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return catchment(arguments, *values, session); };
 }
 

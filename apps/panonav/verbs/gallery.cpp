@@ -167,8 +167,9 @@ ExitCode gallery(const GalleryArguments& arguments, Session& session) {
 Run declare_gallery(Arguments& arguments) {
   auto values = std::make_shared<GalleryArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.required_option("-o,--out FOLDER", values->out,
-                            "Folder for the page; it must be new or contain an earlier gallery");
+  arguments.required_option(
+      "-o,--out FOLDER", values->out,
+      "Folder for the page; it must be new, empty or contain an earlier gallery");
   declare_selection(arguments, values->selection);
   arguments.writes({"--out"});
   return [values](Session& session) { return gallery(*values, session); };

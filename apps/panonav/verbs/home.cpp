@@ -163,11 +163,8 @@ Run declare_home(Arguments& arguments) {
                        "Current image, or a data set with several current images");
   arguments.option("--memory FILE", values->memory, "Memory file that contains the view GOAL");
   declare_pictures(arguments, values->pictures);
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page with both views and the direction home into this folder; the "
-                   "folder must be new or contain an earlier report");
+  declare_report(arguments, values->report, "a page with both views and the direction home");
   declare_homing(arguments, values->homing);
-  arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return home(arguments, *values, session); };
 }
 

@@ -176,9 +176,7 @@ Run declare_localise(Arguments& arguments) {
   arguments.hide_from_help({"--record"});
   arguments.option("-o,--out FILE", values->out,
                    "Write the answers as CSV, one line for each image");
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page with each image above its best match into this folder; the folder "
-                   "must be new or contain an earlier report");
+  declare_report(arguments, values->report, "a page with each image above its best match");
   arguments.flag(
       "--exclude-same-file", values->exclude_same_file,
       "Do not compare an image with the view of the same file name (leave-one-out test)");
@@ -194,7 +192,7 @@ Run declare_localise(Arguments& arguments) {
   declare_changes(arguments, values);
   arguments.reject_options_unless(
       {"[accuracy]"}, [values] { return values->areas; }, "without --areas");
-  arguments.writes({"--out", "--report"});
+  arguments.writes({"--out"});
   return [values, &arguments](Session& session) { return localise(arguments, *values, session); };
 }
 

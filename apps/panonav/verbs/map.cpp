@@ -29,9 +29,7 @@ namespace fs = std::filesystem;
 struct MapArguments {
   std::string dataset;
   std::string memory;
-  std::optional<std::string> tum;
-  std::optional<std::string> graph;
-  std::optional<std::string> picture;
+  MapFileArguments files;
   std::optional<std::string> report;
   RunRecordArguments record;
   PictureArguments pictures;
@@ -143,19 +141,20 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
                   format_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
   }
   if (comparison) print_comparison(*comparison, run, session);
-  if (arguments.picture) {
-    session.print(*arguments.picture + " shows " +
+  if (arguments.files.picture) {
+    session.print(*arguments.files.picture + " shows " +
                   (sizes.size() > 1 ? "the largest connected component of the map, " +
                                           std::to_string(std::ranges::max(sizes)) + " of " +
                                           std::to_string(nodes) + " places"
                                     : "the map"));
   }
   session.print(arguments.memory + " contains the map and the views of its places.");
-  if (arguments.tum) {
-    session.print(*arguments.tum + " contains the poses" +
+  if (arguments.files.tum) {
+    session.print(*arguments.files.tum + " contains the poses" +
                   (sizes.size() > 1 ? " of the largest connected component." : "."));
   }
-  if (arguments.graph) session.print(*arguments.graph + " contains the map as a graph.");
+  if (arguments.files.graph)
+    session.print(*arguments.files.graph + " contains the map as a graph.");
 }
 
 Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
@@ -305,10 +304,10 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
   const Mapper::Result run = arguments.record.view
                                  ? map_in_view(arguments, recording, mapper, session)
                                  : map_recording(recording, mapper, session);
-  if (arguments.tum)
-    write_trajectory(*arguments.tum, make_trajectory(recording, run, arguments.dataset));
-  if (arguments.graph) {
-    write_graph(*arguments.graph, run.map, [&](ViewId view) {
+  if (arguments.files.tum)
+    write_trajectory(*arguments.files.tum, make_trajectory(recording, run, arguments.dataset));
+  if (arguments.files.graph) {
+    write_graph(*arguments.files.graph, run.map, [&](ViewId view) {
       const auto found =
           std::ranges::lower_bound(run.map.nodes, view, {}, &TopologicalMap::Node::view);
       const auto number = static_cast<std::size_t>(found - run.map.nodes.begin());
@@ -319,7 +318,7 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
   if (arguments.record.file || arguments.report) {
     record_map(arguments, recording, run, mapper.encoder(), played, session);
   }
-  if (arguments.picture) write_map_picture(*arguments.picture, recording, run);
+  if (arguments.files.picture) write_map_picture(*arguments.files.picture, recording, run);
   if (arguments.report) {
     write_map_report(*arguments.report, fs::path(arguments.memory).filename().string(), recording,
                      run, played);
@@ -337,20 +336,11 @@ Run declare_map(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory,
                        "Memory file (NAME.panonav); new views are added to it");
   declare_pictures(arguments, values->pictures);
-  arguments.option("--tum FILE", values->tum,
-                   "Write the poses of the largest connected component to this file: as CSV if the "
-                   "name ends in .csv, otherwise as TUM text");
-  arguments.option("--graphml FILE", values->graph, "Write the map as a graph to this file");
+  declare_map_files(arguments, values->files);
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
-  arguments.hide_from_help({"--record"});
-  arguments.option(
-      "--picture FILE", values->picture,
-      "Draw the map into this PNG or SVG file, next to the true positions if they are known");
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page that replays the drive on its map into this folder; the folder "
-                   "must be new or contain an earlier report");
-  arguments.hide_from_help({"--picture"});
+  declare_report(arguments, values->report, "a page that replays the drive on its map");
+  arguments.hide_from_help({"--record", "--picture"});
   arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
   arguments.options("signature", values->signature);
   arguments.options("mapping", values->mapper.mapping);
@@ -369,7 +359,6 @@ Run declare_map(Arguments& arguments) {
       {"--iterations", "--nearer-side"},
       [values] { return values->mapper.odometry.rule == VisualOdometryOptions::Rule::home_vector; },
       "with --rule published");
-  arguments.writes({"--tum", "--graphml", "--picture", "--report"});
   return [values, &arguments](Session& session) { return map(arguments, *values, session); };
 }
 

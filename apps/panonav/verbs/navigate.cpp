@@ -343,9 +343,7 @@ Run declare_navigate(Arguments& arguments) {
   arguments.option("--picture FILE", values->picture,
                    "Draw the directions to the goal, the planned path and the driven path into "
                    "this PNG or SVG file");
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page that replays the mission into this folder; the folder must be new "
-                   "or contain an earlier report");
+  declare_report(arguments, values->report, "a page that replays the mission");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   arguments.hide_from_help({"--record", "--view", "--picture"});
@@ -374,7 +372,7 @@ Run declare_navigate(Arguments& arguments) {
       {"--fine"},
       [&homing] { return homing.strategy == HomingPursuitOptions::Strategy::coarse_to_fine; },
       "without --strategy coarse_to_fine");
-  arguments.writes({"--log", "--picture", "--report"});
+  arguments.writes({"--log", "--picture"});
   return [values, &arguments](Session& session) { return navigate(arguments, *values, session); };
 }
 

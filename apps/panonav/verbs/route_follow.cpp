@@ -198,9 +198,8 @@ Run declare_route_follow(Arguments& arguments) {
                    "otherwise as TUM text");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page with the route, the computed positions and the predicted images "
-                   "into this folder; the folder must be new or contain an earlier report");
+  declare_report(arguments, values->report,
+                 "a page with the route, the computed positions and the predicted images");
   arguments.options("route_tracker", values->tracker);
   arguments.options("route_fit", values->fit);
   arguments.reject_options_unless(
@@ -208,7 +207,7 @@ Run declare_route_follow(Arguments& arguments) {
       "with --no-odometry");
   arguments.reject_options_unless(
       {"--coarse-deg"}, [values] { return values->fit.levels > 1; }, "with --levels 1");
-  arguments.writes({"--tum", "--report"});
+  arguments.writes({"--tum"});
   return [values, &arguments](Session& session) { return follow_run(arguments, *values, session); };
 }
 

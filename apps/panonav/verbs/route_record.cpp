@@ -182,12 +182,9 @@ Run declare_route_record(Arguments& arguments) {
                    "panoramas with unknown elevations (default: all rows)");
   arguments.flag("--odometry", values->odometry,
                  "Use the poses of the odometry, even if the data set has positions");
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page with the route panorama into this folder; the folder must be new "
-                   "or contain an earlier report");
+  declare_report(arguments, values->report, "a page with the route panorama");
   declare_pictures(arguments, values->pictures);
   arguments.options("line", values->line);
-  arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return record(arguments, *values, session); };
 }
 

@@ -410,14 +410,12 @@ Run declare_track(Arguments& arguments) {
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   declare_live(arguments, values->live);
-  arguments.option("--report FOLDER", values->report,
-                   "Write a page that replays the run into this folder; the folder must be new or "
-                   "contain an earlier report");
+  declare_report(arguments, values->report, "a page that replays the run");
   arguments.options("start", values->start, "start");
   arguments.options("monte_carlo", values->filter);
   arguments.options("odometry", values->odometry, "odometry");
   arguments.show_in_help({"--seed"});
-  arguments.writes({"--tum", "--report"});
+  arguments.writes({"--tum"});
   return [values, &arguments](Session& session) { return track_run(arguments, *values, session); };
 }
 
