@@ -178,7 +178,8 @@ TEST(ColumnDistances, NearTheMatchedTurnTheirRootsAreAtMostTheDifference) {
     const ColumnProfiles query(packed(smooth_view(seed)));
     const ColumnProfiles reference(packed(smooth_view(seed + 100)));
     const ColumnMatch match = match_columns(query, reference);
-    const double mean = mean_of_roots(column_distances_near(query, reference, match.heading_rad));
+    const double mean =
+        mean_of_roots(column_distances_at_heading(query, reference, match.heading_rad));
     EXPECT_GT(mean, 0.0);
     EXPECT_LE(mean, match.difference + 1e-3) << "seed " << seed;  // roots are rounded to bytes
     below += mean < match.difference - 1e-3;
@@ -193,7 +194,7 @@ TEST(ColumnDistances, AreTheLeastOfThreeTurnsColumnByColumn) {
     // Any heading less than half a step away, on any lap.
     for (const double heading_rad : {nearest * turn_step_rad, (nearest + 0.4) * turn_step_rad,
                                      (nearest - 0.4) * turn_step_rad - 2.0 * std::numbers::pi}) {
-      const auto distances = column_distances_near(query, reference, heading_rad);
+      const auto distances = column_distances_at_heading(query, reference, heading_rad);
       for (std::size_t c = 0; c < distances.size(); ++c) {
         double min_difference = std::numeric_limits<double>::infinity();
         for (int turn = nearest - 1; turn <= nearest + 1; ++turn) {
@@ -225,14 +226,15 @@ TEST(ColumnDistances, OfTheSameViewTurnedByWholeStepsAreZero) {
     constexpr double rounding = 1.0 / (40.0 * 16.0) + 1e-12;
     for (const double off : {0.0, 0.9, -0.9}) {
       const auto distances =
-          column_distances_near(profiles, reference, (turned + off) * turn_step_rad);
+          column_distances_at_heading(profiles, reference, (turned + off) * turn_step_rad);
       for (const double distance : distances) EXPECT_LE(distance, rounding) << turned << " " << off;
       EXPECT_GE(std::ranges::count(distances, 0.0), 28);
     }
-    const auto elsewhere = column_distances_near(profiles, reference, (turned + 8) * turn_step_rad);
+    const auto elsewhere =
+        column_distances_at_heading(profiles, reference, (turned + 8) * turn_step_rad);
     EXPECT_GT(std::ranges::max(elsewhere), 0.1);
   }
-  for (const double distance : column_distances_near(reference, reference, 0.0)) {
+  for (const double distance : column_distances_at_heading(reference, reference, 0.0)) {
     EXPECT_EQ(distance, 0.0);
   }
 }
@@ -276,8 +278,8 @@ TEST(ColumnProfiles, RefuseBadInput) {
   EXPECT_THROW(
       (void)match_columns(ColumnProfiles(signature), ColumnProfiles(packed(smooth_view(1, 5)))),
       ContractError);
-  EXPECT_THROW((void)column_distances_near(ColumnProfiles(signature),
-                                           ColumnProfiles(packed(smooth_view(1, 5))), 0.0),
+  EXPECT_THROW((void)column_distances_at_heading(ColumnProfiles(signature),
+                                                 ColumnProfiles(packed(smooth_view(1, 5))), 0.0),
                ContractError);
 }
 
@@ -291,7 +293,7 @@ TEST(MatchColumnsTwice, FindsTheSecondTurnOnTheOtherSide) {
     }
   }
   const ColumnProfiles profiles(packed(view));
-  const auto [best, other] = match_columns_twice(profiles, profiles);
+  const auto [best, other] = match_columns_two_best(profiles, profiles);
   const ColumnMatch alone = match_columns(profiles, profiles);
   EXPECT_EQ(best.difference, alone.difference);
   EXPECT_EQ(best.heading_rad, alone.heading_rad);
@@ -299,7 +301,7 @@ TEST(MatchColumnsTwice, FindsTheSecondTurnOnTheOtherSide) {
   EXPECT_GT(other.difference, best.difference);
 
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const auto [nearest, farther] = match_columns_twice(
+    const auto [nearest, farther] = match_columns_two_best(
         ColumnProfiles(packed(smooth_view(seed))), ColumnProfiles(packed(smooth_view(seed + 50))));
     EXPECT_GE(farther.difference, nearest.difference);
     EXPECT_GE(std::abs(angle_difference(farther.heading_rad, nearest.heading_rad)),

@@ -17,15 +17,15 @@ struct Overloaded : Functions... {
 template <class... Functions>
 Overloaded(Functions...) -> Overloaded<Functions...>;  // clang 14 does not find it
 
-/// Distance by which rounding may carry a value beyond a border, relative to the image's size.
+/// Tolerance for rounding errors at the borders of the domain, relative to the longer side of the
+/// image.
 constexpr double border_tolerance = 1e-9;
 
 double tolerance_px(const Camera& camera) {
   return border_tolerance * std::max(camera.image_size.width, camera.image_size.height);
 }
 
-/// Clamps to [low, high]; nullopt where the value lies beyond by more than the tolerance (or is
-/// NaN).
+/// Clamps to [low, high]; nullopt if the value is outside by more than the tolerance, or NaN.
 std::optional<double> clamp_with_tolerance(double value, double low, double high,
                                            double tolerance) {
   if (!(value >= low - tolerance && value <= high + tolerance)) return std::nullopt;
@@ -40,7 +40,8 @@ std::optional<PixelPoint> clamp_to_image(const Camera& camera, PixelPoint pixel)
   return PixelPoint{*u, *v};
 }
 
-/// Returns the elevation at a distance from the centre within [inner, rim]; of mirrors only.
+/// Returns the elevation shown at a distance from the centre; nullopt outside [inner, rim] and for
+/// cameras without a mirror model.
 std::optional<double> elevation_at(const Camera& camera, double radius_px) {
   const auto r = clamp_with_tolerance(radius_px, camera.inner_radius_px, camera.rim_radius_px,
                                       tolerance_px(camera));
@@ -77,8 +78,8 @@ std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
   return clamp_with_tolerance(*r, inner_px, rim_px, slack_px);
 }
 
-/// Returns +1 where azimuth runs counter-clockwise in the picture as shown, or rises with u; else
-/// -1.
+/// Returns +1 if azimuth grows counter-clockwise in the displayed picture (equirectangular: with
+/// u), else -1.
 double azimuth_sign(const Camera& camera) {
   return camera.direction == ColumnDirection::counter_clockwise ? 1.0 : -1.0;
 }
@@ -121,7 +122,7 @@ void validate_dual(const Camera& camera, const DualFisheyeModel& model) {
   }
 }
 
-/// Returns +1 where right in a lens's picture is right in the image as shown, else -1.
+/// Returns +1 if the image shows the lens's picture unmirrored, else -1.
 double mirror_sign(const Camera& camera) {
   return camera.direction == ColumnDirection::clockwise ? 1.0 : -1.0;
 }
@@ -142,11 +143,12 @@ std::optional<LensProjection> project_into_lens(const Camera& camera, const Dual
   return LensProjection{*pixel, point->margin_rad};
 }
 
-/// Finds the band about the horizon in which no direction of a grid is missing, borders included.
+/// Finds the largest band around the horizon in which every direction of a grid of 2 x 1 degrees is
+/// visible.
 ElevationBand visible_elevations_of_lenses(const Camera& camera) {
   constexpr int azimuths = 180;
   constexpr int elevations = 90;
-  const auto is_seen_all_around = [&](double elevation_rad) {
+  const auto is_visible_all_around = [&](double elevation_rad) {
     for (int i = 0; i < azimuths; ++i) {
       const auto direction =
           Direction3::from_angles(2 * std::numbers::pi * i / azimuths, elevation_rad);
@@ -154,12 +156,12 @@ ElevationBand visible_elevations_of_lenses(const Camera& camera) {
     }
     return true;
   };
-  require(is_seen_all_around(0), "elevation seen at every azimuth", 0.0,
+  require(is_visible_all_around(0), "elevation seen at every azimuth", 0.0,
           "seen by one of the lenses; max_angle_rad is too small or the frame cuts the circles");
   const double step = std::numbers::pi / 2 / elevations;
   ElevationBand band;
-  for (int i = 1; i <= elevations && is_seen_all_around(i * step); ++i) band.top_rad = i * step;
-  for (int i = 1; i <= elevations && is_seen_all_around(-i * step); ++i)
+  for (int i = 1; i <= elevations && is_visible_all_around(i * step); ++i) band.top_rad = i * step;
+  for (int i = 1; i <= elevations && is_visible_all_around(-i * step); ++i)
     band.bottom_rad = -i * step;
   require(band.top_rad > band.bottom_rad, "elevations seen at every azimuth", 0.0, "a band");
   return band;
@@ -271,9 +273,9 @@ std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& ca
 ImageCircle image_circle(const Camera& camera, int lens) {
   if (std::holds_alternative<EquirectangularModel>(camera.model)) return {};
   if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
-    const FisheyeLens& seen_by = model->lenses[lens];
+    const FisheyeLens& fisheye = model->lenses[lens];
     return {
-        {seen_by.centre_u_px, seen_by.centre_v_px}, 0.0, radius_at(seen_by, seen_by.max_angle_rad)};
+        {fisheye.centre_u_px, fisheye.centre_v_px}, 0.0, radius_at(fisheye, fisheye.max_angle_rad)};
   }
   return {camera.centre, camera.inner_radius_px, camera.rim_radius_px};
 }

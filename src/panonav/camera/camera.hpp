@@ -22,26 +22,28 @@ struct PixelPoint {
 };
 
 /// A 360 degree picture or a ready-made panorama: columns are azimuths, rows are elevations, both
-/// linear. The width is one full turn. Valid: elevations from bottom to top.
+/// linear. The width is one full turn. Valid for elevations from bottom to top.
 struct EquirectangularModel {
   double elevation_bottom_rad = -1.5707963267948966;  ///< of the picture's lower edge
   double elevation_top_rad = 1.5707963267948966;      ///< of the picture's upper edge
   friend bool operator==(const EquirectangularModel&, const EquirectangularModel&) = default;
 };
 
-/// One of the projection models, each defined in its own header. This is the only list of them.
+/// Any of the projection models, each defined in its own header. All code that enumerates models
+/// uses this list.
 using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel,
                                  EquiangularModel, EquirectangularModel, DualFisheyeModel>;
 
-/// Sense in which azimuths run in a picture; for its columns, see `Camera::direction`.
+/// Sense of rotation in which azimuths run in a picture; `Camera::direction` gives its exact
+/// meaning for each model.
 enum class ColumnDirection {
   clockwise,         ///< azimuths grow against the columns or the image angle
   counter_clockwise  ///< azimuths grow with them
 };
 
-/// A camera that sees all azimuths: how its pixels and the directions in the robot frame belong
-/// together. The axis of a mirror is vertical. Invariant checked by `validate(const Camera&)`; the
-/// functions below expect a valid camera.
+/// Calibration of an omnidirectional camera: the mapping between pixels and directions in the robot
+/// frame. The axis of a mirror is vertical. `validate(const Camera&)` checks the invariant; the
+/// functions below require a valid camera.
 struct Camera {
   /// A pixel that sees a direction, and its weight in a blended panorama.
   struct WeightedPixel {
@@ -49,23 +51,23 @@ struct Camera {
     double weight = 1.0;  ///< shares of the lenses that see a direction; they add up to 1
   };
 
-  CameraModel model;     ///< how elevation, or direction, and place in the picture belong together
+  CameraModel model;     ///< mapping between directions (or elevations) and image positions
   ImageSize image_size;  ///< of every picture of this camera, in pixels
   // Mirror cameras (all models but equirectangular and dual fisheye):
   PixelPoint centre;             ///< inside the image
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
-  double inner_radius_px = 0.0;  ///< nothing is seen within (the camera's own reflection)
-  /// Sense in which azimuth runs in the picture as it is shown (u right, v down). Equirectangular:
-  /// clockwise means that the columns, left to right, follow a turn to the right seen from above. A
-  /// camera that looks up, at a mirror or through a fisheye lens, sees the world from below:
-  /// clockwise, unless its driver mirrors the picture. So do most 360 degree pictures. Dual
-  /// fisheye: clockwise means that right in a lens's picture is right in the world, and not
-  /// mirrored.
+  double inner_radius_px = 0.0;  ///< nothing is visible within (the camera's own reflection)
+  /// Sense of rotation of azimuth in the displayed picture (u right, v down). Equirectangular:
+  /// clockwise means that columns from left to right follow a right turn; most 360 degree pictures
+  /// do. A camera that looks up, at a mirror or through a fisheye lens, sees the world from below:
+  /// clockwise, unless its driver mirrors the picture. Dual fisheye: clockwise means that the
+  /// lenses' pictures are not mirrored.
   ColumnDirection direction = ColumnDirection::clockwise;
-  /// Mirror: image angle of the robot's forward direction, counter-clockwise as shown, from +u.
+  /// Mirror: angle of the robot's forward direction in the displayed image, counter-clockwise from
+  /// +u.
   double forward_angle_rad = 0.0;
-  /// Equirectangular: fraction of the width, between its outer edges, that looks along the heading;
-  /// 0 to 1.
+  /// Equirectangular: position of the forward direction as a fraction of the width from the left
+  /// edge, 0 to 1.
   double forward_column = 0.5;
   friend bool operator==(const Camera&, const Camera&) = default;
 };
@@ -73,19 +75,18 @@ struct Camera {
 /// Throws ContractError that names the field, its value and its range.
 void validate(const Camera& camera);
 
-/// Projects a direction in the robot frame; nullopt where the camera does not see it: outside the
-/// image, outside inner radius to rim, outside the model's domain, or for a direction without
-/// length or with values that are not finite. Borders belong to the domain; rounding up to 1e-9 of
-/// the image's size beyond them is forgiven and clamped. u of an equirectangular picture is in [0,
-/// width). Cost: some ten arithmetic and four trigonometric operations; polynomials ten evaluations
-/// more.
+/// Projects a direction in the robot frame; nullopt if it falls outside the image, outside inner
+/// radius to rim or outside the model's domain, or if the direction is zero or not finite. Borders
+/// belong to the domain; points beyond them by at most 1e-9 of the image's size (rounding) are
+/// clamped. u of an equirectangular picture is in [0, width). Cost: about ten arithmetic and four
+/// trigonometric operations; for a polynomial model about ten evaluations of it in addition.
 [[nodiscard]] std::optional<PixelPoint> project(const Camera& camera, const Direction3& direction);
 
-/// Returns the unit direction that a point of the image shows; nullopt outside the same domain.
+/// Returns the unit direction that an image point shows; nullopt outside the domain of `project`.
 [[nodiscard]] std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel);
 
-/// Projects into each lens: two of a dual fisheye camera, in order, one of any other (the second is
-/// empty). `project` returns the one of the larger weight. See `blend_share`.
+/// Projects into each lens of a dual fisheye camera, with blending weights (`blend_share`); the
+/// second entry is empty for any other camera. `project` returns the pixel with the larger weight.
 [[nodiscard]] std::array<std::optional<Camera::WeightedPixel>, 2> project_all(
     const Camera& camera, const Direction3& direction);
 /// Number of lenses: 2 of a dual fisheye camera, 1 of any other.
@@ -104,8 +105,8 @@ struct ImageCircle {
   double inner_radius_px = 0.0;  ///< nothing is seen within; 0 for a lens
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
 };
-/// Returns the circle of the mirror, or of that lens of a dual fisheye camera; all zero for an
-/// equirectangular one.
+/// Returns the circle of the mirror, or of lens `lens` of a dual fisheye camera; all zero for an
+/// equirectangular camera.
 [[nodiscard]] ImageCircle image_circle(const Camera& camera, int lens);
 
 /// A band of elevations, in radians.
@@ -114,11 +115,10 @@ struct ElevationBand {
   double top_rad = 0.0;     ///< highest, above `bottom_rad`
   friend bool operator==(const ElevationBand&, const ElevationBand&) = default;
 };
-/// Finds the band that is seen at every azimuth. Where the frame cuts the mirror, the band ends
-/// where the cut begins. Of a dual fisheye camera: the band about the horizon, to a degree (its
-/// lenses see the whole sphere where nothing is cut).
-/// Throws ContractError when no elevation is seen at every azimuth (the frame cuts even the inner
-/// radius, or lenses leave a gap at the horizon).
+/// Finds the band of elevations visible at every azimuth. Where the image frame cuts the mirror,
+/// the band ends at the cut. For a dual fisheye camera: the band around the horizon, in steps of
+/// one degree. Throws ContractError when no elevation is seen at every azimuth (the frame cuts even
+/// the inner radius, or lenses leave a gap at the horizon).
 [[nodiscard]] ElevationBand visible_elevations(const Camera& camera);
 
 }  // namespace panonav

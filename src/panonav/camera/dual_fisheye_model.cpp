@@ -10,7 +10,7 @@
 namespace panonav {
 namespace {
 
-/// dr/dtheta / f.
+/// Returns dr / dtheta divided by the focal length.
 double radius_derivative(const FisheyeLens& lens, double angle_rad) {
   const double s = angle_rad * angle_rad;
   return 1 + s * (3 * lens.k3 + s * 5 * lens.k5);
@@ -34,7 +34,8 @@ void validate(const FisheyeLens& lens, const std::string& name) {
   finite("roll_rad", lens.roll_rad);
   require(std::isfinite(lens.gain) && lens.gain > 0, name + "gain", lens.gain,
           "finite and above 0");
-  // The slope is a parabola in theta^2: lowest at an end or at its vertex.
+  // The derivative of the radius is a parabola in theta^2, so its minimum is at an end of the
+  // interval or at the vertex.
   const double end = lens.max_angle_rad * lens.max_angle_rad;
   const double vertex = lens.k5 > 0 ? std::clamp(-0.3 * lens.k3 / lens.k5, 0.0, end) : end;
   for (const double s : {end, vertex}) {
@@ -123,7 +124,8 @@ std::optional<Direction3> unproject(const FisheyeLens& lens, double right_px, do
 double blend_share(double margin_rad, double other_margin_rad) {
   const double overlap_rad = margin_rad + other_margin_rad;
   if (!(overlap_rad > 0)) return 0.5;
-  // The middle half of the overlap: the outer quarters are blurred and dark in real lenses.
+  // Blends only in the middle half of the overlap, since real lenses are blurred and dark near
+  // their borders.
   const double t = std::clamp(2 * margin_rad / overlap_rad - 0.5, 0.0, 1.0);
   return t * t * (3 - 2 * t);
 }

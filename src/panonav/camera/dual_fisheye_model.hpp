@@ -7,9 +7,9 @@
 
 namespace panonav {
 
-/// One fisheye lens with its sensor. A direction at the angle theta from the optical axis is seen
-/// r = f (theta + k3 theta^3 + k5 theta^5) from the centre (Kannala, Brandt 2006, two odd terms).
-/// Valid where r grows with theta, from 0 to `max_angle_rad`.
+/// One fisheye lens with its sensor. A direction at the angle theta from the optical axis is imaged
+/// at the distance r = f (theta + k3 theta^3 + k5 theta^5) from the centre (Kannala, Brandt 2006,
+/// with two odd terms). Valid if r grows with theta from 0 to `max_angle_rad`.
 struct FisheyeLens {
   /// Rotation of a lens, by its azimuth, elevation and roll. The lens frame has x along the optical
   /// axis, y towards the left of its picture and z towards the top.
@@ -26,7 +26,7 @@ struct FisheyeLens {
     std::array<Direction3, 3> axes_;  ///< of the lens, in the robot frame
   };
 
-  /// A direction as one lens sees it.
+  /// Projection of a direction into one lens.
   struct Point {
     double right_px = 0.0;  ///< from the lens's centre
     double up_px = 0.0;     ///< from the lens's centre, against v
@@ -39,27 +39,27 @@ struct FisheyeLens {
   double focal_length_px = 150.0;  ///< above 0, pixels for each radian at the centre
   double k3 = 0.0;                 ///< radial distortion of third order, without unit
   double k5 = 0.0;                 ///< radial distortion of fifth order, without unit
-  /// Half of the field of view: nothing is seen beyond. In (0, pi].
+  /// Half of the field of view, in (0, pi].
   double max_angle_rad = 1.6580627893946132;
   /// Azimuth of the optical axis in the robot frame.
   double azimuth_rad = 0.0;
   double elevation_rad = 0.0;  ///< of the optical axis, above the horizon
-  /// The turn of lens and sensor about the viewing direction, right-handed: the picture shows what
-  /// is above turned by this angle counter-clockwise.
+  /// Right-handed rotation of lens and sensor about the viewing direction: the world's up direction
+  /// appears in the picture rotated counter-clockwise from its top by this angle.
   double roll_rad = 0.0;
-  /// Brightness of its picture, > 0; only the ratio of the two lenses counts.
+  /// Relative brightness of the lens's picture, > 0; only the ratio between the two lenses matters.
   double gain = 1.0;
   friend bool operator==(const FisheyeLens&, const FisheyeLens&) = default;
 };
 
-/// Two fisheye lenses back to back whose circles are side by side in one image, as 360 degree
-/// cameras deliver it live: lens 0 in the left half, lens 1 in the right one. Together they see all
-/// directions if each sees more than half of them.
+/// Two fisheye lenses back to back, imaged side by side in one picture, as in the live video of 360
+/// degree cameras: lens 0 in the left half, lens 1 in the right one. They cover the whole sphere if
+/// each has a field of view above 180 degrees.
 struct DualFisheyeModel {
   std::array<FisheyeLens, 2> lenses;  ///< in the order of their halves of the picture
-  /// Distance between the viewpoints of both lenses; each is half of it in front of the middle of
-  /// the camera, along its own axis. Simulated images have this parallax; projection takes
-  /// everything as far away.
+  /// Distance between the viewpoints of the lenses; each viewpoint is half of it from the camera's
+  /// centre, along the lens's axis. Only simulated images use it; projection assumes distant
+  /// points.
   double baseline_m = 0.0;
   friend bool operator==(const DualFisheyeModel&, const DualFisheyeModel&) = default;
 };
@@ -67,7 +67,7 @@ struct DualFisheyeModel {
 /// Throws ContractError that names the lens, the field, its value and its range.
 void validate(const DualFisheyeModel& model);
 
-/// Distance from the lens's centre at which `angle_rad` from its axis is seen.
+/// Returns the distance from the lens's centre, in px, of directions at `angle_rad` from its axis.
 [[nodiscard]] double radius_at(const FisheyeLens& lens, double angle_rad);
 /// Inverts `radius_at`, for a radius within 0 .. radius_at(lens, max_angle_rad), by Newton steps.
 [[nodiscard]] double angle_at(const FisheyeLens& lens, double radius_px);
@@ -79,10 +79,10 @@ void validate(const DualFisheyeModel& model);
 [[nodiscard]] std::optional<Direction3> unproject(const FisheyeLens& lens, double right_px,
                                                   double up_px);
 
-/// Returns the share of the first lens in the blended image of a direction that both see, by its
-/// distance from the borders of both fields of view: 1/2 on the seam, where both are equal, 1 and 0
-/// from a quarter of the overlap before its borders on. Continuous; the share of the second lens is
-/// 1 less it.
+/// Returns the weight of the first lens when blending a direction that both lenses see, from the
+/// angles to the borders of both fields of view: 1/2 on the seam, where the angles are equal, and 1
+/// or 0 in the outer quarters of the overlap. Continuous; the second lens has the complementary
+/// weight.
 [[nodiscard]] double blend_share(double margin_rad, double other_margin_rad);
 
 }  // namespace panonav

@@ -13,41 +13,44 @@
 namespace panonav {
 namespace {
 
-// The shares and counts below were chosen on the recordings of the README, as the least quality of
-// a rim was (docs/decisions.md).
+// All shares and counts below, and the default of `min_quality`, were chosen on the recordings
+// listed in the README (docs/decisions.md).
 
-/// Longest side of the field on which circles are climbed; the fit in the picture starts there.
-constexpr int middle_side_px = 400;
-/// Longest side of the field on which all centres and radii are tried; the cost grows with its
-/// cube.
-constexpr int coarse_side_px = 200;
-/// Circles of the coarse field that are climbed on the middle one, best first.
-constexpr int climbed_circles = 48;
-/// Circles of the middle field that are fitted to the picture, best first.
-constexpr int fitted_circles = 8;
-/// Circles whose centres and radii differ by less in all, in pixels of the middle field, are one.
+/// Longest side, in px, of the middle field, on which candidate circles are improved by hill
+/// climbing before they are fitted in the image.
+constexpr int middle_field_side_px = 400;
+/// Longest side, in px, of the coarse field, on which all centres and radii are tried; the cost
+/// grows with its cube.
+constexpr int coarse_field_side_px = 200;
+/// Largest number of circles of the coarse field that are improved on the middle field, best first.
+constexpr int max_climbed_circles = 48;
+/// Largest number of circles of the middle field that are fitted in the image, best first.
+constexpr int max_fitted_circles = 8;
+/// Circles are duplicates if their centres and radii differ by less than this in total, in pixels
+/// of the middle field.
 constexpr double same_circle_px = 3.0;
 
-/// Largest width of a ring around the mirror, as share of its outer radius: wider plain bands are
-/// sky or ceiling above a horizon.
+/// Largest width of a plain ring around the mirror, as a share of its outer radius: a wider plain
+/// band is sky or ceiling in the mirrored scene.
 constexpr double max_ring_width = 0.2;
-/// A ring has less than this share of the scene's structure inside it.
+/// Largest structure of a plain ring, as a share of the structure of the scene that it encloses.
 constexpr double max_ring_structure = 0.35;
-/// Largest distance of the centres of circles that belong together, as share of the radius.
+/// Largest distance between the centres of circles of the same mirror, as a share of the radius.
 constexpr double max_centre_distance = 0.04;
-/// A circle replaces the clearest one as rim, or as disc, if it has this share of its quality.
+/// Smallest quality, relative to the clearest circle, with which another circle can replace it as
+/// rim or as disc.
 constexpr double min_relative_quality = 0.6;
 
 /// Smallest and largest radius of the disc in the middle, as shares of the rim's.
 constexpr double min_disc_radius = 0.04, max_disc_radius = 0.65;
-/// Largest distance of its centre from the rim's, as share of the rim's radius: a lens need not be
-/// quite on the mirror's axis.
+/// Largest distance between the centres of disc and rim, as a share of the rim's radius: the lens
+/// may be slightly off the mirror's axis.
 constexpr double max_disc_offset = 0.02;
-/// Least quality of its circle: lower when its inside is plain, because the scene around it is
-/// often as dark as the disc, which leaves gaps in its edge.
+/// Smallest quality of the disc's circle. A plain disc needs less, because the scene around it is
+/// often equally dark, which leaves gaps in its edge.
 constexpr double min_disc_quality = 0.5, min_plain_disc_quality = 0.3;
 
-/// Edge fields of one or several images at both resolutions of the search.
+/// Edge fields of one image, or averaged over several, at both resolutions of the search.
 struct SearchFields {
   EdgeField middle;
   EdgeField coarse;
@@ -61,14 +64,16 @@ int compute_reduction(int side_px, int target_px) {
 
 EdgeField make_middle_field(const ImageView& image) {
   const int longest = std::max(image.width, image.height);
-  return make_edge_field(smooth_planes(image, compute_reduction(longest, middle_side_px), 1.0));
+  return make_edge_field(
+      make_smooth_planes(image, compute_reduction(longest, middle_field_side_px), 1.0));
 }
 
 SearchFields make_search_fields(EdgeField middle, const ImageSize& size) {
   SearchFields result;
-  result.middle_reduction = compute_reduction(std::max(size.width, size.height), middle_side_px);
+  result.middle_reduction =
+      compute_reduction(std::max(size.width, size.height), middle_field_side_px);
   result.coarse_reduction =
-      compute_reduction(std::max(middle.width, middle.height), coarse_side_px);
+      compute_reduction(std::max(middle.width, middle.height), coarse_field_side_px);
   result.coarse = reduce(middle, result.coarse_reduction);
   result.middle = std::move(middle);
   return result;
@@ -83,22 +88,22 @@ FieldCircle scale(const FieldCircle& circle, double factor) {
 }
 
 CircleRange scale(const CircleRange& range, double factor) {
-  return {range.lowest_radius * factor, range.highest_radius * factor, range.visible_fraction,
-          range.evenness};
+  return {range.min_radius * factor, range.max_radius * factor, range.visible_fraction,
+          range.averaging};
 }
 
 /// Fits a circle of the middle field to the edges in the image's pixels.
-std::optional<MirrorCircle::Circle> refine_circle(const SearchFields& seen,
+std::optional<MirrorCircle::Circle> refine_circle(const SearchFields& search_fields,
                                                   std::span<const SmoothPlanes> planes,
                                                   const FieldCircle& on_middle) {
-  const auto fit = fit_circle(planes, scale(on_middle, seen.middle_reduction));
+  const auto fit = fit_circle(planes, scale(on_middle, search_fields.middle_reduction));
   if (!fit) return std::nullopt;
   return MirrorCircle::Circle{
       {fit->circle.u, fit->circle.v}, fit->circle.radius, fit->support, fit->residual};
 }
 
-/// Measures the structure between two radii: the part of the samples along the circles there at
-/// which the grey changes by an edge's slope.
+/// Measures the structure between two radii: the share of samples, along concentric circles, at
+/// which the grey level changes by at least `slope_scale`.
 double measure_structure(std::span<const SmoothPlanes> images, const PixelPoint& centre,
                          double from_px, double to_px) {
   std::size_t steep = 0;
@@ -133,7 +138,8 @@ double measure_structure(std::span<const SmoothPlanes> images, const PixelPoint&
   return count == 0 ? 0.0 : static_cast<double>(steep) / static_cast<double>(count);
 }
 
-/// Chooses, of circles about one centre, ascending, the one where the mirrored scene ends.
+/// Chooses, from concentric circles in ascending order, the one at which the mirrored scene ends,
+/// and returns its index.
 std::size_t choose_rim(const std::vector<MirrorCircle::Circle>& circles,
                        std::span<const SmoothPlanes> planes) {
   std::size_t rim = circles.size() - 1;
@@ -141,7 +147,7 @@ std::size_t choose_rim(const std::vector<MirrorCircle::Circle>& circles,
     const double outer_px = circles[rim].radius_px;
     const double inner_px = circles[inner].radius_px;
     if (inner_px < (1 - max_ring_width) * outer_px) break;
-    // Blur of the two edges; a thin ring has less to spare.
+    // Excludes the blur of the two edges; less in a thin ring, where it would leave nothing.
     const double margin_px = std::min(std::max(2.0, 0.02 * outer_px), 0.35 * (outer_px - inner_px));
     const double ring =
         measure_structure(planes, circles[rim].centre, inner_px + margin_px, outer_px - margin_px);
@@ -152,42 +158,45 @@ std::size_t choose_rim(const std::vector<MirrorCircle::Circle>& circles,
   return rim;
 }
 
-/// Finds the radius about the rim's centre that covers the dark disc or the camera's reflection in
-/// the middle.
-std::optional<double> find_disc_radius(const SearchFields& seen,
+/// Finds the radius around the rim's centre that encloses the dark disc or the camera's reflection;
+/// nullopt if there is no clear circle.
+std::optional<double> find_disc_radius(const SearchFields& search_fields,
                                        std::span<const SmoothPlanes> planes,
                                        const MirrorCircle::Circle& rim) {
-  const double rim_radius = rim.radius_px / seen.middle_reduction;
+  const double rim_radius = rim.radius_px / search_fields.middle_reduction;
   CircleRange range;
-  range.lowest_radius = std::max(3.0, min_disc_radius * rim_radius);
-  range.highest_radius = max_disc_radius * rim_radius;
+  range.min_radius = std::max(3.0, min_disc_radius * rim_radius);
+  range.max_radius = max_disc_radius * rim_radius;
   range.visible_fraction = 0.75;
-  range.evenness = Evenness::mean;  // where the scene is dark, the dark disc has no edge
+  range.averaging = EdgeAveraging::mean;  // a dark disc has no edge next to a dark scene
   const double reach_px = std::max(2.0, max_disc_offset * rim.radius_px);
-  const PixelPoint centre{rim.centre.u_px / seen.middle_reduction,
-                          rim.centre.v_px / seen.middle_reduction};
+  const PixelPoint centre{rim.centre.u_px / search_fields.middle_reduction,
+                          rim.centre.v_px / search_fields.middle_reduction};
   struct Disc {
     double quality;
     double radius_px;
   };
   std::vector<Disc> discs;
   double best_quality = 0;
-  for (const FieldCircle& candidate : concentric_candidates(
-           seen.middle, centre.u_px, centre.v_px, reach_px / seen.middle_reduction, range, 1.0)) {
-    const auto found = refine_circle(seen, planes, climb_to_maximum(seen.middle, candidate, range));
+  for (const FieldCircle& candidate :
+       concentric_candidates(search_fields.middle, centre.u_px, centre.v_px,
+                             reach_px / search_fields.middle_reduction, range, 1.0)) {
+    const auto found = refine_circle(search_fields, planes,
+                                     climb_to_maximum(search_fields.middle, candidate, range));
     if (!found || found->radius_px > max_disc_radius * rim.radius_px) continue;
-    const double off_px = distance_px(found->centre, rim.centre);
-    if (off_px > reach_px) continue;
+    const double centre_offset_px = distance_px(found->centre, rim.centre);
+    if (centre_offset_px > reach_px) continue;
     const double inside = measure_structure(planes, found->centre, 0.0, 0.9 * found->radius_px);
     const double outside =
         measure_structure(planes, rim.centre, 1.1 * found->radius_px, 0.95 * rim.radius_px);
     const double needed =
         inside < max_ring_structure * outside ? min_plain_disc_quality : min_disc_quality;
     if (found->quality < needed) continue;
-    discs.push_back({found->quality, found->radius_px + off_px});
+    discs.push_back({found->quality, found->radius_px + centre_offset_px});
     best_quality = std::max(best_quality, found->quality);
   }
-  // A camera shows several circles, its lens and its body: the widest clear one covers them all.
+  // The camera's reflection has several circles (lens, body); the widest clear one encloses them
+  // all.
   std::optional<double> radius_px;
   for (const Disc& disc : discs) {
     if (disc.quality >= min_relative_quality * best_quality &&
@@ -198,20 +207,21 @@ std::optional<double> find_disc_radius(const SearchFields& seen,
   return radius_px;
 }
 
-/// Finds the circles of the middle field with the strongest edges on them, different from each
-/// other, best first.
-std::vector<FieldCircle> find_best_circles(const SearchFields& seen, const CircleRange& range) {
+/// Finds the circles of the middle field with the strongest edges, without duplicates, best first.
+std::vector<FieldCircle> find_best_circles(const SearchFields& search_fields,
+                                           const CircleRange& range) {
   struct Scored {
     double merit;
     FieldCircle circle;
   };
   std::vector<Scored> climbed;
   for (const FieldCircle& candidate :
-       circle_candidates(seen.coarse, scale(range, 1.0 / seen.coarse_reduction), climbed_circles)) {
-    const FieldCircle circle =
-        climb_to_maximum(seen.middle, scale(candidate, seen.coarse_reduction), range);
-    if (circle.radius < range.lowest_radius || circle.radius > range.highest_radius) continue;
-    const CircleScore found = score_circle(seen.middle, circle, range.evenness);
+       circle_candidates(search_fields.coarse, scale(range, 1.0 / search_fields.coarse_reduction),
+                         max_climbed_circles)) {
+    const FieldCircle circle = climb_to_maximum(
+        search_fields.middle, scale(candidate, search_fields.coarse_reduction), range);
+    if (circle.radius < range.min_radius || circle.radius > range.max_radius) continue;
+    const CircleScore found = score_circle(search_fields.middle, circle, range.averaging);
     if (found.visible < range.visible_fraction) continue;
     climbed.push_back({found.quality * std::sqrt(found.visible), circle});
   }
@@ -225,33 +235,36 @@ std::vector<FieldCircle> find_best_circles(const SearchFields& seen, const Circl
     });
     if (known) continue;
     result.push_back(scored.circle);
-    if (static_cast<int>(result.size()) == fitted_circles) break;
+    if (static_cast<int>(result.size()) == max_fitted_circles) break;
   }
   return result;
 }
 
-struct Search {
+struct SearchResult {
   MirrorCircle::Circle rim;
   std::optional<double> inner_radius_px;
 };
 
-std::optional<Search> search_mirror(const SearchFields& seen, std::span<const SmoothPlanes> planes,
-                                    const ImageSize& size,
-                                    const MirrorCircle::SearchOptions& options) {
+std::optional<SearchResult> search_mirror(const SearchFields& search_fields,
+                                          std::span<const SmoothPlanes> planes,
+                                          const ImageSize& size,
+                                          const MirrorCircle::SearchOptions& options) {
   CircleRange range;
-  range.lowest_radius = options.min_rim * std::min(size.width, size.height) / seen.middle_reduction;
-  range.highest_radius =
-      options.max_rim * std::max(size.width, size.height) / seen.middle_reduction;
+  range.min_radius =
+      options.min_rim * std::min(size.width, size.height) / search_fields.middle_reduction;
+  range.max_radius =
+      options.max_rim * std::max(size.width, size.height) / search_fields.middle_reduction;
   range.visible_fraction = options.visible_fraction;
 
   std::optional<MirrorCircle::Circle> clearest;
   double clearest_merit = 0;
   FieldCircle start;
-  for (const FieldCircle& circle : find_best_circles(seen, range)) {
-    const auto found = refine_circle(seen, planes, circle);
+  for (const FieldCircle& circle : find_best_circles(search_fields, range)) {
+    const auto found = refine_circle(search_fields, planes, circle);
     if (!found || found->quality < options.min_quality) continue;
     const double merit =
-        found->quality * std::sqrt(score_circle(seen.middle, circle, range.evenness).visible);
+        found->quality *
+        std::sqrt(score_circle(search_fields.middle, circle, range.averaging).visible);
     if (merit > clearest_merit) {
       clearest_merit = merit;
       clearest = found;
@@ -261,9 +274,11 @@ std::optional<Search> search_mirror(const SearchFields& seen, std::span<const Sm
   if (!clearest) return std::nullopt;
 
   std::vector<MirrorCircle::Circle> circles{*clearest};
-  for (const FieldCircle& candidate : concentric_candidates(
-           seen.middle, start.u, start.v, max_centre_distance * start.radius, range, 2.0)) {
-    const auto found = refine_circle(seen, planes, climb_to_maximum(seen.middle, candidate, range));
+  for (const FieldCircle& candidate :
+       concentric_candidates(search_fields.middle, start.u, start.v,
+                             max_centre_distance * start.radius, range, 2.0)) {
+    const auto found = refine_circle(search_fields, planes,
+                                     climb_to_maximum(search_fields.middle, candidate, range));
     if (!found || found->quality < min_relative_quality * clearest->quality ||
         (found->radius_px > clearest->radius_px && found->quality < options.min_quality) ||
         distance_px(found->centre, clearest->centre) > max_centre_distance * found->radius_px) {
@@ -278,10 +293,10 @@ std::optional<Search> search_mirror(const SearchFields& seen, std::span<const Sm
             [](const MirrorCircle::Circle& a, const MirrorCircle::Circle& b) {
               return a.radius_px < b.radius_px;
             });
-  Search result;
+  SearchResult result;
   result.rim = circles[choose_rim(circles, planes)];
 
-  result.inner_radius_px = find_disc_radius(seen, planes, result.rim);
+  result.inner_radius_px = find_disc_radius(search_fields, planes, result.rim);
   return result;
 }
 
@@ -319,7 +334,7 @@ std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
   std::vector<SmoothPlanes> planes;
   std::vector<EdgeField> fields;
   for (const ImageView& image : images) {
-    planes.push_back(smooth_planes(image, 1, 1.0));
+    planes.push_back(make_smooth_planes(image, 1, 1.0));
     fields.push_back(make_middle_field(image));
   }
   MirrorCircle mirror;

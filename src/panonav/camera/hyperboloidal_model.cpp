@@ -20,7 +20,8 @@ std::optional<double> elevation_at(const HyperboloidalModel& model, double radiu
   const double a = model.a_mm;
   const double b = model.b_mm;
   const double f = model.focal_length_px;
-  // Beyond f a / b the lens's ray is flatter than the asymptote and misses the mirror.
+  // At radii of f a / b or more the camera's ray does not meet the mirror: it is at least as flat
+  // as the asymptotes.
   if (!(radius_px >= 0) || !(radius_px * b < f * a)) return std::nullopt;
   const double c = std::hypot(a, b);
   // [Y03 eq. 3] with numerator and denominator multiplied by hypot(r, f), and both negated, so that
@@ -36,8 +37,8 @@ std::optional<double> radius_at(const HyperboloidalModel& model, double elevatio
   if (!(elevation_rad >= -std::numbers::pi / 2 && elevation_rad < std::atan2(b, a))) {
     return std::nullopt;
   }
-  // The mirror in polar form about its focus: rho = a^2 / (b - c sin(elevation)); the lens sees
-  // that point under the slope rho cos / (2 c + rho sin).
+  // The mirror in polar form about its focus is rho = a^2 / (b - c sin(elevation)); the camera's
+  // ray to that point has the slope rho cos(elevation) / (2 c + rho sin(elevation)).
   const double cosine = std::max(0.0, std::cos(elevation_rad));
   return model.focal_length_px * a * a * cosine / (2 * b * c - (b * b + c * c) * sine);
 }

@@ -8,15 +8,16 @@
 namespace panonav {
 namespace {
 
-/// Distances from the centre are proportional to the focal length in both models.
+/// Scales the focal length so that the model shows `elevation_rad` at `radius_px`: in both models
+/// the radius is proportional to the focal length.
 template <class Model>
 Model scale_focal_length(Model model, double radius_px, double elevation_rad) {
   validate(model);
-  const auto seen_at_px = radius_at(model, elevation_rad);
-  require(seen_at_px.has_value() && *seen_at_px > 0, "elevation_rad", elevation_rad,
+  const auto current_radius_px = radius_at(model, elevation_rad);
+  require(current_radius_px.has_value() && *current_radius_px > 0, "elevation_rad", elevation_rad,
           "within the valid domain of the model, not along its axis");
   require(radius_px > 0, "radius_px", radius_px, "above 0");
-  model.focal_length_px *= radius_px / *seen_at_px;
+  model.focal_length_px *= radius_px / *current_radius_px;
   validate(model);
   return model;
 }
@@ -56,13 +57,14 @@ constexpr Colour orange{255, 140, 0};
 constexpr Colour red{255, 30, 30};
 constexpr Colour yellow{255, 230, 0};
 
-/// Mixes a colour into a pixel by how much of a line of this half width covers it.
-void blend(Image& image, int u, int v, const Colour& colour, double distance_px,
-           double half_width_px) {
-  const double cover = std::clamp(half_width_px + 0.5 - distance_px, 0.0, 1.0);
-  if (cover == 0) return;
+/// Blends a colour into a pixel by the share that a line at this distance and of this half width
+/// covers.
+void blend_line_pixel(Image& image, int u, int v, const Colour& colour, double distance_px,
+                      double half_width_px) {
+  const double coverage = std::clamp(half_width_px + 0.5 - distance_px, 0.0, 1.0);
+  if (coverage == 0) return;
   for (int c = 0; c < 3; ++c) {
-    const double mixed = (1 - cover) * image.at(u, v, c) + cover * colour[c];
+    const double mixed = (1 - coverage) * image.at(u, v, c) + coverage * colour[c];
     image.at(u, v, c) = static_cast<std::uint8_t>(std::lround(mixed));
   }
 }
@@ -76,7 +78,8 @@ Image draw_mirror(ImageView image, const MirrorCircle& mirror,
   require(image.height == mirror.image_size.height, "image height", image.height,
           to_text(mirror.image_size.height));
   Image picture(image.width, image.height, 3);
-  // Lines stay visible when the picture of a large sensor is scaled down to a screen.
+  // Widens lines in large images, so that they remain visible when the image is scaled down to a
+  // screen.
   const double half_width_px = std::max(0.5, std::max(image.width, image.height) / 1600.0);
   const double cross_px = std::max(4.0, 0.06 * mirror.rim_radius_px);
   const double inner_px = mirror.inner_radius_px.value_or(0.0);
@@ -87,18 +90,18 @@ Image draw_mirror(ImageView image, const MirrorCircle& mirror,
       const double x = u + 0.5 - mirror.centre.u_px;
       const double y = v + 0.5 - mirror.centre.v_px;
       const double r = std::hypot(x, y);
-      blend(picture, u, v, green, std::abs(r - mirror.rim_radius_px), half_width_px);
+      blend_line_pixel(picture, u, v, green, std::abs(r - mirror.rim_radius_px), half_width_px);
       if (mirror.inner_radius_px) {
-        blend(picture, u, v, orange, std::abs(r - inner_px), half_width_px);
+        blend_line_pixel(picture, u, v, orange, std::abs(r - inner_px), half_width_px);
       }
       if (std::max(std::abs(x), std::abs(y)) <= cross_px) {
-        blend(picture, u, v, red, std::min(std::abs(x), std::abs(y)), half_width_px);
+        blend_line_pixel(picture, u, v, red, std::min(std::abs(x), std::abs(y)), half_width_px);
       }
       if (forward_angle_rad) {
         const double along = x * std::cos(*forward_angle_rad) - y * std::sin(*forward_angle_rad);
         const double across = x * std::sin(*forward_angle_rad) + y * std::cos(*forward_angle_rad);
         if (along >= inner_px && along <= mirror.rim_radius_px) {
-          blend(picture, u, v, yellow, std::abs(across), half_width_px);
+          blend_line_pixel(picture, u, v, yellow, std::abs(across), half_width_px);
         }
       }
     }

@@ -10,17 +10,17 @@ namespace panonav {
 
 /// Knowledge of a mirror camera beyond its picture.
 struct MirrorKnowledge {
-  /// Any but EquirectangularModel. When the mirror's shape is unknown: EquiangularModel with the
-  /// elevations seen at the inner radius and at the rim.
+  /// Any model of a mirror camera. If the mirror's shape is unknown, use EquiangularModel with the
+  /// elevations visible at the inner radius and at the rim.
   CameraModel model;
-  /// Overrides the found value; needed if nothing was found.
+  /// Replaces the inner radius found in the image; 0 if neither is set.
   std::optional<double> inner_radius_px = std::nullopt;
   ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
   double forward_angle_rad = 0.0;                          ///< see Camera
 };
 
-/// Makes the camera of a mirror found in an image. Where no inner radius is known or found it is 0.
-/// Throws ContractError when model and circle do not fit together, see validate(const Camera&).
+/// Makes the camera of a mirror found in an image. Throws ContractError when model and circle do
+/// not fit together, see validate(const Camera&).
 [[nodiscard]] Camera camera_from_mirror(const MirrorCircle& mirror,
                                         const MirrorKnowledge& knowledge);
 
@@ -29,14 +29,14 @@ struct MirrorKnowledge {
 /// elevation and radius_px > 0.
 [[nodiscard]] HyperboloidalModel fit_focal_length(HyperboloidalModel model, double radius_px,
                                                   double elevation_rad);
-/// Fits the focal length of a unified model likewise. Throws as above.
+/// Fits the focal length of a unified model in the same way, with the same exceptions.
 [[nodiscard]] UnifiedModel fit_focal_length(UnifiedModel model, double radius_px,
                                             double elevation_rad);
 
 /// Draws the mirror on a colour copy of the image: the rim in green, the inner radius in orange (if
 /// found), the centre as a red cross, and a yellow line from inner radius to rim in the robot's
-/// forward direction if it is given (image angle, counter-clockwise as shown, from +u). Throws
-/// ContractError if the image's size is not the mirror's.
+/// forward direction if `forward_angle_rad` is set (see Camera). Throws ContractError if the
+/// image's size is not the mirror's.
 [[nodiscard]] Image draw_mirror(ImageView image, const MirrorCircle& mirror,
                                 std::optional<double> forward_angle_rad = std::nullopt);
 

@@ -13,12 +13,12 @@
 
 namespace panonav {
 
-/// The name of each alternative of CameraModel, in its order; files use these.
+/// Names of the models in files, in the order of the alternatives of CameraModel.
 inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> camera_model_names{
     "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular", "dual-fisheye"};
 
-/// The name of each UnifiedModel::Axis, in its order. Files name it where it is not `down`, beside
-/// the parameters.
+/// Names of the values of UnifiedModel::Axis in files, in its order. Files omit the default,
+/// `down`.
 inline constexpr std::array<std::string_view, 2> view_axis_names{"down", "up"};
 
 /// Returns the model's name in files: one of `camera_model_names`.
@@ -37,8 +37,8 @@ inline constexpr std::array<std::string_view, 2> view_axis_names{"down", "up"};
 }
 
 /// Calls `visit(name, value)` for each parameter of the model; `value` is a double or, for the
-/// coefficients of the polynomial, a vector of doubles. The one list from which files are written
-/// and read. `Model` is CameraModel, const or not.
+/// coefficients of the polynomial, a vector of doubles. All readers and writers of files use this
+/// list. `Model` is CameraModel, const or not.
 template <class Model, class Visit>
 void visit_parameters(Model& model, Visit&& visit) {
   std::visit(

@@ -16,7 +16,7 @@ double evaluate(std::span<const double> coefficients, double x) {
   return value;
 }
 
-std::vector<double> derivative(std::span<const double> coefficients) {
+std::vector<double> differentiate(std::span<const double> coefficients) {
   std::vector<double> result;
   for (std::size_t i = 1; i < coefficients.size(); ++i) {
     result.push_back(static_cast<double>(i) * coefficients[i]);
@@ -24,7 +24,7 @@ std::vector<double> derivative(std::span<const double> coefficients) {
   return result;
 }
 
-double bisect(std::span<const double> coefficients, double low, double high) {
+double find_root_by_bisection(std::span<const double> coefficients, double low, double high) {
   const bool low_is_negative = evaluate(coefficients, low) < 0;
   for (int i = 0; i < 100; ++i) {
     const double middle = 0.5 * (low + high);
@@ -33,11 +33,13 @@ double bisect(std::span<const double> coefficients, double low, double high) {
   return 0.5 * (low + high);
 }
 
-/// Returns where the polynomial changes its sign within (low, high), ascending. It is monotonic
-/// between two neighbouring extrema, so the sign changes of the derivative bracket all of them.
-std::vector<double> sign_changes(std::span<const double> coefficients, double low, double high) {
+/// Returns the roots in (low, high) at which the polynomial changes its sign, ascending. Between
+/// neighbouring roots of the derivative the polynomial is monotonic, so each of these intervals
+/// holds at most one.
+std::vector<double> find_sign_changes(std::span<const double> coefficients, double low,
+                                      double high) {
   if (coefficients.size() < 2) return {};
-  std::vector<double> borders = sign_changes(derivative(coefficients), low, high);
+  std::vector<double> borders = find_sign_changes(differentiate(coefficients), low, high);
   borders.insert(borders.begin(), low);
   borders.push_back(high);
   std::vector<double> result;
@@ -45,7 +47,7 @@ std::vector<double> sign_changes(std::span<const double> coefficients, double lo
     const double left = evaluate(coefficients, borders[i]);
     const double right = evaluate(coefficients, borders[i + 1]);
     if ((left < 0 && right > 0) || (left > 0 && right < 0)) {
-      result.push_back(bisect(coefficients, borders[i], borders[i + 1]));
+      result.push_back(find_root_by_bisection(coefficients, borders[i], borders[i + 1]));
     }
   }
   return result;
@@ -62,11 +64,12 @@ void validate(const PolynomialModel& model, double inner_radius_px, double rim_r
   // c_i r^i.
   std::vector<double> slope(c.size());
   for (std::size_t i = 0; i < c.size(); ++i) slope[i] = (1.0 - static_cast<double>(i)) * c[i];
-  std::vector<double> places = sign_changes(derivative(slope), inner_radius_px, rim_radius_px);
-  places.push_back(inner_radius_px);
-  places.push_back(rim_radius_px);
+  std::vector<double> checked_radii_px =
+      find_sign_changes(differentiate(slope), inner_radius_px, rim_radius_px);
+  checked_radii_px.push_back(inner_radius_px);
+  checked_radii_px.push_back(rim_radius_px);
   const double at_inner = evaluate(slope, inner_radius_px);
-  for (const double radius_px : places) {
+  for (const double radius_px : checked_radii_px) {
     if (!(evaluate(slope, radius_px) * at_inner > 0)) {
       throw ContractError("coefficients: radius where the elevation stops rising or falling",
                           radius_px, "outside inner_radius_px .. rim_radius_px");
@@ -86,7 +89,7 @@ std::optional<double> radius_at(const PolynomialModel& model, double elevation_r
   // The ray (r, -f(r)) and the direction (cos, sin) are parallel where their cross product is 0.
   const double cosine = std::cos(elevation_rad);
   const double sine = std::sin(elevation_rad);
-  const std::vector<double> slope = derivative(model.coefficients);
+  const std::vector<double> slope = differentiate(model.coefficients);
   const auto cross = [&](double r) { return r * sine + evaluate(model.coefficients, r) * cosine; };
   double low = inner_radius_px;
   double high = rim_radius_px;

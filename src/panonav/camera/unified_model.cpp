@@ -31,8 +31,8 @@ std::optional<double> radius_at(const UnifiedModel& model, double elevation_rad)
   const double along =
       model.axis == UnifiedModel::Axis::down ? -std::sin(elevation_rad) : std::sin(elevation_rad);
   const double across = std::max(0.0, std::cos(elevation_rad));
-  const double lowest = model.xi <= 1 ? -model.xi : -1 / model.xi;
-  if (!(along > lowest)) return std::nullopt;
+  const double min_along = model.xi <= 1 ? -model.xi : -1 / model.xi;
+  if (!(along > min_along)) return std::nullopt;
   return model.focal_length_px * across / (model.xi + along);
 }
 

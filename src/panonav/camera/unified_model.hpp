@@ -4,13 +4,13 @@
 
 namespace panonav {
 
-/// Unified central model (Geyer, Daniilidis 2000; Mei, Rives 2007): a direction is put on the unit
-/// sphere, then seen in perspective from a point xi behind its centre: r = f sin(psi) / (xi +
-/// cos(psi)), psi the angle to the axis. xi = 0 is a pinhole, 0 < xi < 1 a hyperboloidal mirror or
-/// a fisheye lens, xi = 1 a paraboloidal mirror. Valid: xi <= 1: cos(psi) > -xi, every r; xi > 1:
-/// cos(psi) > -1 / xi, and r < f / sqrt(xi^2 - 1).
+/// Unified central model (Geyer, Daniilidis 2000; Mei, Rives 2007): a direction is projected onto
+/// the unit sphere, and then in perspective from a point at distance xi behind its centre: r = f
+/// sin(psi) / (xi + cos(psi)), where psi is the angle to the axis. xi = 0 is a pinhole, 0 < xi < 1
+/// a hyperboloidal mirror or a fisheye lens, xi = 1 a paraboloidal mirror. Valid: xi <= 1: cos(psi)
+/// > -xi, every r; xi > 1: cos(psi) > -1 / xi, and r < f / sqrt(xi^2 - 1).
 struct UnifiedModel {
-  /// Which way the middle of the picture looks.
+  /// Direction that the middle of the picture shows.
   enum class Axis {
     down,  ///< a mirror above the camera: the middle shows the camera itself
     up,    ///< a fisheye lens towards the ceiling
@@ -18,18 +18,19 @@ struct UnifiedModel {
 
   double xi = 1.0;                 ///< >= 0
   double focal_length_px = 300.0;  ///< above 0
-  Axis axis = Axis::down;          ///< which way the middle of the picture looks
+  Axis axis = Axis::down;          ///< direction that the middle of the picture shows
   friend bool operator==(const UnifiedModel&, const UnifiedModel&) = default;
 };
 
 /// Throws ContractError that names the field, its value and its range.
 void validate(const UnifiedModel& model);
 
-/// Elevation (up is positive) in which a point of the image `radius_px` from the centre looks.
-/// Empty outside the valid domain.
+/// Returns the elevation (up is positive) visible at distance `radius_px` from the image centre;
+/// nullopt outside the valid domain.
 [[nodiscard]] std::optional<double> elevation_at(const UnifiedModel& model, double radius_px);
 
-/// Distance from the centre at which an elevation is seen. Empty outside the valid domain.
+/// Returns the distance from the image centre at which an elevation is visible; nullopt outside the
+/// valid domain.
 [[nodiscard]] std::optional<double> radius_at(const UnifiedModel& model, double elevation_rad);
 
 }  // namespace panonav

@@ -14,15 +14,16 @@ namespace {
 
 constexpr std::string_view separator = "://";
 
-// Addresses that need a mask, with their masks; the longest first, as one may be a part of another.
-struct Longer {
+// Orders the remembered addresses by length, longest first, so that an address is masked before
+// another one that is a part of it.
+struct LongerFirst {
   bool operator()(const std::string& a, const std::string& b) const {
     return a.size() != b.size() ? a.size() > b.size() : a < b;
   }
 };
 struct RememberedAddresses {
   std::mutex mutex;
-  std::map<std::string, std::string, Longer> masks;
+  std::map<std::string, std::string, LongerFirst> masks;
 };
 
 RememberedAddresses& remembered_addresses() {
@@ -46,7 +47,7 @@ void replace_all(std::string& text, const std::string& from, const std::string& 
   }
 }
 
-// The text with each of these characters replaced by a text.
+// Replaces each of these characters of the text by its escape.
 std::string escape(std::string_view text,
                    const std::vector<std::pair<char, std::string>>& escapes) {
   std::string escaped;
@@ -57,22 +58,26 @@ std::string escape(std::string_view text,
   return escaped;
 }
 
-// `is_whole`: nothing follows the address, so that what is no number is no port.
-std::string mask(std::string_view address, bool is_whole) {
+// Replaces passwords and secret parameters of an address by "***". `is_complete_address`: no other
+// text follows the address, so that text after the host's colon that is not a number cannot be a
+// port.
+std::string mask(std::string_view address, bool is_complete_address) {
   const std::size_t scheme = address.find(separator);
   if (scheme == std::string_view::npos) return std::string(address);
   std::vector<bool> hidden(address.size(), false);
   const auto hide = [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) hidden[i] = true;
   };
-  // All up to the last @, as a password may hold any character that was not escaped.
+  // Hides everything between the colon and the last @, because a password may contain any unescaped
+  // character.
   const std::size_t colon = address.find(':', scheme + separator.size());
   const std::size_t at = address.rfind('@');
   if (at != std::string_view::npos && colon < at) {
     hide(colon + 1, at);
-  } else if (is_whole && colon != std::string_view::npos &&
+  } else if (is_complete_address && colon != std::string_view::npos &&
              !address.substr(scheme + 3).starts_with('[')) {
-    // Without a port the text is a password whose host was forgotten.
+    // Text after the colon that is not a port is taken for a password before a forgotten @ and
+    // host.
     const std::size_t end = std::min(address.find_first_of("/?#,", colon), address.size());
     const std::string_view port = address.substr(colon + 1, end - colon - 1);
     if (port.find_first_not_of("0123456789") != std::string_view::npos) hide(colon + 1, end);
@@ -80,7 +85,7 @@ std::string mask(std::string_view address, bool is_whole) {
   for (std::size_t from = address.find('?', scheme); from < address.size();) {
     const std::size_t end = std::min(address.find_first_of("&;", from + 1), address.size());
     const std::size_t equals = address.find('=', from);
-    // A mask that is there already may be followed by a colon.
+    // Leaves a value that is masked already, even if a colon follows the mask.
     if (equals < end && !address.substr(equals + 1).starts_with("***:") &&
         is_secret_parameter(address.substr(from + 1, equals - from - 1))) {
       hide(equals + 1, end);
@@ -122,19 +127,20 @@ void remember_address(std::string_view address) {
 }
 
 std::string mask_passwords(std::string_view text) {
-  std::string known(text);
+  std::string masked_text(text);
   {
     RememberedAddresses& remembered = remembered_addresses();
     const std::lock_guard lock(remembered.mutex);
     for (const auto& [address, mask] : remembered.masks) {
-      replace_all(known, address, mask);
-      replace_all(known, to_readable_line(address), mask);
-      replace_all(known, escape(address, {{'"', "\\\""}, {'\\', "\\\\"}, {'\t', "\\t"}}), mask);
-      replace_all(known, escape(address, {{'\'', "'\\''"}}), mask);
+      replace_all(masked_text, address, mask);
+      replace_all(masked_text, to_readable_line(address), mask);
+      replace_all(masked_text, escape(address, {{'"', "\\\""}, {'\\', "\\\\"}, {'\t', "\\t"}}),
+                  mask);
+      replace_all(masked_text, escape(address, {{'\'', "'\\''"}}), mask);
     }
   }
   std::string result;
-  for (std::string_view rest = known; !rest.empty();) {
+  for (std::string_view rest = masked_text; !rest.empty();) {
     const std::size_t colon = std::min(rest.find(separator), rest.size());
     const std::size_t end =
         colon == rest.size() ? colon : std::min(rest.find_first_of(" \t\n\"'", colon), rest.size());

@@ -9,8 +9,7 @@ namespace panonav {
 
 namespace {
 
-std::string describe_fault(std::string_view field, std::string_view value,
-                           std::string_view allowed) {
+std::string format_fault(std::string_view field, std::string_view value, std::string_view allowed) {
   return std::string(field).append(" is ").append(value).append("; allowed: ").append(allowed);
 }
 
@@ -24,10 +23,10 @@ std::string to_text(double value) {
 
 ContractError::ContractError(std::string_view field, std::string_view value,
                              std::string_view allowed)
-    : Error(describe_fault(field, value, allowed)) {}
+    : Error(format_fault(field, value, allowed)) {}
 
 ContractError::ContractError(std::string_view field, double value, std::string_view allowed)
-    : Error(describe_fault(field, to_text(value), allowed)) {}
+    : Error(format_fault(field, to_text(value), allowed)) {}
 
 FileError::FileError(std::string_view path, std::string_view fault)
     : Error((is_address(path) ? mask_credentials(path) : std::string(path)) + ": " +

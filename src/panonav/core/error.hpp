@@ -7,8 +7,8 @@
 namespace panonav {
 
 /// Base of everything that panonav throws. The message is one line that says what is wrong, where,
-/// which value was found and which values are allowed. "No answer" (lost, nothing visible) is never
-/// an error: functions return an empty optional for it.
+/// which value was found and which values are allowed. A missing answer (robot lost, nothing
+/// visible) is not an error: functions then return an empty optional.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -20,7 +20,7 @@ class ContractError : public Error {
   using Error::Error;
   /// Message "`field` is `value`; allowed: `allowed`".
   ContractError(std::string_view field, std::string_view value, std::string_view allowed);
-  /// Message with the value as `to_text` writes it.
+  /// The same message, with the number converted by `to_text`.
   ContractError(std::string_view field, double value, std::string_view allowed);
 };
 
@@ -30,12 +30,11 @@ class OptionError : public Error {
   using Error::Error;
 };
 
-/// A file is missing, unreadable, damaged, of a foreign kind, of another version, or cannot be
-/// written.
+/// A file is missing, unreadable, damaged, of the wrong type or version, or cannot be written.
 class FileError : public Error {
  public:
-  /// Message "`path`: `fault`", of an address without its password. `fault` names the field, the
-  /// value and the allowed range where there are any.
+  /// Message "`path`: `fault`"; passwords in an address are masked. `fault` should name field,
+  /// value and allowed range, if there are any.
   FileError(std::string_view path, std::string_view fault);
 };
 
@@ -44,7 +43,7 @@ inline void require(bool holds, std::string_view field, double value, std::strin
   if (!holds) throw ContractError(field, value, allowed);
 }
 
-/// The shortest text that reads back as the same number; "nan" and "inf" as words.
+/// Returns the shortest text that reads back as the same number, or "nan" or "inf".
 std::string to_text(double value);
 
 }  // namespace panonav

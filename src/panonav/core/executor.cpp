@@ -21,21 +21,21 @@ struct Executor::Pool {
   std::function<void()> before_chunk;
   bool stopping = false;
 
-  // The loop that runs; guarded by `mutex`.
+  // State of the running loop; guarded by `mutex`.
   const std::function<void(std::size_t, std::size_t, std::size_t)>* body = nullptr;
   std::size_t count = 0;
   std::size_t chunk = 1;
   std::size_t next_chunk = 0;
-  std::size_t open_chunks = 0;
+  std::size_t unfinished_chunks = 0;
   std::size_t failed_chunk = 0;
-  std::exception_ptr failure;
+  std::exception_ptr first_failure;
   std::exception_ptr interruption;  // thrown by `before_chunk`
 
-  // Runs chunks until none is left. `lock` is held on entry and on return.
-  void run(std::unique_lock<std::mutex>& lock, bool is_caller) {
+  // Runs chunks until all are taken. `lock` is held on entry and on return.
+  void run_chunks(std::unique_lock<std::mutex>& lock, bool is_caller) {
     while (body != nullptr && next_chunk * chunk < count) {
-      if (is_caller && before_chunk && !call_before_chunk(lock)) return;
-      if (next_chunk * chunk >= count) return;  // others took the rest meanwhile
+      if (is_caller && before_chunk && !call_before_chunk_or_cancel(lock)) return;
+      if (next_chunk * chunk >= count) return;  // other threads took the remaining chunks meanwhile
       const std::size_t number = next_chunk++;
       const auto* const work = body;
       const std::size_t begin = number * chunk;
@@ -48,16 +48,17 @@ struct Executor::Pool {
         thrown = std::current_exception();
       }
       lock.lock();
-      if (thrown && (!failure || number < failed_chunk)) {
-        failure = thrown;
+      if (thrown && (!first_failure || number < failed_chunk)) {
+        first_failure = thrown;
         failed_chunk = number;
       }
-      if (--open_chunks == 0) work_done.notify_all();
+      if (--unfinished_chunks == 0) work_done.notify_all();
     }
   }
 
-  // Calls `before_chunk`; if it throws, the chunks that nobody took count as done. False then.
-  bool call_before_chunk(std::unique_lock<std::mutex>& lock) {
+  // Calls `before_chunk`. If it throws, stores the exception, cancels the chunks that no thread has
+  // taken, and returns false.
+  bool call_before_chunk_or_cancel(std::unique_lock<std::mutex>& lock) {
     lock.unlock();
     std::exception_ptr thrown;
     try {
@@ -69,7 +70,7 @@ struct Executor::Pool {
     if (!thrown) return true;
     interruption = thrown;
     const std::size_t chunks = (count + chunk - 1) / chunk;
-    open_chunks -= chunks - std::min(chunks, next_chunk);
+    unfinished_chunks -= chunks - std::min(chunks, next_chunk);
     next_chunk = chunks;
     return false;
   }
@@ -84,7 +85,7 @@ Executor::Executor(int count, std::function<void()> before_chunk)
   const auto work = [pool = pool_.get()] {
     std::unique_lock lock(pool->mutex);
     while (!pool->stopping) {
-      pool->run(lock, false);
+      pool->run_chunks(lock, false);
       pool->work_available.wait(lock, [pool] {
         return pool->stopping ||
                (pool->body != nullptr && pool->next_chunk * pool->chunk < pool->count);
@@ -94,7 +95,7 @@ Executor::Executor(int count, std::function<void()> before_chunk)
   try {
     while (threads() < count) pool_->workers.emplace_back(work);
   } catch (const std::system_error&) {
-    // The system has no thread left. Those that run do the same work, only more slowly.
+    // The system cannot start more threads; those started do the work more slowly.
   }
 }
 
@@ -120,15 +121,15 @@ void Executor::for_chunks(std::size_t count, std::size_t chunk,
   pool_->count = count;
   pool_->chunk = chunk;
   pool_->next_chunk = 0;
-  pool_->open_chunks = (count + chunk - 1) / chunk;
-  pool_->failure = nullptr;
+  pool_->unfinished_chunks = (count + chunk - 1) / chunk;
+  pool_->first_failure = nullptr;
   pool_->interruption = nullptr;
   pool_->work_available.notify_all();
-  pool_->run(lock, true);
-  pool_->work_done.wait(lock, [this] { return pool_->open_chunks == 0; });
+  pool_->run_chunks(lock, true);
+  pool_->work_done.wait(lock, [this] { return pool_->unfinished_chunks == 0; });
   pool_->body = nullptr;
   if (pool_->interruption) std::rethrow_exception(std::exchange(pool_->interruption, nullptr));
-  if (pool_->failure) std::rethrow_exception(std::exchange(pool_->failure, nullptr));
+  if (pool_->first_failure) std::rethrow_exception(std::exchange(pool_->first_failure, nullptr));
 }
 
 }  // namespace panonav

@@ -7,15 +7,15 @@
 
 namespace panonav {
 
-/// A number that names one thing of one kind. Ids of different kinds do not convert into each
-/// other, and an id is not an index: it stays the same when other things are removed.
+/// A typed number that identifies an object. Ids of different types do not convert into each other.
+/// Unlike an index, an id does not change when other objects are removed.
 template <class Tag>
 struct Id {
-  std::uint32_t value = 0;  ///< what files and messages show; ids are ordered by it
+  std::uint32_t value = 0;  ///< shown in files and messages; defines the order of ids
   friend constexpr auto operator<=>(Id, Id) = default;
 };
 
-/// Names a reference view within one visual memory. Never used twice, even after a removal.
+/// Identifies a reference view within one visual memory. Never reused, even after a removal.
 using ViewId = Id<struct ViewTag>;
 
 }  // namespace panonav

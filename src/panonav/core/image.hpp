@@ -14,8 +14,8 @@ struct ImageSize {
   friend bool operator==(const ImageSize&, const ImageSize&) = default;
 };
 
-/// 8-bit pixels that belong to somebody else: `channels` interleaved (1 grey, 3 RGB), rows from the
-/// top, `stride` bytes from one row to the next. Pixel (u, v) covers [u, u+1) x [v, v+1) of the
+/// A view of 8-bit pixels that it does not own: `channels` interleaved (1 grey, 3 RGB), rows from
+/// the top, `stride` bytes from one row to the next. Pixel (u, v) covers [u, u+1) x [v, v+1) of the
 /// continuous image plane, so its centre lies at (u + 0.5, v + 0.5).
 struct ImageView {
   /// The first channel of pixel (0, 0), at the upper left; null: no image.
@@ -76,8 +76,8 @@ class Image {
   std::vector<std::uint8_t> pixels_;
 };
 
-/// Converts to one grey channel; colour is weighed as ITU-R BT.601 does (0.299 R + 0.587 G + 0.114
-/// B).
+/// Converts to one grey channel, with the weights of ITU-R BT.601 for colour (0.299 R + 0.587 G +
+/// 0.114 B).
 [[nodiscard]] Image to_grey(ImageView image);
 
 }  // namespace panonav

@@ -8,7 +8,7 @@ namespace panonav {
 
 namespace {
 
-std::string format(double value, std::chars_format form, int precision) {
+std::string format_with_precision(double value, std::chars_format form, int precision) {
   // The largest double has 309 digits before the point.
   std::string text(static_cast<std::size_t>(std::max(precision, 0)) + 330, '\0');
   const auto result = std::to_chars(text.data(), text.data() + text.size(), value, form, precision);
@@ -27,11 +27,11 @@ std::string to_hex_text(double value) {
 }
 
 std::string to_fixed_text(double value, int digits) {
-  return format(value, std::chars_format::fixed, digits);
+  return format_with_precision(value, std::chars_format::fixed, digits);
 }
 
 std::string to_general_text(double value, int significant) {
-  return format(value, std::chars_format::general, significant);
+  return format_with_precision(value, std::chars_format::general, significant);
 }
 
 std::string to_hex_digits(std::uint64_t value, std::size_t digits) {

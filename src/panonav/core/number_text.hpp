@@ -9,24 +9,24 @@
 
 namespace panonav {
 
-// Numbers as texts that do not depend on the locale of the program: a library within a program
-// with decimal commas writes and reads the same bytes. printf, strtod, scanf and streams do not.
+// Conversion between numbers and text independent of the program's locale: decimal commas never
+// appear, unlike with printf, strtod, scanf and streams.
 
-/// Writes a number as "%a" of printf does with a decimal point, with all its bits: "0x1.8p+1".
+/// Formats a number without loss as printf's "%a" with a decimal point: "0x1.8p+1".
 [[nodiscard]] std::string to_hex_text(double value);
-/// Writes a number as "%.<digits>f" does.
+/// Formats a number as printf's "%.<digits>f".
 [[nodiscard]] std::string to_fixed_text(double value, int digits);
-/// Writes a number as "%.<significant>g" does.
+/// Formats a number as printf's "%.<significant>g".
 [[nodiscard]] std::string to_general_text(double value, int significant);
 /// Writes a number in hexadecimal digits, padded with zeros to `digits`.
 [[nodiscard]] std::string to_hex_digits(std::uint64_t value, std::size_t digits = 1);
 
-/// Reads the output of `to_hex_text`, to the bit. False, and `value` unchanged, unless the whole
-/// text is one such number.
+/// Parses the output of `to_hex_text` without loss, or a decimal number. False, with `value`
+/// unchanged, unless the whole text is one number.
 [[nodiscard]] bool read_hex_number(std::string_view text, double& value);
 
-/// Reads a number in decimal digits, or a whole number of another `base`, 2 .. 36. False, and
-/// `value` as before, unless the whole text is one number that the type can hold.
+/// Parses a decimal number, or an integer in another `base` (2 .. 36). False, with `value`
+/// unchanged, unless the whole text is one number that the type can represent.
 template <class Number, class... Base>
 [[nodiscard]] bool read_number(std::string_view text, Number& value, Base... base) {
   const char* const end = text.data() + text.size();
@@ -37,7 +37,7 @@ template <class Number, class... Base>
   return true;
 }
 
-/// Reads the decimal number with which the text begins; false where it begins with none.
+/// Parses the decimal number at the beginning of the text; false if there is none.
 template <class Number>
 [[nodiscard]] bool read_leading_number(std::string_view text, Number& value) {
   return std::from_chars(text.data(), text.data() + text.size(), value).ec == std::errc();

@@ -15,37 +15,38 @@
 
 namespace panonav {
 
-/// Name, help and range of one option. Options live once, as members of the struct of their
-/// module; the command line, TOML files and bindings are derived from its `OptionTable`.
+/// Name, help and range of one option. Each option is defined once, as a member of its module's
+/// options struct, and listed in the `OptionTable` of that struct, from which the command line,
+/// TOML files and bindings are derived.
 struct OptionInfo {
-  /// The smallest allowed value; a number stands for itself.
+  /// Lower bound of a range; converts implicitly from a number, which is then allowed itself.
   struct Low {
     double value = -std::numeric_limits<double>::infinity();  ///< the bound
     bool is_open = false;                                     ///< the bound itself is not allowed
     constexpr Low() = default;                                ///< No bound.
-    /// A bound that is allowed itself unless it `is_open`.
+    /// Makes a bound; the bound itself is allowed unless `is_open`.
     constexpr Low(double bound, bool is_open_ = false)
         : value(bound), is_open(is_open_) {}  // NOLINT
   };
-  std::string_view name;  ///< the member's: snake_case, with its unit
+  std::string_view name;  ///< name of the member: snake_case, with its unit
   std::string_view help;  ///< one plain line
   double low = -std::numeric_limits<double>::infinity();  ///< smallest allowed value
   double high = std::numeric_limits<double>::infinity();  ///< largest allowed value
   bool low_open = false;                                  ///< `low` itself is not allowed
 };
 
-/// Visits the members of an options struct. Each options struct `T` has a function
-/// `void visit_options(T&, OptionVisitor&)` beside it that holds its `OptionTable` and visits it.
+/// Visits the members of an options struct. Each options struct `T` has a function `void
+/// visit_options(T&, OptionVisitor&)`, which visits all entries of its `OptionTable`.
 class OptionVisitor {
  public:
   virtual ~OptionVisitor() = default;
-  /// An int. A visitor may change `value`; it checks `info`'s range itself.
+  /// Visits an int. A visitor may change `value`, and must check the range of `info` itself.
   virtual void visit(const OptionInfo& info, int& value) = 0;
   /// Visits a double, in the unit in which the member's name ends.
   virtual void visit(const OptionInfo& info, double& value) = 0;
   /// Visits a bool, which has no range.
   virtual void visit(const OptionInfo& info, bool& value) = 0;
-  /// `value` is an index into `choices`.
+  /// Visits a choice; `value` is an index into `choices`.
   virtual void visit(const OptionInfo& info, std::span<const std::string_view> choices,
                      int& value) = 0;
 };
@@ -57,10 +58,12 @@ class OptionVisitor {
 [[nodiscard]] std::optional<std::string> find_option_fault(const OptionInfo& info, double value);
 
 namespace detail {
-/// Throws OptionError with the faults of all options that `visit` shows, if there are any.
+/// Throws OptionError that lists the invalid values among all options that `visit` visits, if there
+/// are any.
 void require_valid(const std::function<void(OptionVisitor&)>& visit);
 
-/// Returns the member's name, with which the compiler's text of &Options::member ends.
+/// Returns the member's name, extracted from the compiler's text for &Options::member in
+/// __PRETTY_FUNCTION__.
 template <auto member>
 constexpr std::string_view member_name() {
   std::string_view text = __PRETTY_FUNCTION__;
@@ -74,22 +77,22 @@ Options options_with(Value Options::*);
 template <auto member>
 using OptionsWith = decltype(options_with(member));
 
-struct AnyMember {
+struct ConvertibleToAny {
   template <class Value>
-  operator Value() const;  // NOLINT: asked for, never called
+  operator Value() const;  // NOLINT: only declared, never called
 };
 
 /// Number of members of the aggregate: the largest number that braces can initialise.
 template <class Options, class... Members>
 consteval std::size_t member_count() {
-  if constexpr (requires { Options{Members{}..., AnyMember{}}; }) {
-    return member_count<Options, Members..., AnyMember>();
+  if constexpr (requires { Options{Members{}..., ConvertibleToAny{}}; }) {
+    return member_count<Options, Members..., ConvertibleToAny>();
   } else {
     return sizeof...(Members);
   }
 }
 
-/// One member in an `OptionTable`; without `is_listed` no visitor sees it.
+/// One member in an `OptionTable`. If `is_listed` is false, visitors skip it.
 template <auto member, std::size_t choice_count, bool is_listed = true>
 struct OptionEntry {
   using Options = OptionsWith<member>;
@@ -113,12 +116,13 @@ struct OptionEntry {
 
 }  // namespace detail
 
-/// Values above `low`, which is not allowed itself: `option<&T::step_m>("...", above(0), 100)`.
+/// Makes an open lower bound, so that values must be greater than `low`: `option<&T::step_m>("...",
+/// above(0), 100)`.
 constexpr OptionInfo::Low above(double low) {
   return {low, true};
 }
 
-/// The entry of a number or of a bool.
+/// Makes the table entry of a number or a bool.
 template <auto member>
 constexpr auto option(std::string_view help, OptionInfo::Low low = {},
                       double high = std::numeric_limits<double>::infinity()) {
@@ -127,7 +131,7 @@ constexpr auto option(std::string_view help, OptionInfo::Low low = {},
   return entry;
 }
 
-/// The entry of a member that holds the index of a choice: an enum, or an int.
+/// Makes the table entry of an enum or int that is an index into `choices`.
 template <auto member, std::size_t count>
 constexpr auto option(std::string_view help, const std::array<std::string_view, count>& choices) {
   detail::OptionEntry<member, count> entry;
@@ -135,26 +139,26 @@ constexpr auto option(std::string_view help, const std::array<std::string_view, 
   entry.choices = choices;
   return entry;
 }
-/// The entry of a member that holds one of some choices, which are named in the order of the enum.
+/// Makes the table entry of an enum, with the names of its values in order.
 template <auto member, class... Names>
 constexpr auto choice(std::string_view help, Names... choices) {
   return option<member>(help, std::array<std::string_view, sizeof...(Names)>{choices...});
 }
 
-/// All options of a member that is an options struct itself.
+/// Makes the table entry of a nested options struct; its options are visited in turn.
 template <auto member>
 constexpr auto options_of() {
   return detail::OptionEntry<member, 0>();
 }
 
-/// A member that no user sets by name, and why.
+/// Makes the table entry of a member that is not an option, with the reason.
 template <auto member>
 constexpr auto no_option(std::string_view /*reason*/) {
   return detail::OptionEntry<member, 0, false>();
 }
 
-/// The members of an options struct, each of them once and in the order in which they are shown; a
-/// member that is missing does not compile:
+/// Lists every member of an options struct exactly once, in
+/// display order; a missing or repeated member is a compile error:
 ///
 ///     constexpr OptionTable table{
 ///         option<&SearchOptions::radius_m>("how far", above(0), 100),
@@ -169,13 +173,14 @@ class OptionTable {
   /// The entries in the order in which help shows them.
   constexpr explicit OptionTable(const Entries&... entries) : entries_(entries...) {}
 
-  /// Hands each member to `visitor` in the order of the entries; members of nested structs in turn.
+  /// Passes each option to `visitor` in the order of the entries, including the options of nested
+  /// structs.
   void visit(Options& options, OptionVisitor& visitor) const {
     std::apply([&](const auto&... entry) { (entry.visit(options, visitor), ...); }, entries_);
   }
 
  private:
-  static consteval bool all_differ() {
+  static consteval bool are_names_unique() {
     const std::array<std::string_view, sizeof...(Entries)> names{Entries::name...};
     for (std::size_t i = 0; i < names.size(); ++i) {
       for (std::size_t j = 0; j < i; ++j) {
@@ -187,7 +192,7 @@ class OptionTable {
   static_assert(
       detail::member_count<Options>() == sizeof...(Entries),
       "each member has one entry: option, choice, options_of, or no_option with a reason");
-  static_assert(all_differ(), "no member has two entries");
+  static_assert(are_names_unique(), "no member has two entries");
   std::tuple<Entries...> entries_;
 };
 

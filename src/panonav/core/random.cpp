@@ -22,7 +22,8 @@ std::uint64_t split_mix(std::uint64_t& state) {
 Random::Random(std::uint64_t seed) : Random(seed, 0) {}
 
 Random::Random(std::uint64_t seed, std::uint64_t stream) {
-  // Mixing the stream first keeps (seed, stream + 1) far from (seed + 1, stream).
+  // Mixes the stream number first, so that (seed, stream + 1) and (seed + 1, stream) get unrelated
+  // states.
   std::uint64_t mixer = stream;
   std::uint64_t state = seed ^ split_mix(mixer);
   for (auto& word : state_) word = split_mix(state);
@@ -49,7 +50,7 @@ double Random::uniform(double low, double high) {
 }
 
 std::uint64_t Random::index(std::uint64_t count) {
-  // Values above the largest multiple of count are drawn again, so no index is favoured.
+  // Draws again above the largest multiple of count, so that all indices are equally likely.
   const std::uint64_t limit = UINT64_MAX - UINT64_MAX % count;
   std::uint64_t value = next();
   while (value >= limit) value = next();
@@ -57,13 +58,13 @@ std::uint64_t Random::index(std::uint64_t count) {
 }
 
 double Random::normal() {
-  // Box-Muller without its second value: no state beyond the generator's own.
+  // Box-Muller; drops the second value, so that no state besides the generator's is needed.
   const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
   return radius * std::cos(2.0 * std::numbers::pi * uniform());
 }
 
 std::pair<double, double> Random::normal_pair() {
-  // Box-Muller; the halves of one number are two uniform ones.
+  // Box-Muller; the two halves of one random number serve as the two uniform numbers.
   const std::uint64_t bits = next();
   const auto half = [](std::uint32_t part) {
     return (static_cast<float>(part) + 0.5F) * 0x1.0p-32F;

@@ -6,13 +6,13 @@
 
 namespace panonav {
 
-/// Random numbers with the same bits on every platform: xoshiro256++ seeded through SplitMix64, and
-/// distributions of our own, because the standard ones differ between libraries. Not thread-safe:
-/// give each chunk of parallel work its own `stream`.
+/// Random number generator with the same results on every platform: xoshiro256++ seeded by
+/// SplitMix64, with its own distributions, because those of the standard differ between libraries.
+/// Not thread-safe: give each chunk of parallel work its own `stream`.
 class Random {
  public:
   explicit Random(std::uint64_t seed);  ///< Stream 0 of the seed.
-  /// An engine that is independent of every other (seed, stream).
+  /// Makes a generator that is independent of those of every other (seed, stream).
   Random(std::uint64_t seed, std::uint64_t stream);
 
   std::uint64_t next();  ///< 64 random bits.
@@ -24,8 +24,8 @@ class Random {
   std::uint64_t index(std::uint64_t count);
   /// Normal distribution of mean 0 and standard deviation 1.
   double normal();
-  /// Two independent standard normal values to 24 bits from one number of the generator, at a third
-  /// of the cost; none is beyond 6.7 deviations.
+  /// Draws two independent standard normal values, with 24 bits, from one 64-bit number: a third of
+  /// the cost of `normal`. No value exceeds 6.7 standard deviations.
   std::pair<double, double> normal_pair();
   /// Normal distribution of this mean and standard deviation (>= 0), in the unit of both.
   double normal(double mean, double standard_deviation);

@@ -7,17 +7,17 @@
 
 namespace panonav {
 
-/// Linear interpolation between order statistics; `fraction` in [0, 1]. Throws ContractError on no
-/// values.
+/// Computes a quantile by linear interpolation between order statistics; `fraction` in [0, 1].
+/// Throws ContractError on no values.
 [[nodiscard]] double quantile(std::span<const double> values, double fraction);
-/// The middle value; of an even number the mean of the two in the middle. Throws ContractError on
-/// no values. Cost: O(n log n).
+/// Computes the median; for an even number of values the mean of the two in the middle. Throws
+/// ContractError on no values. Cost: O(n log n).
 [[nodiscard]] double median(std::span<const double> values);
 /// Arithmetic mean. Throws ContractError on no values.
 [[nodiscard]] double mean(std::span<const double> values);
 
-/// The median; of an even number the larger of the two in the middle. Reorders `values`, of which
-/// there must be at least one. Cost: O(n).
+/// Computes the median; for an even number of values the larger of the two in the middle. Reorders
+/// `values`, which must not be empty. Cost: O(n).
 template <typename Value>
 [[nodiscard]] Value upper_median_in_place(std::span<Value> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -31,9 +31,8 @@ template <typename Value>
   return upper_median_in_place(std::span(values));
 }
 
-/// The value at `fraction` (0 .. 1) of the ascending order, its position rounded down: one of the
-/// values, where `quantile` interpolates. Throws ContractError on no
-/// values. Cost: O(n).
+/// Returns the value at the position fraction * (n - 1), rounded down, of the ascending order.
+/// Unlike `quantile` it does not interpolate. Throws ContractError on no values. Cost: O(n).
 [[nodiscard]] double order_statistic(std::vector<double> values, double fraction);
 
 }  // namespace panonav

@@ -31,8 +31,8 @@ int create_exclusively(const fs::path& path) {
   return ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
 }
 
-// True if nobody else holds the lock and the file still has the name: a finished process renames
-// its file before it unlocks it.
+// Locks the file; false if another process holds the lock, or `path` no longer names this file: a
+// finished process renames its file before it unlocks it.
 bool lock_if_current(int descriptor, const fs::path& path) {
   struct stat file {};
   struct stat named {};
@@ -51,7 +51,7 @@ void remove_if_abandoned(const fs::path& path) {
 }  // namespace
 
 void require_no_database(const fs::path& path) {
-  // The first bytes of each SQLite 3 file (sqlite.org/fileformat), with the zero that ends them.
+  // First 16 bytes of every SQLite 3 file (sqlite.org/fileformat), including the final zero.
   constexpr std::string_view magic("SQLite format 3\0", 16);
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) return;

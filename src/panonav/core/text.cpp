@@ -17,7 +17,8 @@ bool is_continuation_byte(char c) {
   return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
 }
 
-// Bytes of the UTF-8 character at the beginning of the text; 0 where there is none.
+// Returns the number of bytes of the UTF-8 character at the beginning of the text; 0 if it is
+// invalid.
 std::size_t utf8_character_size(std::string_view text) {
   const auto first = static_cast<unsigned char>(text.front());
   if (first < 0x80U) return 1;
@@ -41,8 +42,8 @@ std::size_t utf8_character_size(std::string_view text) {
   return 0;
 }
 
-// Control characters behind ASCII: C1; marks, embeddings, overrides and isolates of the direction
-// of writing (Unicode TR9); separators of lines and paragraphs.
+// True for control characters beyond ASCII: C1; marks, embeddings, overrides and isolates of the
+// writing direction (Unicode TR9); line and paragraph separators.
 bool is_invisible_control(std::string_view character) {
   const auto is_within = [character](std::string_view first, std::string_view last) {
     return character.size() == first.size() && character >= first && character <= last;
@@ -52,7 +53,8 @@ bool is_invisible_control(std::string_view character) {
          is_within("\xE2\x81\xA6", "\xE2\x81\xA9");
 }
 
-// Insertions, deletions, changes and swaps of neighbours that make one text of the other.
+// Returns the smallest number of insertions, deletions, replacements and swaps of neighbours that
+// turn one text into the other.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> cost(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
@@ -175,7 +177,7 @@ std::string to_csv_field(std::string_view text) {
 }
 
 std::string to_sheet_field(std::string_view text) {
-  // Sheets take the wide forms of =, +, - and @ for these, too.
+  // Spreadsheets also accept the full-width forms of =, +, - and @, which are the last four.
   constexpr std::array<std::string_view, 10> begins{
       "=",           "+", "-", "@", "\t", "\r", "\xEF\xBC\x9D", "\xEF\xBC\x8B", "\xEF\xBC\x8D",
       "\xEF\xBC\xA0"};
@@ -190,7 +192,8 @@ std::string shorten_middle(std::string_view text, std::size_t max_characters) {
   const auto characters = static_cast<std::size_t>(
       std::ranges::count_if(text, [](char c) { return !is_continuation_byte(c); }));
   if (characters <= max_characters) return std::string(text);
-  // The end, such as a file's name in a path, says most, and so both ends stay.
+  // Keeps both ends, because the end, such as the file name of a path, is the most informative
+  // part.
   const std::size_t kept = (max_characters - 3) / 2;
   std::size_t begin = 0;
   for (std::size_t left = kept; left > 0; --left) {
@@ -211,7 +214,7 @@ std::string suggest_name(std::string_view typed, std::span<const std::string_vie
   std::size_t best = std::max<std::size_t>(1, typed.size() / 3) + 1;
   std::string_view nearest;
   for (const auto name : names) {
-    // The beginning of a longer name is that name.
+    // Four or more first characters of a name match it with distance 1.
     const bool begins = typed.size() >= 4 && name.starts_with(typed);
     const std::size_t distance = begins ? 1 : edit_distance(typed, name);
     if (distance >= best) continue;

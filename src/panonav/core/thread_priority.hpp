@@ -5,8 +5,8 @@
 
 namespace panonav {
 
-/// Lowers the priority of this thread below that of a robot's answers, also where these are made by
-/// a real-time thread. On Linux both calls are about the calling thread.
+/// Lowers the priority of the calling thread (batch scheduling, nice + 10), so that background work
+/// does not delay a robot's answers. On Linux both calls affect only the calling thread.
 inline void lower_thread_priority() {
   const sched_param lowest{};
   (void)sched_setscheduler(0, SCHED_BATCH, &lowest);

@@ -6,15 +6,15 @@
 
 namespace panonav {
 
-/// A map of one point set onto another: to ~ scale * R(rotation) * from + translation, with
-/// a mirror image first (y -> -y) when `reflected`.
+/// A similarity transform that maps one point set onto another: to ~ scale * R(rotation) * from +
+/// translation; if `reflected`, y of `from` changes its sign first.
 struct Alignment {
   /// Freedoms of the fit beyond rotation and translation.
   struct Options {
-    bool allow_scale = false;       ///< the unit of length of `from` is free
-    bool allow_reflection = false;  ///< a mirror image is taken where it fits better
+    bool allow_scale = false;       ///< also fit the scale
+    bool allow_reflection = false;  ///< mirror `from` if this fits better
   };
-  /// Metres of `to` for each unit of `from`; 1 unless the scale was free.
+  /// Metres in `to` per unit of length in `from`; 1 unless `allow_scale`.
   double scale = 1.0;
   double rotation_rad = 0.0;  ///< counter-clockwise, in [-pi, pi]
   Point2 translation;         ///< added after rotation and scale, in the frame of `to`
@@ -25,15 +25,15 @@ struct Alignment {
   [[nodiscard]] Point2 apply(Point2 p_in_from) const;
 };
 
-/// Least-squares alignment (Procrustes, Umeyama 1991). Throws ContractError unless both sets have
-/// the same size >= 1. Coincident points align by translation alone.
+/// Computes the least-squares alignment (Procrustes, Umeyama 1991). Throws ContractError unless
+/// both sets have the same size >= 1. Coincident points align by translation alone.
 [[nodiscard]] Alignment align(std::span<const Point2> from, std::span<const Point2> to,
                               const Alignment::Options& options = {});
 
-/// Procrustes disparity of two shapes, the "shape difference" mu that [F11 section 4] names but
-/// does not print: how much they differ after the best translation, rotation and scale. mu = 1 -
-/// (s_1 + d s_2)^2 with s the singular values of the product of the two centred, unit-norm sets,
-/// and d = +-1 such that the rotation is proper.
+/// Procrustes disparity of two shapes, that is, their remaining difference after the best
+/// translation, rotation and scale. [F11 section 4] uses it as "shape difference" mu without giving
+/// the formula. mu = 1 - (s_1 + d s_2)^2 with s the singular values of the product of the two
+/// centred, unit-norm sets, and d = +-1 such that the rotation is proper.
 struct ShapeDifference {
   double value = 0.0;            ///< 0 (same shape) .. 1
   double with_reflection = 0.0;  ///< the same when a mirror image is allowed

@@ -6,7 +6,7 @@
 
 namespace panonav {
 
-double wrap_angle_far(double angle_rad) {
+double wrap_any_angle(double angle_rad) {
   constexpr double turn = 2.0 * std::numbers::pi;
   double wrapped = std::remainder(angle_rad, turn);  // [-pi, pi]
   if (wrapped >= std::numbers::pi) wrapped = -std::numbers::pi;
@@ -26,7 +26,7 @@ std::optional<CircularMean> circular_mean(std::span<const double> angles_rad) {
     y += std::sin(angle);
   }
   const double length = std::hypot(x, y) / static_cast<double>(angles_rad.size());
-  // Below this the direction is rounding noise.
+  // Angles with a shorter resultant cancel; its direction would be rounding noise.
   if (!(length > 1e-12)) return std::nullopt;
   return CircularMean{wrap_angle(std::atan2(y, x)), std::min(1.0, length)};
 }

@@ -9,20 +9,20 @@
 #include <utility>
 #include <vector>
 
-// Non-linear least squares by damped Gauss-Newton steps. Whoever includes this links Eigen.
+// Non-linear least squares by damped Gauss-Newton steps. Users of this header must link Eigen.
 
 namespace panonav {
 
-/// Weight of a residual by Cauchy's loss; `squared`: the residual over its scale, squared.
+/// Returns the weight of a residual under Cauchy's loss; `squared`: square of residual / scale.
 [[nodiscard]] constexpr double cauchy_weight(double squared) noexcept {
   return 1.0 / (1.0 + squared);
 }
-/// Returns the weight of the loss of Geman and McClure: residuals far beyond the scale have almost
-/// none.
+/// Returns the weight under the Geman-McClure loss, which is almost 0 for residuals far above the
+/// scale.
 [[nodiscard]] constexpr double geman_mcclure_weight(double squared) noexcept {
   return 1.0 / ((1.0 + squared) * (1.0 + squared));
 }
-/// Returns the weight of Tukey's loss: 0 beyond the scale.
+/// Returns the weight under Tukey's biweight loss, which is 0 for residuals above the scale.
 [[nodiscard]] constexpr double tukey_weight(double squared) noexcept {
   return squared < 1.0 ? (1.0 - squared) * (1.0 - squared) : 0.0;
 }
@@ -34,15 +34,16 @@ struct DenseEquations {
   using Matrix = Eigen::Matrix<double, unknowns, unknowns>;  ///< of the equations
   using Vector = Eigen::Matrix<double, unknowns, 1>;         ///< of one number for each unknown
   Matrix matrix;                                             ///< symmetric; both triangles
-  Vector right;                                              ///< where the cost falls
-  double min_reciprocal_condition = 0.0;                     ///< below it there is no solution
+  Vector right;                                              ///< negative gradient of the cost
+  double min_reciprocal_condition = 0.0;                     ///< `solve` fails below it
 
   /// Sets all to zero; for a fixed number of unknowns.
   void set_zero() {
     matrix.setZero();
     right.setZero();
   }
-  /// Solves with (1 + damping) times the diagonal. Empty when the solution is not finite.
+  /// Solves the equations with the diagonal multiplied by 1 + damping. nullopt if they are too
+  /// badly conditioned or the solution is not finite.
   [[nodiscard]] std::optional<Vector> solve(double damping = 0.0) const {
     Matrix damped = matrix;
     damped.diagonal() *= 1.0 + damping;
@@ -57,7 +58,7 @@ struct DenseEquations {
   }
 };
 
-/// Normal equations of many unknowns of which few share a residual.
+/// Sparse normal equations, for many unknowns of which each residual depends on few.
 class SparseEquations {
  public:
   /// Sets all to zero, for this number of unknowns.
@@ -65,7 +66,8 @@ class SparseEquations {
     entries_.clear();
     right_ = Eigen::VectorXd::Zero(unknowns);
   }
-  /// Adds to the matrix, of which one triangle is kept: `row` and `column` come in either order.
+  /// Adds `value` to an entry of the symmetric matrix, of which only one triangle is stored; `row`
+  /// and `column` may be swapped.
   void add(int row, int column, double value) {
     entries_.emplace_back(std::max(row, column), std::min(row, column), value);
   }
@@ -76,17 +78,18 @@ class SparseEquations {
     const Eigen::Index size = right_.size();
     Matrix made(size, size);
     made.setFromTriplets(entries_.begin(), entries_.end());
-    analysed_ = analysed_ && has_pattern_of(made);
+    analysed_ = analysed_ && has_same_pattern(made);
     matrix_.swap(made);
     diagonal_ = matrix_.diagonal();
   }
-  /// Solves with (1 + damping) times the diagonal and a trace of its largest value; with no damping
-  /// as it is. Empty when it cannot be solved so. Every unknown must have an entry on the diagonal.
-  /// Cost: one factorisation; its order is found again only when the pattern has changed.
+  /// Solves the equations with the diagonal multiplied by 1 + damping, plus a tiny share of its
+  /// largest entry; without damping, unchanged. nullopt if the factorisation fails. Every unknown
+  /// needs a diagonal entry. Cost: one factorisation, whose ordering is computed again only if the
+  /// sparsity pattern has changed.
   [[nodiscard]] std::optional<Eigen::VectorXd> solve(double damping = 0.0) {
     if (damping > 0.0) {
-      // A share of the largest value that rounding leaves, so that free unknowns stay where they
-      // are.
+      // Share of the largest diagonal entry that is added to all, well above rounding, so that
+      // undetermined unknowns do not move.
       constexpr double trace_share = 1e-9;
       const double floor = trace_share * std::max(diagonal_.maxCoeff(), trace_share);
       for (int i = 0; i < diagonal_.size(); ++i) {
@@ -105,7 +108,7 @@ class SparseEquations {
  private:
   using Matrix = Eigen::SparseMatrix<double>;
 
-  [[nodiscard]] bool has_pattern_of(const Matrix& other) const {
+  [[nodiscard]] bool has_same_pattern(const Matrix& other) const {
     return matrix_.rows() == other.rows() && matrix_.nonZeros() == other.nonZeros() &&
            std::equal(matrix_.outerIndexPtr(), matrix_.outerIndexPtr() + matrix_.outerSize() + 1,
                       other.outerIndexPtr()) &&
@@ -121,12 +124,12 @@ class SparseEquations {
   bool analysed_ = false;
 };
 
-/// Damping of the steps of `minimise`, and when it ends.
+/// Damping and termination criteria of `minimise`.
 struct LeastSquaresOptions {
-  int max_steps = 20;         ///< >= 0
-  double damping = 0.0;       ///< of the first step, as a share of the diagonal
-  int max_attempts = 8;       ///< at one step, each with ten times the damping
-  double min_decrease = 0.0;  ///< of the cost; a step that lowers it by no more is the last
+  int max_steps = 20;                  ///< >= 0
+  double damping = 0.0;                ///< of the first step, as a share of the diagonal
+  int max_attempts = 8;                ///< per step, each with ten times the last damping
+  double min_decrease = 0.0;           ///< ends after a step that lowers the cost by at most this
   double min_relative_decrease = 0.0;  ///< the same, as a share of the cost
 };
 
@@ -137,17 +140,17 @@ struct LeastSquaresReport {
   bool solvable = true;    ///< false: the equations could not be set up or solved
 };
 
-/// Minimises a sum of weighted squares, from where `problem` stands:
+/// Minimises a sum of weighted squares, from the present estimate of `problem`, which provides:
 ///
 ///   bool linearise(Equations&)  fills the equations at the present estimate, with weights that
 ///                               stay until the next call; false ends the minimisation
 ///   move(change)                changes the estimate
 ///
-/// With `double cost()`, `undo()` and `accept()` a step counts only where it lowers the cost (as
-/// Levenberg and Marquardt do): `undo` goes back to before `move`, damping grows tenfold after each
-/// failure and falls tenfold after each success. Without them each step counts, at constant
-/// damping (Gauss-Newton), and `bool move(change)` says whether the estimate has converged.
-/// Deterministic. Throws what the problem throws.
+/// If `problem` has `double cost()`, `undo()` and `accept()`, only steps that lower the cost
+/// are accepted (Levenberg-Marquardt): `undo` restores the estimate before `move`; damping
+/// grows tenfold after each failure and falls tenfold after each success. Otherwise all
+/// steps are accepted at constant damping (Gauss-Newton), and `bool move(change)` returns
+/// true once the estimate has converged. Deterministic. Throws what the problem throws.
 template <class Problem, class Equations>
 LeastSquaresReport minimise(Problem& problem, Equations& equations,
                             const LeastSquaresOptions& options) {

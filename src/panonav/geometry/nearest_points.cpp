@@ -26,7 +26,8 @@ std::vector<std::vector<std::size_t>> nearest_points(std::span<const Point2> poi
   for (std::size_t rank = 0; rank < order.size(); ++rank) {
     const std::size_t here = order[rank];
     best.clear();
-    // False once points that way are farther along x than the farthest of the best.
+    // Inserts a point into `best` if it is near enough. False if the search in this direction can
+    // stop: the group ends, or x alone differs by more than the distance of the farthest in `best`.
     const auto insert_if_near = [&](std::size_t other) {
       if (group[other] != group[here]) return false;
       const bool full = best.size() == count;

@@ -8,8 +8,9 @@
 
 namespace panonav {
 
-/// Finds for each of `points` the `count` nearest other ones, nearest first, ties by index. Points
-/// that are not in the same `group` do not count. Cost: n sqrt(n) count for points in a square.
+/// Finds, for each point, the indices of the `count` nearest other points of the same group
+/// (`group[i]` is the group of point i), nearest first, ties by index. Cost: O(n sqrt(n) count) for
+/// n points spread over a square.
 [[nodiscard]] std::vector<std::vector<std::size_t>> nearest_points(
     std::span<const Point2> points, std::span<const std::size_t> group, std::size_t count);
 

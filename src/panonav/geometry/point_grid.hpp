@@ -9,7 +9,7 @@
 
 namespace panonav {
 
-/// Numbered points in the square cells of a grid, to find those near a position.
+/// Stores numbered points in square grid cells, for fast search near a position.
 class PointGrid {
  public:
   /// `cell_m`: side of a cell, > 0.
@@ -19,8 +19,9 @@ class PointGrid {
   void add(std::uint32_t number, Point2 position) {
     cells_[key(cell(position.x_m), cell(position.y_m))].push_back({number, position});
   }
-  /// Calls visit(number, position) for all points within a cell's side of the position, and for
-  /// others in the cells around; cell by cell, in the order in which they were added.
+  /// Calls visit(number, position) for all points in the cell of the position and in its 8
+  /// neighbours, which include all points within one cell side. Within a cell, points are visited
+  /// in the order in which they were added.
   template <class Visit>
   void visit_near(Point2 position, const Visit& visit) const {
     const std::int64_t x = cell(position.x_m);
@@ -39,7 +40,8 @@ class PointGrid {
     std::uint32_t number;
     Point2 position;
   };
-  /// Wraps far away, where two cells may share a key.
+  /// Returns the cell index of a coordinate; it wraps at 1e9 cells, so that distant cells may share
+  /// a key.
   [[nodiscard]] std::int64_t cell(double value_m) const {
     return static_cast<std::int64_t>(std::floor(std::fmod(value_m / cell_m_, 1e9)));
   }

@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// A point of the plane; the name of the variable says in which frame.
+/// A point in the plane; variable names state its frame.
 struct Point2 {
   double x_m = 0.0;  ///< forward, or along the frame's first axis
   double y_m = 0.0;  ///< left, or along its second axis
@@ -75,11 +75,11 @@ struct Direction3 {
   double y = 0.0;  ///< left
   double z = 0.0;  ///< up
 
-  /// Counter-clockwise from x, seen from above, in [-pi, pi]; 0 straight up and down.
+  /// Azimuth counter-clockwise from x, viewed from above, in [-pi, pi]; 0 for vertical directions.
   [[nodiscard]] double azimuth_rad() const { return std::atan2(y, x); }
-  /// Above the horizon, in [-pi/2, pi/2].
+  /// Elevation above the horizon, in [-pi/2, pi/2].
   [[nodiscard]] double elevation_rad() const { return std::atan2(z, std::hypot(x, y)); }
-  /// The unit direction of an azimuth and an elevation.
+  /// Makes the unit direction with this azimuth and elevation.
   [[nodiscard]] static Direction3 from_angles(double azimuth_rad, double elevation_rad) {
     return {std::cos(elevation_rad) * std::cos(azimuth_rad),
             std::cos(elevation_rad) * std::sin(azimuth_rad), std::sin(elevation_rad)};

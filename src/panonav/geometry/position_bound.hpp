@@ -5,12 +5,11 @@
 
 namespace panonav {
 
-/// Largest coordinate of a position, in metres either way: a quarter of a meridian, so that the
-/// coordinates of maps (UTM) fit, while squares and sums of them keep micrometres in a double.
-/// Chosen.
+/// Largest absolute coordinate of a position, in metres. Chosen as a quarter of a meridian: map
+/// coordinates (UTM) fit, and doubles keep micrometre accuracy in sums and squares of them.
 inline constexpr double max_position_m = 1e7;
 
-/// The same for messages.
+/// Text of this range for error messages.
 inline constexpr std::string_view position_range = "-10000000 to 10000000 m";
 
 /// True if a coordinate, in metres, is a number within `max_position_m`.

@@ -61,7 +61,7 @@ Circle make_circle_through(Point2 a, Point2 b, Point2 c) {
     best = {centre, std::max({distance(centre, a), distance(centre, b), distance(centre, c)})};
   }
   if (std::isfinite(best.radius_m)) return best;
-  // If the three are on one line, two of them span the circle.
+  // If the three points are collinear, two of them span the smallest circle.
   for (const Circle& pair :
        {make_circle_through(a, b), make_circle_through(a, c), make_circle_through(b, c)}) {
     if (is_inside(pair, a) && is_inside(pair, b) && is_inside(pair, c)) return pair;
@@ -74,7 +74,8 @@ Circle make_circle_through(Point2 a, Point2 b, Point2 c) {
 double polygon_area_m2(std::span<const Point2> corners) {
   if (corners.size() < 3) return 0.0;
   double twice = 0.0;
-  // Relative to the first corner, so that coordinates far from the origin cost no digits.
+  // Uses coordinates relative to the first corner, so that polygons far from the origin lose no
+  // precision.
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
     twice += (corners[i].x_m - corners[0].x_m) * (corners[i + 1].y_m - corners[0].y_m) -
              (corners[i + 1].x_m - corners[0].x_m) * (corners[i].y_m - corners[0].y_m);
@@ -116,7 +117,8 @@ VoronoiCells::VoronoiCells(std::span<const Point2> positions, std::optional<doub
 }
 
 void VoronoiCells::merge_positions(std::span<const Point2> positions) {
-  // Equal positions become neighbours in this order; the first of them founds the site.
+  // Sorts equal positions next to each other; the first of them in the input order defines the
+  // site.
   std::vector<std::size_t> order(positions.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -126,18 +128,18 @@ void VoronoiCells::merge_positions(std::span<const Point2> positions) {
     if (p.y_m != q.y_m) return p.y_m < q.y_m;
     return a < b;
   });
-  std::vector<std::size_t> founder(positions.size());
+  std::vector<std::size_t> first_equal(positions.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
-    founder[order[i]] = same ? founder[order[i - 1]] : order[i];
+    first_equal[order[i]] = same ? first_equal[order[i - 1]] : order[i];
   }
   site_of_.resize(positions.size());
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (founder[i] == i) {
+    if (first_equal[i] == i) {
       site_of_[i] = sites_.size();
       sites_.push_back(positions[i]);
     } else {
-      site_of_[i] = site_of_[founder[i]];
+      site_of_[i] = site_of_[first_equal[i]];
     }
   }
 }
@@ -150,15 +152,15 @@ void VoronoiCells::sort_sites() {
       low = {std::min(low.x_m, p.x_m), std::min(low.y_m, p.y_m)};
       high = {std::max(high.x_m, p.x_m), std::max(high.y_m, p.y_m)};
     }
-    sweep_x_ = high.x_m - low.x_m >= high.y_m - low.y_m;
+    sweeps_along_x_ = high.x_m - low.x_m >= high.y_m - low.y_m;
   }
-  by_sweep_.resize(sites_.size());
-  std::iota(by_sweep_.begin(), by_sweep_.end(), std::size_t{0});
-  std::sort(by_sweep_.begin(), by_sweep_.end(), [this](std::size_t a, std::size_t b) {
+  sites_by_sweep_.resize(sites_.size());
+  std::iota(sites_by_sweep_.begin(), sites_by_sweep_.end(), std::size_t{0});
+  std::sort(sites_by_sweep_.begin(), sites_by_sweep_.end(), [this](std::size_t a, std::size_t b) {
     return std::pair(sweep_coordinate(sites_[a]), a) < std::pair(sweep_coordinate(sites_[b]), b);
   });
-  rank_.resize(sites_.size());
-  for (std::size_t i = 0; i < by_sweep_.size(); ++i) rank_[by_sweep_[i]] = i;
+  sweep_rank_.resize(sites_.size());
+  for (std::size_t i = 0; i < sites_by_sweep_.size(); ++i) sweep_rank_[sites_by_sweep_[i]] = i;
 }
 
 double VoronoiCells::median_spacing_m() const {
@@ -175,16 +177,17 @@ double VoronoiCells::median_spacing_m() const {
       }
     };
     const double here = sweep_coordinate(sites_[site]);
-    std::size_t below = rank_[site];
-    std::size_t above = rank_[site] + 1;
-    // Outwards on both sides until no site there can be nearer than the second found.
-    while (below > 0 && here - sweep_coordinate(sites_[by_sweep_[below - 1]]) < nearest[1]) {
-      consider(by_sweep_[--below]);
-      if (above < sites_.size()) consider(by_sweep_[above++]);
+    std::size_t below = sweep_rank_[site];
+    std::size_t above = sweep_rank_[site] + 1;
+    // Searches outwards on both sides until no further site can be nearer than the second-nearest
+    // so far.
+    while (below > 0 && here - sweep_coordinate(sites_[sites_by_sweep_[below - 1]]) < nearest[1]) {
+      consider(sites_by_sweep_[--below]);
+      if (above < sites_.size()) consider(sites_by_sweep_[above++]);
     }
     while (above < sites_.size() &&
-           sweep_coordinate(sites_[by_sweep_[above]]) - here < nearest[1]) {
-      consider(by_sweep_[above++]);
+           sweep_coordinate(sites_[sites_by_sweep_[above]]) - here < nearest[1]) {
+      consider(sites_by_sweep_[above++]);
     }
     second[site] = std::isfinite(nearest[1]) ? nearest[1] : nearest[0];
   }
@@ -194,13 +197,13 @@ double VoronoiCells::median_spacing_m() const {
 template <class Visit>
 void VoronoiCells::visit_sites_within(std::size_t site, double radius_m, const Visit& visit) const {
   const double here = sweep_coordinate(sites_[site]);
-  for (std::size_t i = rank_[site]; i-- > 0;) {
-    if (here - sweep_coordinate(sites_[by_sweep_[i]]) > radius_m) break;
-    visit(by_sweep_[i]);
+  for (std::size_t i = sweep_rank_[site]; i-- > 0;) {
+    if (here - sweep_coordinate(sites_[sites_by_sweep_[i]]) > radius_m) break;
+    visit(sites_by_sweep_[i]);
   }
-  for (std::size_t i = rank_[site] + 1; i < by_sweep_.size(); ++i) {
-    if (sweep_coordinate(sites_[by_sweep_[i]]) - here > radius_m) break;
-    visit(by_sweep_[i]);
+  for (std::size_t i = sweep_rank_[site] + 1; i < sites_by_sweep_.size(); ++i) {
+    if (sweep_coordinate(sites_[sites_by_sweep_[i]]) - here > radius_m) break;
+    visit(sites_by_sweep_[i]);
   }
 }
 
@@ -208,7 +211,7 @@ std::vector<Point2> VoronoiCells::cell(std::size_t site) const {
   require(site < sites_.size(), "site", static_cast<double>(site),
           "0 .. " + to_text(static_cast<double>(sites_.size()) - 1.0));
   if (spacing_m_ == 0.0) return {};
-  // Sites farther than twice the half-diagonal of the square cannot cut it.
+  // Only sites within the diagonal of the clipping square can cut it.
   const double reach_m = spacing_m_ * std::sqrt(2.0);
   const Point2 here = sites_[site];
   std::vector<std::pair<double, Point2>> near;  // distance and offset of the other sites

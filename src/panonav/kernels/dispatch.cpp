@@ -11,13 +11,13 @@ namespace panonav::kernels {
 
 namespace {
 
-struct Available {
+struct AvailableSets {
   std::array<Instructions, 4> sets{Instructions::scalar};
   std::size_t count = 1;
 };
 
-Available detect() noexcept {
-  Available available;
+AvailableSets detect_instructions() noexcept {
+  AvailableSets available;
 #ifdef PANONAV_HAS_AVX2
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
     available.sets[available.count++] = Instructions::avx2;
@@ -35,7 +35,7 @@ Available detect() noexcept {
   return available;
 }
 
-Instructions choose() {
+Instructions choose_instructions() {
   const auto sets = available_instructions();
   const char* const forced = std::getenv("PANONAV_INSTRUCTIONS");
   if (forced == nullptr || *forced == '\0') return sets.back();
@@ -56,12 +56,12 @@ std::string_view name(Instructions instructions) noexcept {
 }
 
 std::span<const Instructions> available_instructions() noexcept {
-  static const Available available = detect();
+  static const AvailableSets available = detect_instructions();
   return {available.sets.data(), available.count};
 }
 
 Instructions chosen_instructions() {
-  static const Instructions chosen = choose();
+  static const Instructions chosen = choose_instructions();
   return chosen;
 }
 

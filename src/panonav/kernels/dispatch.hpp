@@ -7,15 +7,16 @@
 
 namespace panonav::kernels {
 
-/// "scalar", "avx2", "avx512" or "neon".
+/// Returns "scalar", "avx2", "avx512" or "neon".
 [[nodiscard]] std::string_view name(Instructions instructions) noexcept;
 
-/// The instruction sets that this build and this processor have, the widest last; never empty.
+/// Lists the instruction sets that both this build and this processor support, the widest last;
+/// never empty.
 [[nodiscard]] std::span<const Instructions> available_instructions() noexcept;
 
-/// The widest available set, or the one named by the environment variable PANONAV_INSTRUCTIONS.
-/// Chosen once, at the first call. Throws ContractError when the variable names a set that is
-/// unknown or not available.
+/// Returns the widest available set, or the one named by the environment variable
+/// PANONAV_INSTRUCTIONS; the choice is made once, at the first call. Throws ContractError when the
+/// variable names a set that is unknown or not available.
 [[nodiscard]] Instructions chosen_instructions();
 
 }  // namespace panonav::kernels

@@ -4,7 +4,7 @@
 
 namespace panonav::kernels {
 
-/// The bodies for one of `available_instructions()`; for any other set the scalar ones.
+/// Returns the kernels for one of `available_instructions()`; for any other set the scalar ones.
 [[nodiscard]] const DistanceKernels& distance_kernels(Instructions instructions);
 
 }  // namespace panonav::kernels

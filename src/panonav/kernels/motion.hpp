@@ -7,22 +7,21 @@
 
 namespace panonav::kernels {
 
-/// Draws two independent normal deviates of each number, of mean 0 and deviation 1, as
-/// `Random::normal_pair` makes them of one number of the generator; the last bits differ. Spans of
-/// one size; throws ContractError otherwise. All instruction sets give the same bits. Cost: 2 ns a
-/// pair with AVX-512.
+/// Converts each random 64-bit number to two independent standard normal deviates, as
+/// `Random::normal_pair` does (up to the last bits). Spans of one size; throws ContractError
+/// otherwise. All instruction sets give the same bits. Cost: 2 ns a pair with AVX-512.
 void normal_pairs(std::span<const std::uint64_t> bits, std::span<float> first,
                   std::span<float> second, Instructions instructions);
 
-/// Poses in the plane, one array for each coordinate.
+/// Poses in the plane as a structure of arrays.
 struct PoseColumns {
   /// Steps, one for each pose, in the frame of the robot before it.
   struct Steps {
     std::span<const double> forward_m,       ///< along the robot's heading
         left_m;                              ///< to the left of it
-    std::span<const double> turn_error_rad;  ///< true turn less `turn_rad`
-    double turn_rad;                  ///< what each heading turns by before its error is added
-    double turn_share_before_travel;  ///< of the error of the turn, made before the travel
+    std::span<const double> turn_error_rad;  ///< rotation minus `turn_rad`
+    double turn_rad;                         ///< rotation common to all poses
+    double turn_share_before_travel;  ///< share of `turn_error_rad` that acts before the travel
   };
 
   std::span<double> x_m,  ///< along the frame's x axis

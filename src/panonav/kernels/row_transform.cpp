@@ -15,13 +15,13 @@ RowTransform::RowTransform(int columns, int components)
   require(columns >= 4, "columns", columns, ">= 4");
   require(components >= 1 && components <= columns / 2, "components", components,
           "1 .. " + std::to_string(columns / 2) + " (half the columns)");
-  folded_ = columns % 2 == 0 ? columns / 4 + 1 : (columns + 1) / 2;
+  folded_columns_ = columns % 2 == 0 ? columns / 4 + 1 : (columns + 1) / 2;
   const int blocks = (components + row_transform_block - 1) / row_transform_block;
-  const auto size = static_cast<std::size_t>(blocks) * folded_ * row_transform_block;
+  const auto size = static_cast<std::size_t>(blocks) * folded_columns_ * row_transform_block;
   cosines_.assign(size, 0.0F);
   sines_.assign(size, 0.0F);
 
-  // All angles are multiples of one column.
+  // Tabulates one full turn, since all angles are multiples of the angle of one column.
   const double scale = 2.0 / columns;
   std::vector<float> cosine(static_cast<std::size_t>(columns));
   std::vector<float> sine(static_cast<std::size_t>(columns));
@@ -34,10 +34,11 @@ RowTransform::RowTransform(int columns, int components)
   }
   for (int k = 0; k < components; ++k) {
     const int block = k / row_transform_block;
-    for (int c = 0; c < folded_; ++c) {
+    for (int c = 0; c < folded_columns_; ++c) {
       const auto at = static_cast<std::size_t>(static_cast<long>(k) * c % columns);
-      const auto to = (static_cast<std::size_t>(block) * folded_ + c) * row_transform_block +
-                      k % row_transform_block;
+      const auto to =
+          (static_cast<std::size_t>(block) * folded_columns_ + c) * row_transform_block +
+          k % row_transform_block;
       cosines_[to] = cosine[at];
       sines_[to] = sine[at];
     }
@@ -57,10 +58,10 @@ void RowTransform::operator()(std::span<const float> values, std::span<float> re
           static_cast<double>(std::min(real.size(), imaginary.size())),
           ">= " + std::to_string(needed));
 
-  std::vector<float> scratch(row_transform_scratch(folded_));
-  const RowTransformJob job{values.data(), static_cast<int>(rows), columns_,      components_,
-                            folded_,       cosines_.data(),        sines_.data(), scratch.data(),
-                            real.data(),   imaginary.data(),       stride};
+  std::vector<float> scratch(row_transform_scratch(folded_columns_));
+  const RowTransformJob job{values.data(),   static_cast<int>(rows), columns_,      components_,
+                            folded_columns_, cosines_.data(),        sines_.data(), scratch.data(),
+                            real.data(),     imaginary.data(),       stride};
   with_body<RowTransformBody>(instructions, [&](auto body) { body.row_transform(job); });
 }
 

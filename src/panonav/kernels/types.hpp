@@ -1,7 +1,7 @@
 #pragma once
 
-// Types that callers and bodies of the kernels share. No C++ standard header here: see
-// CMakeLists.txt.
+// Types shared by the callers and the bodies of the kernels. Must not include C++ standard headers:
+// see CMakeLists.txt.
 
 #include <stddef.h>
 #include <stdint.h>
@@ -11,32 +11,32 @@ namespace panonav::kernels {
 /// Instruction sets for which kernels have bodies. `avx2` means AVX2 and FMA; `avx512` means F, BW,
 /// DQ and VL.
 enum class Instructions {
-  scalar,  ///< C++ alone, on every processor; the others give what their headers promise
+  scalar,  ///< plain C++, for every processor
   avx2,    ///< x86-64 of 2013 and later
   avx512,  ///< x86-64 servers and newer desktops
   neon     ///< ARM of 64 bit
 };
 
-/// The integer loops of the search in a visual memory, for one instruction set. All sets give the
-/// same numbers. None of them allocates or throws.
+/// Integer kernels of the search in a visual memory, for one instruction set. All sets give
+/// identical results. The kernels neither allocate nor throw.
 struct DistanceKernels {
-  /// A query as `sketch_bounds` and `sketch_bounds_at` compare it. Sketches consist of groups of 8
-  /// bytes.
+  /// Query of `sketch_bounds` and `sketch_bounds_at`. A sketch is a short description of a view, in
+  /// groups of 8 bytes.
   struct SketchQuery {
     const uint8_t* values;  ///< 8 bytes per group, 0 where the mask is 0
-    const uint8_t* mask;    ///< 8 bytes per group: 255 where a byte counts, else 0
+    const uint8_t* mask;    ///< 8 bytes per group: 255 for compared bytes, else 0
     const uint64_t* steps;  ///< one weight per group, below 2^22
-    size_t groups;          ///< compared; a multiple of 8 for `sketch_bounds_at`
-    size_t stored_groups;   ///< of each view, >= groups
+    size_t groups;          ///< compared groups; a multiple of 8 for `sketch_bounds_at`
+    size_t stored_groups;   ///< stored groups of each view, >= groups
     int32_t constant;       ///< added to every bound
-    int32_t max_slack;      ///< slacks above are taken as this
+    int32_t max_slack;      ///< upper limit of the slack used for a view
   };
 
-  /// A query as `cell_bounds` compares it. Sketches consist of codes of 4 bits, one a dimension.
+  /// Query of `cell_bounds`. A view is described by one code of 4 bits per dimension.
   struct CellQuery {
-    const uint8_t* tables;  ///< 16 bytes a dimension: what each code adds to the bound
+    const uint8_t* tables;  ///< 16 bytes per dimension: contribution of each code to the bound
     size_t pairs;           ///< half the number of dimensions
-    uint8_t limit;          ///< of the bounds that are wanted
+    uint8_t limit;          ///< largest bound of the views to report
   };
 
   /// Sum of |a - b| over `count` bytes; any count below 2^22, any alignment.
@@ -45,29 +45,31 @@ struct DistanceKernels {
   /// Sum of |(a & mask) - (b & mask)| over `count` bytes; any count below 2^22, any alignment.
   uint32_t (*masked_l1)(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);
 
-  /// For each view v of 8 * octets views: bounds[v] = max(0, constant + sum_g steps[g] *
-  /// L1(sketch of v & mask, values)[group g] - min(slacks[v], max_slack)), and the smallest of
-  /// them. The sketches of 8 views are interleaved: first group of views 0 .. 7, second group of
+  /// Computes, for each of 8 * octets views v, bounds[v] = max(0, constant + sum_g steps[g] *
+  /// L1(sketch of v & mask, values)[group g] - min(slacks[v], max_slack)); returns the smallest
+  /// bound. The sketches of 8 views are interleaved: first group of views 0 .. 7, second group of
   /// views 0 .. 7, .. The caller guarantees that each bound stays below 2^31 and octets >= 1.
   uint32_t (*sketch_bounds)(const uint8_t* sketches, const int32_t* slacks, size_t octets,
                             const SketchQuery& query, uint32_t* bounds);
 
-  /// The same for views indices[0 .. count - 1] out of sketches that lie one after the other, each
-  /// with its groups one after the other: bounds[i] belongs to view indices[i]. query.groups is a
-  /// multiple of 8. `slacks` null: query.max_slack of every view.
+  /// Computes the same for the views indices[0 .. count - 1] of sketches that are stored
+  /// consecutively, not interleaved: bounds[i] belongs to view indices[i]. query.groups is a
+  /// multiple of 8. If `slacks` is null, query.max_slack is used for every view.
   void (*sketch_bounds_at)(const uint8_t* sketches, const int32_t* slacks, const uint32_t* indices,
                            size_t count, const SketchQuery& query, uint32_t* bounds);
 
-  /// For each of 16 codes of each dimension, which stand for sums of low .. high: tables[16 * d +
-  /// code] = what lies between them and sums[d], times factors[d], rounded down, at most 255.
+  /// Computes the tables of `CellQuery`. Code c of dimension d represents sums in the interval
+  /// low[16 * d + c] .. high[16 * d + c]; tables[16 * d + c] = distance of sums[d] from this
+  /// interval, times factors[d], rounded down, at most 255.
   void (*cell_tables)(const int32_t* low, const int32_t* high, const int32_t* sums,
                       const float* factors, size_t dimensions, uint8_t* tables);
 
-  /// For each view v of `blocks` blocks of `cell_block` views: bounds[v] = the sum over its codes
-  /// of tables[16 * d + code], at most 255. Writes the positions of those <= query.limit,
-  /// ascending, to `indices`, which has room for all, and returns their number. A block consists of
-  /// `pairs` rows of `cell_block` bytes; byte v of each is of view v: the code of an even dimension
-  /// in its lower four bits, that of the next one in the upper four.
+  /// Computes, for each view v of `blocks` blocks of `cell_block` views, bounds[v] = sum over its
+  /// dimensions d of tables[16 * d + code], at most 255. Writes the indices of the views with
+  /// bounds <= query.limit, ascending, to `indices`, which has room for all views, and returns
+  /// their number. A block consists of `pairs` rows of `cell_block` bytes. Byte v of each row
+  /// belongs to view v: its lower four bits are the code of an even dimension, its upper four bits
+  /// that of the next dimension.
   size_t (*cell_bounds)(const uint8_t* codes, size_t blocks, const CellQuery& query,
                         uint8_t* bounds, uint32_t* indices);
 
@@ -77,22 +79,22 @@ struct DistanceKernels {
                             uint32_t* indices);
 };
 
-/// Views that `cell_bounds` compares together.
+/// Number of views in a block of `cell_bounds`.
 inline constexpr size_t cell_block = 64;
 
-/// Sizes that `match_columns` compares: columns of the query.
+/// Number of columns of the query of `match_columns`.
 inline constexpr int matched_query_columns = 32;
-/// Columns of the reference; also the number of turns.
+/// Number of columns of the reference; also the number of rotations.
 inline constexpr int matched_reference_columns = 128;
 inline constexpr int matched_bands = 16;  ///< Bytes of a column: bands of elevation.
 
-/// Descriptors of 256 bits that `nearest_descriptors` takes of a view.
+/// Largest number of descriptors (of 256 bits) per view in `nearest_descriptors`.
 inline constexpr int max_descriptors = 256;
 
-/// Bearings of features that two views share, an array for each number. Tangents are those of the
-/// elevations; `sine` and `cosine` belong to the azimuth in the query minus that in the reference.
+/// Bearings of matched features of two views, as a structure of arrays. Tangents belong to the
+/// elevations; `sine` and `cosine` to the azimuth in the query minus that in the reference.
 struct MatchedBearings {
-  /// A turn between two views, and its half.
+  /// Sine and cosine of a rotation between two views, and of half of it.
   struct Turn {
     float sine,       ///< of the turn
         cosine,       ///< of the turn
@@ -111,7 +113,7 @@ struct MatchedBearings {
   size_t count;                 ///< matched pairs: values in each array
 };
 
-/// Directions of motion of which the opposite ones are tried as well.
+/// Number of axes of motion, each tested in both directions.
 inline constexpr int motion_axes = 16;
 /// Candidate axes of motion, and the condition under which one explains a matched bearing.
 struct MotionHypotheses {
@@ -119,30 +121,30 @@ struct MotionHypotheses {
       sine[motion_axes];      ///< of each axis, along y
   float tolerance_sine,       ///< of the largest error of a bearing, below a right angle
       tolerance_cosine,       ///< of the same
-      max_ratio;              ///< largest distance of the views over that of a landmark
+      max_ratio;              ///< largest ratio of view distance to landmark distance
 };
 
-/// References around a place that the kernel compares at a time; unused lanes have similarity 0.
+/// Number of references around a place; unused lanes have similarity 0.
 inline constexpr int similarity_lanes = 12;
 
-/// Reference views around a place and their similarity to a view, side by side. A lane without a
-/// reference has similarity 0, the logarithm of which is minus infinity, and lies far away.
+/// Reference views around a place and their similarities to a view, one per lane. An unused lane
+/// has similarity 0 (logarithm minus infinity) and a distant position.
 struct SimilarityLanes {
-  /// Fall of similarity with distance: exp(-sqrt(distance^2 + blur) * per_metre).
+  /// Decrease of similarity with distance: exp(-sqrt(distance^2 + blur_square_m2) * per_metre).
   struct Fall {
-    float per_metre;  ///< above 0, the fall of the logarithm for each metre
-    /// Added to the square of each distance, so that similarity falls little near a reference.
+    float per_metre;  ///< > 0, decrease of the logarithm per metre
+    /// Added to the square of each distance, which makes the decrease flat near a reference.
     float blur_square_m2;
   };
 
   float x_m[similarity_lanes];                   ///< position of each reference
   float y_m[similarity_lanes];                   ///< the same, along y
   float log_similarity[similarity_lanes];        ///< to the view
-  float heading_rad[similarity_lanes];           ///< of the view, as the reference implies it
-  float other_log_similarity[similarity_lanes];  ///< at the other heading that fits
-  /// The heading at which `other_log_similarity` holds.
+  float heading_rad[similarity_lanes];           ///< heading of the view implied by the reference
+  float other_log_similarity[similarity_lanes];  ///< to the view, at the second-best heading
+  /// Second-best heading of the view, to which `other_log_similarity` belongs.
   float other_heading_rad[similarity_lanes];
-  float per_square_turn[similarity_lanes];  ///< <= 0; 0: the heading does not count
+  float per_square_turn[similarity_lanes];  ///< <= 0; 0 ignores the heading
 };
 
 }  // namespace panonav::kernels

@@ -57,7 +57,7 @@ constexpr double decile_deviations = 1.2816;
 // columns fit best.
 double better_half_difference(const ColumnProfiles& query, const ColumnProfiles& reference,
                               double heading_rad) {
-  auto columns = column_distances_near(query, reference, heading_rad);
+  auto columns = column_distances_at_heading(query, reference, heading_rad);
   const auto half = columns.begin() + columns.size() / 2;
   std::ranges::nth_element(columns, half);
   return std::accumulate(columns.begin(), half, 0.0,

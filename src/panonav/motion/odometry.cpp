@@ -37,7 +37,7 @@ StepSampler::StepSampler(const Pose2& step, const OdometryNoise& noise)
   };
   translation_deviation_m_ =
       deviation(noise.translation_from_translation, noise.translation_from_rotation);
-  // A heading is unknown long before this.
+  // Upper bound against overflow; a heading is completely unknown at far smaller values.
   constexpr double max_deviation_rad = 1000.0;
   rotation_deviation_rad_ = std::min(
       max_deviation_rad, deviation(noise.rotation_from_translation, noise.rotation_from_rotation));

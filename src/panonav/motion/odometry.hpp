@@ -12,20 +12,19 @@ namespace panonav {
 /// An odometry step is `robot_old_from_robot_new`: the pose of the robot after the step in the
 /// frame of the robot before it. It does not depend on any world frame.
 
-/// Drive of a robot, which decides the errors that its odometry can make.
+/// Kind of drive, which determines the shape of odometry errors.
 enum class DriveKind {
   differential,  ///< cannot move sideways: travel errors lie along the heading at the middle of the
                  ///< step
   holonomic,     ///< moves in every direction: travel errors are equal in x and y
 };
 
-/// Error of odometry. The random part is a random walk: its variance grows with the distance and
-/// the turn, not with the number of steps, so a path cut into more steps is not less certain. The
-/// systematic part is a wrong scale (wheel radius, wheel base) that stays the same during a run.
-/// The defaults are the order of size of small wheeled robots on flat floors without slip; measure
-/// your own.
+/// Error model of odometry. The random part is a random walk: its variance grows with distance and
+/// rotation, so the uncertainty of a path does not depend on the number of steps. The systematic
+/// part is a scale error (wheel radius, wheel base) that is constant during a run. The defaults are
+/// typical of small wheeled robots on flat floors without slip; measure your robot's values.
 struct OdometryNoise {
-  /// Kind of errors: those of wheels, or of a platform that moves sideways.
+  /// Drive of the robot: wheels, or a platform that can move sideways.
   DriveKind drive = DriveKind::differential;
   /// Standard deviation of travel after 1 m (m); of each of x and y for a holonomic robot.
   double translation_from_translation = 0.03;
@@ -42,9 +41,10 @@ struct OdometryNoise {
 };
 void visit_options(OdometryNoise& options, OptionVisitor& visitor);
 
-/// Samples the true motion when odometry reports `step`, or the reported one when `step` is true
-/// (the random part only, with zero mean in travel and turn). Differential drive: the chord of the
-/// step keeps its angle to the heading at the middle of the step, as wheels without slip demand.
+/// Samples noisy versions of an odometry step: true motions for a reported step, or reported steps
+/// for a true motion. Only the random, zero-mean errors of travel and rotation are added.
+/// Differential drive: the direction of travel stays fixed relative to the heading at the middle of
+/// the step, as for wheels without slip.
 class StepSampler {
  public:
   /// `noise` must be valid.
@@ -57,15 +57,15 @@ class StepSampler {
 
   /// The step with its heading in [-pi, pi).
   [[nodiscard]] const Pose2& step() const noexcept { return step_; }
-  /// True if its travel errors are equal in x and y.
+  /// True for a holonomic drive, whose travel errors are equal in x and y.
   [[nodiscard]] bool is_holonomic() const noexcept { return is_holonomic_; }
   /// Standard deviation of its travel (m); of each of x and y for a holonomic drive.
   [[nodiscard]] double translation_deviation_m() const noexcept { return translation_deviation_m_; }
   /// Standard deviation of its turn (rad).
   [[nodiscard]] double rotation_deviation_rad() const noexcept { return rotation_deviation_rad_; }
-  /// Scales normal deviates of mean 0 and deviation 1 (the third for a holonomic drive only) to
-  /// errors of travel and turn, in the frame of the robot before the step, which the error of the
-  /// turn rotates first by `turn_share_before_travel` of itself.
+  /// Converts standard normal deviates (`third` is used only for a holonomic drive) to errors of
+  /// travel and rotation in the frame of the robot before the step. The caller must first rotate
+  /// this frame by `turn_share_before_travel` times the error of the rotation.
   [[nodiscard]] Pose2 error_from_deviates(double first, double second,
                                           double third) const noexcept {
     if (is_holonomic_) {
@@ -75,8 +75,8 @@ class StepSampler {
     const double travel_m = first * translation_deviation_m_;
     return {travel_m * cos_middle_, travel_m * sin_middle_, second * rotation_deviation_rad_};
   }
-  /// Share of the turn's error before the travel: 0 for a holonomic drive, 1/2 for wheels, whose
-  /// travel points along the middle of the turn.
+  /// Share of the rotation's error that acts before the travel: 0 for a holonomic drive, 1/2 for
+  /// wheels, which travel in the direction at the middle of the rotation.
   [[nodiscard]] double turn_share_before_travel() const noexcept {
     return is_holonomic_ ? 0.0 : 0.5;
   }

@@ -36,7 +36,7 @@ std::vector<Pose2> estimate_headings(std::span<const Point2> positions, double w
       low = low > 0 ? low - 1 : low;
       high = high + 1 < positions.size() ? high + 1 : high;
     }
-    // Least squares of the position over the distance: the slopes of x and y are the direction.
+    // Regression of x and y on the path length; their slopes are the direction of motion.
     double n = 0.0;
     double s = 0.0;
     double x = 0.0;

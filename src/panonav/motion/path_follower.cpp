@@ -28,65 +28,71 @@ PathFollower::PathFollower(std::span<const Point2> path, const PathFollowerOptio
   if (path.size() < 2) {
     throw ContractError("places of the path", static_cast<double>(path.size()), "2 or more");
   }
-  length_to_m_.push_back(0.0);
+  path_length_to_point_m_.push_back(0.0);
   for (std::size_t i = 0; i < path.size(); ++i) {
     if (!std::isfinite(path[i].x_m) || !std::isfinite(path[i].y_m)) {
       throw ContractError("place of the path", "not finite", "finite numbers");
     }
-    if (i > 0) length_to_m_.push_back(length_to_m_.back() + distance(path[i - 1], path[i]));
+    if (i > 0)
+      path_length_to_point_m_.push_back(path_length_to_point_m_.back() +
+                                        distance(path[i - 1], path[i]));
   }
 }
 
 Point2 PathFollower::position_at(double along_m) const {
-  const auto after = std::ranges::upper_bound(length_to_m_, along_m);
-  if (after == length_to_m_.end()) return path_.back();
-  const auto i = static_cast<std::size_t>(after - length_to_m_.begin());
+  const auto after = std::ranges::upper_bound(path_length_to_point_m_, along_m);
+  if (after == path_length_to_point_m_.end()) return path_.back();
+  const auto i = static_cast<std::size_t>(after - path_length_to_point_m_.begin());
   if (i == 0) return path_.front();
-  const double share = (along_m - length_to_m_[i - 1]) / (length_to_m_[i] - length_to_m_[i - 1]);
+  const double share = (along_m - path_length_to_point_m_[i - 1]) /
+                       (path_length_to_point_m_[i] - path_length_to_point_m_[i - 1]);
   return {path_[i - 1].x_m + share * (path_[i].x_m - path_[i - 1].x_m),
           path_[i - 1].y_m + share * (path_[i].y_m - path_[i - 1].y_m)};
 }
 
-// Moves to the nearest point of the path, from the last one on and not farther than the robot can
-// have driven, even if it has cut a corner.
+// Moves the position on the path to the nearest point within twice the look-ahead distance after
+// the last position: farther than the robot can have driven, even if it cut a corner.
 void PathFollower::advance_to_nearest(Point2 robot) {
   const double max_m = along_m_ + 2.0 * options_.look_ahead_m;
   double min_distance_m = std::numeric_limits<double>::infinity();
   double best_m = along_m_;
-  const auto first = std::ranges::upper_bound(length_to_m_, along_m_);
-  auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(1, first - length_to_m_.begin()));
-  for (; i < path_.size() && length_to_m_[i - 1] <= max_m; ++i) {
+  const auto first = std::ranges::upper_bound(path_length_to_point_m_, along_m_);
+  auto i = static_cast<std::size_t>(
+      std::max<std::ptrdiff_t>(1, first - path_length_to_point_m_.begin()));
+  for (; i < path_.size() && path_length_to_point_m_[i - 1] <= max_m; ++i) {
     const double ex = path_[i].x_m - path_[i - 1].x_m;
     const double ey = path_[i].y_m - path_[i - 1].y_m;
-    const double length = length_to_m_[i] - length_to_m_[i - 1];
+    const double length = path_length_to_point_m_[i] - path_length_to_point_m_[i - 1];
     if (!(length > 0.0)) continue;
-    const double foot =
+    const double projection_m =
         ((robot.x_m - path_[i - 1].x_m) * ex + (robot.y_m - path_[i - 1].y_m) * ey) / length;
-    const double there_m =
-        std::clamp(length_to_m_[i - 1] + std::clamp(foot, 0.0, length), along_m_, max_m);
-    const double distance_m = distance(position_at(there_m), robot);
+    const double candidate_m = std::clamp(
+        path_length_to_point_m_[i - 1] + std::clamp(projection_m, 0.0, length), along_m_, max_m);
+    const double distance_m = distance(position_at(candidate_m), robot);
     if (distance_m < min_distance_m) {
       min_distance_m = distance_m;
-      best_m = there_m;
+      best_m = candidate_m;
     }
   }
   along_m_ = best_m;
 }
 
-// Finds the point as far ahead as the path stays near the straight line there.
+// Finds the farthest point, within the look-ahead, to which the straight line stays within
+// `max_cut_m` of the path.
 Point2 PathFollower::find_target() const {
   const Point2 here = position();
-  // Nearer, the robot would turn for every error of its position.
+  // Smallest distance of the target: with a nearer one, small position errors would cause large
+  // rotations.
   double ahead_m = along_m_ + options_.look_ahead_m / 3.0;
   const double max_m = along_m_ + options_.look_ahead_m;
-  const auto is_cut_too_wide = [&](Point2 there) {
-    const double ex = there.x_m - here.x_m;
-    const double ey = there.y_m - here.y_m;
+  const auto is_cut_too_wide = [&](Point2 target) {
+    const double ex = target.x_m - here.x_m;
+    const double ey = target.y_m - here.y_m;
     const double length = std::hypot(ex, ey);
     if (!(length > 0.0)) return true;
-    const auto first = std::ranges::upper_bound(length_to_m_, along_m_);
-    for (auto i = static_cast<std::size_t>(first - length_to_m_.begin());
-         i < path_.size() && length_to_m_[i] < ahead_m; ++i) {
+    const auto first = std::ranges::upper_bound(path_length_to_point_m_, along_m_);
+    for (auto i = static_cast<std::size_t>(first - path_length_to_point_m_.begin());
+         i < path_.size() && path_length_to_point_m_[i] < ahead_m; ++i) {
       const double off = (path_[i].x_m - here.x_m) * ey - (path_[i].y_m - here.y_m) * ex;
       if (std::abs(off) > options_.max_cut_m * length) return true;
     }
@@ -94,19 +100,20 @@ Point2 PathFollower::find_target() const {
   };
   constexpr int steps = 8;
   const double step_m = (max_m - ahead_m) / steps;
-  Point2 there = position_at(ahead_m);
+  Point2 target = position_at(ahead_m);
   for (int i = 0; i < steps; ++i) {
     ahead_m += step_m;
     const Point2 farther = position_at(ahead_m);
     if (is_cut_too_wide(farther)) break;
-    there = farther;
+    target = farther;
   }
-  return there;
+  return target;
 }
 
 std::optional<Point2> PathFollower::next_target(Point2 robot) {
   advance_to_nearest(robot);
-  // A robot beside the end has arrived, too.
+  // A robot within `arrived_m` of the end has also arrived if its position on the path is almost at
+  // the end.
   const double left_m = length_m() - along_m_;
   const bool near = distance(robot, path_.back()) <= options_.arrived_m;
   if (left_m <= 1e-9 || (near && left_m <= options_.look_ahead_m)) return std::nullopt;

@@ -11,7 +11,7 @@ namespace panonav {
 
 namespace {
 
-void check(const StampedPose& pose, const StampedPose* before, std::size_t number) {
+void validate_pose(const StampedPose& pose, const StampedPose* before, std::size_t number) {
   const std::string name = "pose " + std::to_string(number) + " of a trajectory: ";
   const auto finite = [&name](const char* field, double value) {
     require(std::isfinite(value), name + field, value, "a finite number");
@@ -35,12 +35,12 @@ Pose2 interpolate(const Pose2& a, const Pose2& b, double fraction) {
 
 Trajectory::Trajectory(std::vector<StampedPose> poses) : poses_(std::move(poses)) {
   for (std::size_t i = 0; i < poses_.size(); ++i) {
-    check(poses_[i], i == 0 ? nullptr : &poses_[i - 1], i);
+    validate_pose(poses_[i], i == 0 ? nullptr : &poses_[i - 1], i);
   }
 }
 
 void Trajectory::append(const StampedPose& pose) {
-  check(pose, poses_.empty() ? nullptr : &poses_.back(), poses_.size());
+  validate_pose(pose, poses_.empty() ? nullptr : &poses_.back(), poses_.size());
   poses_.push_back(pose);
 }
 

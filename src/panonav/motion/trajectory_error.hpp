@@ -11,20 +11,20 @@ namespace panonav {
 
 /// Errors of an estimated trajectory (Sturm et al. 2012).
 struct TrajectoryError {
-  /// Rules by which an estimate is compared with the truth.
+  /// Options for comparing an estimate with the true trajectory.
   struct Options {
-    /// The truth is interpolated to the stamps of the estimate; estimates in a gap of the truth
-    /// longer than this are left out.
+    /// Longest gap in the true trajectory that is interpolated; estimates in longer gaps are left
+    /// out.
     double max_gap_s = 1.0;
-    /// Distance along the true path between the poses of a relative error.
+    /// Distance along the true path over which relative errors are computed.
     double relative_distance_m = 1.0;
     bool align = true;              ///< false: both are in one frame already
-    bool align_scale = false;       ///< with `align`: the estimate's unit of length is free
-    bool align_reflection = false;  ///< with `align`: maps whose handedness nobody fixed
+    bool align_scale = false;       ///< with `align`: also fit the scale
+    bool align_reflection = false;  ///< with `align`: allow a mirror image
     friend bool operator==(const Options&, const Options&) = default;
   };
 
-  /// Statistics of errors that are not negative.
+  /// Summary statistics of absolute errors.
   struct Summary {
     double rms = 0.0;      ///< root mean square
     double mean = 0.0;     ///< arithmetic mean
@@ -34,8 +34,9 @@ struct TrajectoryError {
   };
 
   std::size_t pairs = 0;     ///< estimates with a true pose at their stamp
-  std::size_t left_out = 0;  ///< estimates without one
-  /// Identity without `align`; its `rms_m` is that of `position_m`.
+  std::size_t left_out = 0;  ///< estimates without a true pose
+  /// Alignment applied to the estimate; the identity without `align`. `rms_m` equals
+  /// `position_m.rms`.
   Alignment ground_truth_from_estimate;
   Summary position_m;   ///< absolute error of position, after alignment
   Summary heading_rad;  ///< absolute error of heading, after alignment; a reflected alignment
@@ -48,8 +49,9 @@ struct TrajectoryError {
 
 void visit_options(TrajectoryError::Options& options, OptionVisitor& visitor);
 
-/// Associates by stamp, aligns by least squares over the positions, and compares; nullopt when
-/// fewer than two estimates have a true pose at their stamp. Throws OptionError.
+/// Computes the errors of `estimate`: interpolates the truth at its stamps, aligns the positions by
+/// least squares, and compares poses. nullopt if fewer than two estimates have a true pose. Throws
+/// OptionError.
 [[nodiscard]] std::optional<TrajectoryError> trajectory_error(
     const Trajectory& estimate, const Trajectory& truth,
     const TrajectoryError::Options& options = {});

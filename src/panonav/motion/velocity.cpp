@@ -37,8 +37,8 @@ Velocity compute_command_towards(double direction_rad, double distance_m,
   const double angle = wrap_angle(direction_rad);
   const double turn = std::clamp(angle / options.period_s, -options.turn_rad_s, options.turn_rad_s);
   if (std::abs(angle) > options.on_spot_rad) return {0.0, 0.0, turn};
-  // Limits the speed to what the rotation allows: the arc to the point has the curvature 2
-  // sin(angle) / d.
+  // Limits the speed so that the largest rotation speed suffices for the arc to the point, whose
+  // curvature is 2 sin(angle) / distance.
   const double arc =
       0.5 * options.turn_rad_s * distance_m / std::max(std::abs(std::sin(angle)), 1e-9);
   const double forward = std::min(speed * std::cos(angle), arc);
@@ -51,7 +51,8 @@ Pose2 integrate_velocity(const Velocity& velocity, double duration_s) {
   const double turn = velocity.turn_rad_s * duration_s;
   const double x = velocity.forward_m_s * duration_s;
   const double y = velocity.left_m_s * duration_s;
-  // sin(t) / t and (1 - cos(t)) / t, by their series where the quotients lose their digits.
+  // sin(t) / t and (1 - cos(t)) / t; for small t by their series, because the quotients lose
+  // precision.
   const bool small = std::abs(turn) < 1e-6;
   const double along = small ? 1.0 : std::sin(turn) / turn;
   const double across = small ? 0.5 * turn : (1.0 - std::cos(turn)) / turn;

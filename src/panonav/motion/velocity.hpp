@@ -14,8 +14,8 @@ struct Velocity {
   friend bool operator==(const Velocity&, const Velocity&) = default;
 };
 
-/// The interface to a robot that moves, real or simulated. A command holds until the next one; a
-/// base should stop by itself when none comes for a while.
+/// Interface to the drive of a robot, real or simulated. A command is valid until the next one; a
+/// base should stop by itself if commands stop coming.
 class RobotBase {
  public:
   virtual ~RobotBase() = default;
@@ -25,7 +25,7 @@ class RobotBase {
 
 /// Limits of a base, and the period of its commands.
 struct BaseOptions {
-  DriveKind drive = DriveKind::differential;  ///< wheels, or a platform that moves sideways
+  DriveKind drive = DriveKind::differential;  ///< wheels, or a platform that can move sideways
   double speed_m_s = 0.3;                     ///< highest, > 0
   double turn_rad_s = 1.0;                    ///< highest, > 0
   double period_s = 0.1;                      ///< time for which a command holds, > 0
@@ -34,15 +34,15 @@ struct BaseOptions {
 void visit_options(BaseOptions& options, OptionVisitor& visitor);
 
 /// Computes the command for the next period towards a point at `direction_rad` and `distance_m` in
-/// the current robot frame. It never drives past the point. A holonomic robot keeps its heading; a
-/// differential drive turns towards the point, on the spot first, and slows down with the cosine of
-/// the remaining angle. At distance 0 the robot stands. Throws ContractError on numbers that are
-/// not finite or a distance below 0, OptionError.
+/// the current robot frame. The command never drives past the point. A holonomic robot keeps its
+/// heading; a differential drive rotates towards the point, on the spot if the angle exceeds
+/// `on_spot_rad`, and reduces its speed with the cosine of the angle. At distance 0 the velocity is
+/// 0. Throws ContractError on numbers that are not finite or a distance below 0, OptionError.
 [[nodiscard]] Velocity compute_command_towards(double direction_rad, double distance_m,
                                                const BaseOptions& options);
 
-/// Returns robot_old_from_robot_new after driving at this velocity for a time >= 0: an arc, or a
-/// straight line.
+/// Returns the motion `robot_old_from_robot_new` of driving at this velocity for `duration_s` >= 0:
+/// an arc, or a straight line.
 [[nodiscard]] Pose2 integrate_velocity(const Velocity& velocity, double duration_s);
 
 }  // namespace panonav

@@ -9,8 +9,9 @@ namespace panonav {
 
 namespace {
 
-// Between two seen columns, `from` and the next one round the cylinder.
-void fill_gap(std::span<float> row, int from, int length) {
+// Interpolates linearly between the visible columns `from` and `from + length`, across the seam of
+// the cylinder.
+void interpolate_gap(std::span<float> row, int from, int length) {
   const int columns = static_cast<int>(row.size());
   const float first = row[from];
   const float last = row[static_cast<std::size_t>((from + length) % columns)];
@@ -20,19 +21,20 @@ void fill_gap(std::span<float> row, int from, int length) {
   }
 }
 
-void fill_row(std::span<float> row, std::span<const std::uint8_t> hidden, float mean_of_all) {
+void fill_hidden_in_row(std::span<float> row, std::span<const std::uint8_t> hidden,
+                        float mean_value) {
   const int columns = static_cast<int>(row.size());
   const auto seen = std::ranges::find(hidden, std::uint8_t{0});
   if (seen == hidden.end()) {
-    std::ranges::fill(row, mean_of_all);
+    std::ranges::fill(row, mean_value);
     return;
   }
-  const int first_seen = static_cast<int>(seen - hidden.begin());
-  int from = first_seen;
+  const int first_visible = static_cast<int>(seen - hidden.begin());
+  int from = first_visible;
   for (int i = 1; i <= columns; ++i) {
-    if (hidden[static_cast<std::size_t>((first_seen + i) % columns)] != 0) continue;
-    fill_gap(row, from, first_seen + i - from);
-    from = first_seen + i;
+    if (hidden[static_cast<std::size_t>((first_visible + i) % columns)] != 0) continue;
+    interpolate_gap(row, from, first_visible + i - from);
+    from = first_visible + i;
   }
 }
 
@@ -46,15 +48,17 @@ std::vector<std::uint8_t> find_hidden_values(ImageView mask, const Unwarper& unw
       seen.at(u, v) = mask.data[v * mask.stride + u] == 0 ? 0 : 255;
     }
   }
-  const Panorama share_seen = unwarper.unwrap(seen.view());
+  const Panorama visible_share = unwarper.unwrap(seen.view());
   std::vector<std::uint8_t> hidden;
-  hidden.reserve(share_seen.values().size());
-  // Two lenses are made equally bright: what all pixels give is 1 for the darker one only.
+  hidden.reserve(visible_share.values().size());
+  // The unwarper scales the brighter of two lenses down to the darker one, so a white image does
+  // not become 1 everywhere; compare with its values.
   std::ranges::fill(seen.pixels(), std::uint8_t{255});
   const Panorama all = unwarper.unwrap(seen.view());
-  // A thousandth is less than half a grey level of the picture.
+  // A value is hidden if masked pixels have more than 0.1 % of its weight, less than half a grey
+  // level.
   for (std::size_t i = 0; i < all.values().size(); ++i) {
-    hidden.push_back(share_seen.values()[i] < 0.999F * all.values()[i] ? 1 : 0);
+    hidden.push_back(visible_share.values()[i] < 0.999F * all.values()[i] ? 1 : 0);
   }
   if (std::ranges::count(hidden, std::uint8_t{0}) == 0) {
     throw ContractError("mask", "hides everything", "something is seen");
@@ -77,7 +81,7 @@ void fill_hidden_values(Panorama& panorama, std::span<const std::uint8_t> hidden
   const auto mean = static_cast<float>(sum / static_cast<double>(seen));
   const auto columns = static_cast<std::size_t>(panorama.columns());
   for (std::size_t at = 0; at < values.size(); at += columns) {
-    fill_row(values.subspan(at, columns), hidden.subspan(at, columns), mean);
+    fill_hidden_in_row(values.subspan(at, columns), hidden.subspan(at, columns), mean);
   }
 }
 

@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-std::size_t checked_size(int rows, int columns) {
+std::size_t validated_size(int rows, int columns) {
   require(rows >= 1, "panorama rows", rows, ">= 1");
   require(columns >= 4, "panorama columns", columns, ">= 4");
   return static_cast<std::size_t>(rows) * columns;
@@ -22,12 +22,12 @@ std::size_t checked_size(int rows, int columns) {
 }  // namespace
 
 Panorama::Panorama(int rows, int columns, std::optional<ElevationBand> elevations)
-    : Panorama(rows, columns, elevations, std::vector<float>(checked_size(rows, columns))) {}
+    : Panorama(rows, columns, elevations, std::vector<float>(validated_size(rows, columns))) {}
 
 Panorama::Panorama(int rows, int columns, std::optional<ElevationBand> elevations,
                    std::vector<float> values)
     : rows_(rows), columns_(columns), elevations_(elevations), values_(std::move(values)) {
-  const std::size_t size = checked_size(rows, columns);
+  const std::size_t size = validated_size(rows, columns);
   require(values_.size() == size, "number of panorama values", static_cast<double>(values_.size()),
           to_text(static_cast<double>(size)));
   if (elevations_) {
@@ -37,7 +37,8 @@ Panorama::Panorama(int rows, int columns, std::optional<ElevationBand> elevation
     require(elevations_->top_rad <= zenith, "elevations top_rad", elevations_->top_rad,
             "above bottom_rad .. pi/2");
   }
-  // 0 times anything finite is 0, and anything else makes the sum NaN: quicker than asking each.
+  // 0 times a finite value is 0, and an infinite or NaN value makes the sum NaN: one vectorised
+  // loop instead of a test per value.
   float sum = 0.0F;
   for (const float value : values_) sum += value * 0.0F;
   require(sum == 0.0F, "panorama value", static_cast<double>(sum), "finite");

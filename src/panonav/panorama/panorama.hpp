@@ -22,11 +22,12 @@ class Panorama {
   Panorama(int rows, int columns, std::optional<ElevationBand> elevations,
            std::vector<float> values);
 
-  /// Values of a column, from the highest elevation to the lowest.
+  /// Number of rows: values of a column, from the highest elevation to the lowest.
   [[nodiscard]] int rows() const noexcept { return rows_; }
-  /// Values of a row: azimuths of a full turn.
+  /// Number of columns: values of a row, which cover a full turn in azimuth.
   [[nodiscard]] int columns() const noexcept { return columns_; }
-  /// Empty: unknown, every row is then treated as on the horizon.
+  /// Elevations of the lower and upper edge; nullopt if unknown: every row is then treated as if it
+  /// were on the horizon.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
     return elevations_;
   }
@@ -62,20 +63,20 @@ class Panorama {
   std::vector<float> values_;
 };
 
-/// Rotates the view as if the robot had turned by `columns_turned` columns counter-clockwise:
+/// Returns the view after the robot has rotated counter-clockwise by `columns_turned` columns:
 /// I'(phi) = I(phi + delta), so column c of the result is column c + columns_turned.
 [[nodiscard]] Panorama rotate_columns(const Panorama& panorama, int columns_turned);
 /// Mirrors the view, left to right: column c goes to -c.
 [[nodiscard]] Panorama mirror(const Panorama& panorama);
 
-/// Makes a picture for people: clockwise, forward in the middle, 0..1 as 0..255 (clamped). No
-/// column is mixed with another: column 0 becomes the picture's column columns / 2, so that reading
-/// the picture back with `picture_forward_column` gives the same panorama but for the rounding to 8
-/// bit.
+/// Converts to an image for display: columns run clockwise, forward is in the middle, and 0..1
+/// becomes 0..255 (clamped). Columns are reordered without interpolation: column 0 becomes column
+/// columns / 2 of the image, so reading the image with `picture_forward_column` restores the
+/// panorama up to rounding to 8 bit.
 [[nodiscard]] Image to_picture(const Panorama& panorama);
 
-/// Position of the forward direction in `to_picture`: a fraction of the width, between its outer
-/// edges.
+/// Returns the position of the forward direction in the image of `to_picture`, as a fraction of its
+/// width from the left edge.
 [[nodiscard]] double picture_forward_column(int columns) noexcept;
 
 }  // namespace panonav

@@ -20,17 +20,17 @@ double cubic_kernel(double x) {
   return 0.0;
 }
 
-/// One new sample as a weighted sum of old ones, which follow each other from `first`.
+/// A new sample as the weighted sum of consecutive old samples, from index `first`.
 struct Sample {
   int first = 0;
   std::vector<float> weights;
 };
 
-/// `position`: where the new sample lies, in old samples (the centre of old sample i is i). `step`:
-/// distance of new samples, in old ones.
+/// Computes the weights of one new sample. `position`: its centre in units of old samples (old
+/// sample i is at i). `step`: spacing of the new samples, in old ones.
 Sample make_sample(double position, double step) {
   const double width = std::max(1.0, step);
-  // Positions are computed from angles; a rounding error must not keep a copy from being exact.
+  // Removes the rounding error of positions computed from angles, so that copies are exact.
   const double nearest = std::round(position);
   if (std::abs(position - nearest) < 1e-9) position = nearest;
   Sample sample;
@@ -68,33 +68,35 @@ void validate_layout(const PictureLayout& layout) {
   }
 }
 
-// Samples the rows between two heights, fractions of the picture's from its top, at `shape`. Rows
-// come first: it leaves fewer of them. Weights that fall outside the picture count for its edge.
+// Resamples the picture to `shape`, from height `top` (fraction from the upper edge) in steps of
+// `row_step` old rows. Each row is interpolated vertically before its columns. Rows beyond the
+// picture repeat its edge.
 std::vector<float> sample_grey(ImageView picture, const PictureLayout& layout, double top,
                                double row_step, PanoramaShape shape) {
   const double column_step = static_cast<double>(picture.width) / shape.columns;
   const double sign = layout.direction == ColumnDirection::clockwise ? -1.0 : 1.0;
-  std::vector<Sample> across;
+  std::vector<Sample> column_samples;
   for (int c = 0; c < shape.columns; ++c) {
     Sample sample = make_sample(
         layout.forward_column * picture.width + sign * c * column_step - 0.5, column_step);
     sample.first = (sample.first % picture.width + picture.width) % picture.width;
-    across.push_back(std::move(sample));
+    column_samples.push_back(std::move(sample));
   }
   std::vector<float> values(static_cast<std::size_t>(shape.rows) * shape.columns);
   std::vector<float> line(static_cast<std::size_t>(picture.width));
   for (int y = 0; y < shape.rows; ++y) {
-    const Sample down = make_sample(top * picture.height + (y + 0.5) * row_step - 0.5, row_step);
+    const Sample row_sample =
+        make_sample(top * picture.height + (y + 0.5) * row_step - 0.5, row_step);
     std::fill(line.begin(), line.end(), 0.0F);
-    for (std::size_t i = 0; i < down.weights.size(); ++i) {
-      const int v = std::clamp(down.first + static_cast<int>(i), 0, picture.height - 1);
+    for (std::size_t i = 0; i < row_sample.weights.size(); ++i) {
+      const int v = std::clamp(row_sample.first + static_cast<int>(i), 0, picture.height - 1);
       const std::uint8_t* from = picture.data + v * picture.stride;
-      for (int u = 0; u < picture.width; ++u) line[u] += down.weights[i] * from[u];
+      for (int u = 0; u < picture.width; ++u) line[u] += row_sample.weights[i] * from[u];
     }
     for (int c = 0; c < shape.columns; ++c) {
       float sum = 0.0F;
-      int u = across[c].first;
-      for (const float weight : across[c].weights) {
+      int u = column_samples[c].first;
+      for (const float weight : column_samples[c].weights) {
         sum += weight * line[u];
         if (++u == picture.width) u = 0;
       }

@@ -12,13 +12,14 @@ namespace panonav {
 /// the full circle, its rows are elevations. The centre of column c lies at (c + 0.5) / columns of
 /// the width, rows likewise.
 struct PictureLayout {
-  /// Sense of the columns from left to right, seen from above. Pictures for people run clockwise.
+  /// Sense of rotation, viewed from above, in which the columns run from left to right. Images for
+  /// display run clockwise.
   ColumnDirection direction = ColumnDirection::clockwise;
-  /// Fraction of the width, between its outer edges, that shows the direction of the heading.
+  /// Position of the forward direction, as a fraction of the width from the left edge.
   double forward_column = 0.5;
   /// Elevations of the picture's lower and upper edge; nullopt: unknown.
   std::optional<ElevationBand> elevations = std::nullopt;
-  /// The part to keep, within `elevations`; empty: all. Needs `elevations`.
+  /// Elevations to keep, a part of `elevations`, which must then be set; nullopt keeps all.
   std::optional<ElevationBand> kept_elevations = std::nullopt;
   friend bool operator==(const PictureLayout&, const PictureLayout&) = default;
 };
@@ -31,12 +32,11 @@ struct PanoramaShape {
 };
 
 /// Converts a picture to the conventions of `Panorama`: the result runs counter-clockwise with
-/// forward at column 0, and colour becomes grey. Where the picture is as coarse as the result or
-/// coarser it is interpolated by Keys' cubic; where it is denser the cubic is widened to the
-/// distance of the new samples, so that nothing aliases. Columns that fall on columns of the same
-/// number are copied unchanged. Columns wrap round; rows end at the picture's edges. Values are
-/// clamped to [0, 1]. Throws ContractError on a layout or shape out of range. Cost: about 1 ms for
-/// 1024 x 512 to 80 x 512.
+/// forward at column 0, and colour becomes grey. Keys' cubic interpolates; where the picture has
+/// more samples than the result, the cubic is widened to the spacing of the new samples against
+/// aliasing. Values are copied unchanged where new and old samples coincide and are equally many.
+/// Columns wrap round; rows end at the picture's edges. Values are clamped to [0, 1]. Throws
+/// ContractError on a layout or shape out of range. Cost: about 1 ms for 1024 x 512 to 80 x 512.
 [[nodiscard]] Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
                                              PanoramaShape shape = {});
 

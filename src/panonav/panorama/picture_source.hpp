@@ -17,13 +17,13 @@ enum class PictureKind {
 
 /// Layout of the pictures of a recording, from which they become panoramic cylinders.
 struct PictureSource {
-  PictureKind kind = PictureKind::panorama;  ///< which of the other members count
-  /// Panorama and equirectangular: the layout of columns and rows. Mirror: only `kept_elevations`
-  /// is used, the band that is unwarped (empty: all that the camera sees at every azimuth).
+  PictureKind kind = PictureKind::panorama;  ///< decides which other members are used
+  /// Panorama and equirectangular: layout of columns and rows. Mirror: only `kept_elevations` is
+  /// used, the band to unwarp; nullopt: all elevations that the camera sees at every azimuth.
   PictureLayout layout;
   std::optional<Camera> camera;  ///< mirror, and only there
-  /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself. Values that come
-  /// from them are filled from both sides (see `fill_hidden_values`).
+  /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself. Panorama values
+  /// that depend on these pixels are interpolated (see `fill_hidden_values`).
   std::optional<Image> mask;
   friend bool operator==(const PictureSource&, const PictureSource&) = default;
 };

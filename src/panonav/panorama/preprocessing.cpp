@@ -12,7 +12,8 @@ namespace panonav {
 
 namespace {
 
-/// Sums row by row in double precision, so that a rotation changes them by rounding only.
+/// Mean and standard deviation, summed in double precision, so that a rotation of the view changes
+/// them only by rounding.
 struct Moments {
   double mean = 0.0;
   double deviation = 0.0;

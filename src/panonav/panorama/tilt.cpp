@@ -13,8 +13,8 @@ namespace panonav {
 
 namespace {
 
-/// Position of a direction of the level robot in the tilted one's panorama, in rows and columns;
-/// columns as the difference to its own, which changes slowly.
+/// Position in the tilted panorama of a direction of the level one: the row, and the difference of
+/// the columns, which varies slowly from direction to direction.
 struct Shift {
   float row = 0.0F;
   float columns = 0.0F;
@@ -51,15 +51,15 @@ class TiltedPositions {
   double top_rad_, rows_per_rad_, columns_per_rad_;
 };
 
-/// Exact positions every few degrees and straight lines in between: off by less than 0.01 of a
-/// degree below 60 degrees of elevation. Nearer to a pole, level or tilted, every position is
-/// exact.
+/// Spacing of the nodes at which positions are computed exactly; in between they are interpolated
+/// linearly, with errors below 0.01 degrees. Rows within 30 degrees of a pole of either panorama
+/// are computed exactly everywhere.
 constexpr double node_spacing_rad = 5.0 * std::numbers::pi / 180.0;
-constexpr double polar_rad = std::numbers::pi / 3.0;
+constexpr double polar_elevation_rad = std::numbers::pi / 3.0;
 
-/// The nodes of one row, one more than needed at its end.
-void compute_nodes(const TiltedPositions& positions, double elevation_rad, int columns, int step,
-                   std::vector<Shift>& nodes) {
+/// Computes the nodes of one row, with one node beyond its last column.
+void compute_row_nodes(const TiltedPositions& positions, double elevation_rad, int columns,
+                       int step, std::vector<Shift>& nodes) {
   nodes.clear();
   for (int c = 0; c < columns + step; c += step)
     nodes.push_back(positions.at(elevation_rad, 2.0 * std::numbers::pi * c / columns));
@@ -69,7 +69,7 @@ Shift interpolate_shift(const Shift& a, const Shift& b, float share) {
   return {a.row + share * (b.row - a.row), a.columns + share * (b.columns - a.columns)};
 }
 
-/// One row of the level panorama.
+/// Computes one row of the level panorama by bilinear interpolation.
 void interpolate_row(const Panorama& seen, const std::vector<Shift>& nodes, int step,
                      std::span<float> values) {
   const int columns = seen.columns();
@@ -127,20 +127,20 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
   std::vector<Shift> lower;
   int lower_row = -1;
   for (int y = 0; y < rows; ++y) {
-    const bool is_polar = std::abs(level.elevation_rad(y)) + tilt_rad > polar_rad;
+    const bool is_polar = std::abs(level.elevation_rad(y)) + tilt_rad > polar_elevation_rad;
     const int step = is_polar ? 1 : column_step;
     if (is_polar) {
-      compute_nodes(positions, level.elevation_rad(y), columns, step, nodes);
+      compute_row_nodes(positions, level.elevation_rad(y), columns, step, nodes);
     } else {
       const int upper_row = y / row_step * row_step;
       if (lower_row != upper_row + row_step) {
         if (lower_row == upper_row) {
           std::swap(upper, lower);
         } else {
-          compute_nodes(positions, level.elevation_rad(upper_row), columns, step, upper);
+          compute_row_nodes(positions, level.elevation_rad(upper_row), columns, step, upper);
         }
         lower_row = upper_row + row_step;
-        compute_nodes(positions, level.elevation_rad(lower_row), columns, step, lower);
+        compute_row_nodes(positions, level.elevation_rad(lower_row), columns, step, lower);
       }
       const auto share = static_cast<float>(y - upper_row) / static_cast<float>(row_step);
       nodes.resize(upper.size());
@@ -156,8 +156,9 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
 Panorama level_panorama(const Panorama& seen, const Tilt& tilt) {
   validate(tilt);
   if (seen.elevations()) return level_panorama(seen, tilt, seen.rows(), *seen.elevations());
-  constexpr double tolerated_rad = 0.5 * std::numbers::pi / 180.0;
-  if (std::max(std::abs(tilt.roll_rad), std::abs(tilt.pitch_rad)) <= tolerated_rad) return seen;
+  constexpr double tolerated_tilt_rad = 0.5 * std::numbers::pi / 180.0;
+  if (std::max(std::abs(tilt.roll_rad), std::abs(tilt.pitch_rad)) <= tolerated_tilt_rad)
+    return seen;
   throw ContractError("tilt",
                       format_number(degrees(tilt.roll_rad)) + ", " +
                           format_number(degrees(tilt.pitch_rad)) + " degrees",

@@ -12,7 +12,8 @@ struct Tilt {
   friend bool operator==(const Tilt&, const Tilt&) = default;
 };
 
-/// Larger ones leave too little of a band that all sides see.
+/// Largest accepted tilt, in rad: with more, too small a band of elevations remains visible at all
+/// azimuths.
 inline constexpr double max_tilt_rad = 0.5235987755982988;  // 30 degrees
 
 /// Throws ContractError unless both angles are at most `max_tilt_rad`.
@@ -20,11 +21,10 @@ void validate(const Tilt& tilt);
 
 /// Levels a panorama: computes the view of the robot with its axis vertical, at the same heading
 /// and place. `seen` is rotated by the inverse of the tilt into a panorama of `rows` rows in
-/// `band`, interpolated linearly between four values. `seen` may show more than the band, so that
-/// little of it is missing; directions that `seen` does not show take its nearest row, as in
-/// `Unwarper`. No tilt and the same shape: the same bits. Throws ContractError where the elevations
-/// of `seen` are unknown or the tilt is too large. Cost: 0.37 ms for 80 x 512
-/// (docs/performance.md).
+/// `band`, interpolated linearly between four values. `seen` may cover more elevations than `band`,
+/// to fill more of the result; directions outside `seen` take its nearest row. Without tilt and
+/// with the same shape and band the result is a copy. Throws ContractError where the elevations of
+/// `seen` are unknown or the tilt is too large. Cost: 0.37 ms for 80 x 512 (docs/performance.md).
 [[nodiscard]] Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
                                       const ElevationBand& band);
 /// Levels a panorama in the band and with the rows of `seen`. Where its elevations are unknown, a

@@ -15,7 +15,7 @@ namespace panonav {
 
 namespace {
 
-ElevationBand checked_band(const Camera& camera, const UnwarperOptions& options) {
+ElevationBand validated_band(const Camera& camera, const UnwarperOptions& options) {
   validate(camera);
   validate(options);
   constexpr double zenith = std::numbers::pi / 2.0;
@@ -59,7 +59,7 @@ Unwarper::Unwarper(const Camera& camera, const UnwarperOptions& options)
     : camera_(camera),
       rows_(options.rows),
       columns_(options.columns),
-      elevations_(checked_band(camera, options)) {
+      elevations_(validated_band(camera, options)) {
   if (!std::holds_alternative<EquirectangularModel>(camera_.model)) {
     table_ = std::make_shared<const UnwarpTable>(
         make_unwarp_table(camera_, rows_, columns_, elevations_));
@@ -67,8 +67,8 @@ Unwarper::Unwarper(const Camera& camera, const UnwarperOptions& options)
 }
 
 bool Unwarper::is_visible(int row, int column) const noexcept {
-  return !table_ || table_->seen.empty() ||
-         table_->seen[static_cast<std::size_t>(row) * columns_ + column] != 0;
+  return !table_ || table_->visible.empty() ||
+         table_->visible[static_cast<std::size_t>(row) * columns_ + column] != 0;
 }
 
 void Unwarper::require_camera_size(ImageView image) const {
@@ -81,11 +81,11 @@ void Unwarper::require_camera_size(ImageView image) const {
   }
 }
 
-void Unwarper::halve_and_pair(ImageView image, Workspace& workspace) const {
+void Unwarper::build_halved_pairs(ImageView image, Workspace& workspace) const {
   const kernels::Instructions instructions = kernels::chosen_instructions();
   workspace.halved.resize(table_->halved_size);
   workspace.pairs.resize(table_->pairs_size);
-  // The part of the level before that is there: its first pixel is (left, top).
+  // The available part of the previous level; its first pixel is (left, top).
   struct Part {
     const std::uint8_t* data;
     std::ptrdiff_t stride;
@@ -100,7 +100,7 @@ void Unwarper::halve_and_pair(ImageView image, Workspace& workspace) const {
     if (i > 0) {
       const int width = level.right - level.left;
       const int height = level.bottom - level.top;
-      std::uint8_t* const halved = workspace.halved.data() + level.halved_at;
+      std::uint8_t* const halved = workspace.halved.data() + level.halved_offset;
       kernels::halve(
           {part.at(2 * level.left, 2 * level.top), 2 * width, 2 * height, 1, part.stride}, halved,
           instructions);
@@ -110,21 +110,21 @@ void Unwarper::halve_and_pair(ImageView image, Workspace& workspace) const {
       kernels::pair_rows(
           {part.at(level.pair_left, level.pair_top), level.pair_right - level.pair_left,
            level.pair_bottom - level.pair_top + 1, 1, part.stride},
-          workspace.pairs.data() + level.pairs_at, instructions);
+          workspace.pairs.data() + level.pairs_offset, instructions);
     }
   }
 }
 
-void Unwarper::compute_row(std::span<const std::uint16_t> pairs, int row,
-                           std::span<float> values) const {
+void Unwarper::compute_row_values(std::span<const std::uint16_t> pairs, int row,
+                                  std::span<float> values) const {
   const UnwarpTable::Row& entry = table_->rows[row];
-  const std::size_t count = static_cast<std::size_t>(entry.taps) * columns_;
-  // The taps of two lenses share the weight of one.
-  const int full_taps = entry.taps / lens_count(camera_);
+  const std::size_t count = static_cast<std::size_t>(entry.taps_per_value) * columns_;
+  // Two lenses have twice as many taps, but each pair of taps has the weight of one.
+  const int full_taps = entry.taps_per_value / lens_count(camera_);
   const float scale = 1.0F / static_cast<float>(255 * kernels::tap_weight_sum * full_taps);
   kernels::remap(pairs, std::span(table_->positions).subspan(entry.first_entry, count),
-                 std::span(table_->weights).subspan(entry.first_entry, count), entry.taps, scale,
-                 values, kernels::chosen_instructions());
+                 std::span(table_->weights).subspan(entry.first_entry, count), entry.taps_per_value,
+                 scale, values, kernels::chosen_instructions());
 }
 
 Panorama Unwarper::unwrap(ImageView image) const {
@@ -140,15 +140,16 @@ Panorama Unwarper::unwrap(ImageView image, Workspace& workspace) const {
   return {rows_, columns_, elevations_, std::move(values)};
 }
 
-void Unwarper::unwrap_blocks(ImageView image, Workspace& workspace,
-                             const std::function<void(int, std::span<const float>)>& take) const {
+void Unwarper::unwrap_blocks(
+    ImageView image, Workspace& workspace,
+    const std::function<void(int, std::span<const float>)>& consume_rows) const {
   require_camera_size(image);
   if (std::holds_alternative<EquirectangularModel>(camera_.model)) {
     const Panorama panorama = unwrap_picture(camera_, image, elevations_, rows_, columns_);
     for (int y = 0; y < rows_; y += rows_per_block) {
       const int count = std::min(rows_per_block, rows_ - y);
-      take(y, panorama.values().subspan(static_cast<std::size_t>(y) * columns_,
-                                        static_cast<std::size_t>(count) * columns_));
+      consume_rows(y, panorama.values().subspan(static_cast<std::size_t>(y) * columns_,
+                                                static_cast<std::size_t>(count) * columns_));
     }
     return;
   }
@@ -157,16 +158,18 @@ void Unwarper::unwrap_blocks(ImageView image, Workspace& workspace,
     grey = to_grey(image);
     image = grey->view();
   }
-  halve_and_pair(image, workspace);
+  build_halved_pairs(image, workspace);
   std::vector<float>& block = workspace.block;
   block.resize(static_cast<std::size_t>(rows_per_block) * columns_);
   for (int y = 0; y < rows_; y += rows_per_block) {
     const int count = std::min(rows_per_block, rows_ - y);
     for (int i = 0; i < count; ++i) {
-      compute_row(workspace.pairs, y + i,
-                  std::span(block).subspan(static_cast<std::size_t>(i) * columns_, columns_));
+      compute_row_values(
+          workspace.pairs, y + i,
+          std::span(block).subspan(static_cast<std::size_t>(i) * columns_, columns_));
     }
-    take(y, std::span<const float>(block).first(static_cast<std::size_t>(count) * columns_));
+    consume_rows(y,
+                 std::span<const float>(block).first(static_cast<std::size_t>(count) * columns_));
   }
 }
 

@@ -18,18 +18,18 @@ namespace panonav {
 
 namespace {
 
-/// The terms of C(sigma) (`CorrelationPoint`); entry 0 is 0.
+/// Coefficients of C(sigma), see `CorrelationPoint`; entry 0 is 0.
 struct CrossSpectrum {
   std::vector<double> real, imaginary;
-  double norm = 0.0;  ///< the correlation of a view with itself, geometric mean of both views
+  double norm = 0.0;  ///< geometric mean of the energies of both views
 
   explicit CrossSpectrum(int components)
       : real(static_cast<std::size_t>(components)), imaginary(real.size()) {}
-  [[nodiscard]] int highest() const { return static_cast<int>(real.size()) - 1; }
+  [[nodiscard]] int max_frequency() const { return static_cast<int>(real.size()) - 1; }
   [[nodiscard]] std::complex<double> term(int k) const { return {real[k], imaginary[k]}; }
 };
 
-int choose_components(SignatureShape query, SignatureShape reference, int components) {
+int resolve_components(SignatureShape query, SignatureShape reference, int components) {
   require(query.rows == reference.rows, "rows of the query", query.rows,
           std::to_string(reference.rows) + " (as the reference)");
   const int common = std::min(query.components, reference.components);
@@ -44,7 +44,7 @@ struct SineCosine {
 
 /// |angle| <= 4 pi; absolute error below 1e-6. Branch-free, so that the compiler can do several at
 /// once.
-inline SineCosine sine_cosine(float angle_rad) {
+inline SineCosine approximate_sine_cosine(float angle_rad) {
   const float quarters = angle_rad * static_cast<float>(2.0 / std::numbers::pi);
   const int quadrant = static_cast<int>(quarters + 8.5F) - 8;
   const float x =
@@ -59,7 +59,7 @@ inline SineCosine sine_cosine(float angle_rad) {
 
 std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
                                             const FourierSignature& reference, int components) {
-  components = choose_components(query.shape(), reference.shape(), components);
+  components = resolve_components(query.shape(), reference.shape(), components);
   const auto rows = static_cast<std::size_t>(query.rows());
   CrossSpectrum spectrum(components);
   std::vector<float> cosines(rows);
@@ -73,7 +73,7 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
     const float* const reference_phases = reference.phases_rad().data() + k * rows;
     for (std::size_t y = 0; y < rows; ++y) {
       const float weight = query_magnitudes[y] * reference_magnitudes[y];
-      const SineCosine turn = sine_cosine(query_phases[y] - reference_phases[y]);
+      const SineCosine turn = approximate_sine_cosine(query_phases[y] - reference_phases[y]);
       cosines[y] = weight * turn.cosine;
       sines[y] = weight * turn.sine;
     }
@@ -88,8 +88,8 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
     spectrum.real[k] = real;
     spectrum.imaginary[k] = imaginary;
   }
-  // Views are of the order of 1, so a transform in single precision leaves less than this of
-  // nothing.
+  // Bound of the rounding errors of a single-precision transform of values of the order of 1;
+  // weaker structure is treated as none.
   constexpr double rounding = 1e-6;
   const double min_energy = rounding * rounding * static_cast<double>(rows);
   if (!(query_energy > min_energy && reference_energy > min_energy)) return {};
@@ -99,14 +99,15 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
 
 std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
                                             const PackedSignature& reference, int components) {
-  components = choose_components(query.shape, reference.shape, components);
+  components = resolve_components(query.shape, reference.shape, components);
   for (const PackedSignature* packed : {&query, &reference}) {
     require(packed->magnitudes.size() == packed->shape.size() &&
                 packed->phases.size() == packed->shape.size(),
             "bytes of a packed signature", static_cast<double>(packed->phases.size()),
             to_text(static_cast<double>(packed->shape.size())));
   }
-  // Integer sums: exact, in any order. 14 bits keep a term within 32 bits.
+  // Integer sums are exact in any order of addition. Sines and cosines have 14 bits, so that a term
+  // fits into 32 bits.
   struct Turn {
     std::int32_t cosine, sine;
   };
@@ -172,14 +173,14 @@ Peak refine_peak(const CrossSpectrum& spectrum, double low, double high) {
   return {wrap_angle(heading), point.value};
 }
 
-/// Finds the maxima of C, highest first: all that may be the highest or the second highest.
+/// Finds all maxima of C that may be its highest or second highest; returns them highest first.
 std::vector<Peak> find_highest_peaks(const CrossSpectrum& spectrum) {
-  const int highest = spectrum.highest();
+  const int max_frequency = spectrum.max_frequency();
   int count = 16;
-  while (count < 8 * highest) count *= 2;
+  while (count < 8 * max_frequency) count *= 2;
 
-  // Horner's rule for all points of the grid at once. Single precision is enough to choose among
-  // maxima that are refined below.
+  // Evaluates C at all points of the grid by Horner's rule. Single precision suffices, because the
+  // maxima are refined below.
   const auto size = static_cast<std::size_t>(count);
   std::vector<float> buffer(4 * size);
   float* const cosine = buffer.data();
@@ -195,7 +196,7 @@ std::vector<Peak> find_highest_peaks(const CrossSpectrum& spectrum) {
             turn.real() * step.imag() + turn.imag() * step.real()};
   }
   const double scale = 1.0 / spectrum.norm;
-  for (int k = highest; k >= 1; --k) {
+  for (int k = max_frequency; k >= 1; --k) {
     const auto term_real = static_cast<float>(spectrum.real[k] * scale);
     const auto term_imaginary = static_cast<float>(spectrum.imaginary[k] * scale);
     for (std::size_t i = 0; i < size; ++i) {
@@ -220,8 +221,8 @@ std::vector<Peak> find_highest_peaks(const CrossSpectrum& spectrum) {
   std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
     return a.value != b.value ? a.value > b.value : a.index < b.index;
   });
-  // Bernstein's inequality: C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its maximum
-  // between a maximum and the nearest point of the grid.
+  // Bernstein's inequality: from a maximum to the nearest point of the grid, C decreases by at most
+  // (max_frequency * half a step)^2 / 2 <= 0.08 of its maximum.
   std::vector<Peak> peaks;
   const double grid_step = 2.0 * std::numbers::pi / count;
   const float margin = candidates.empty() ? 0.0F : 0.1F * candidates.front().value;
@@ -234,7 +235,7 @@ std::vector<Peak> find_highest_peaks(const CrossSpectrum& spectrum) {
   return peaks;
 }
 
-double distinctness(double value, double other) {
+double compute_distinctness(double value, double other) {
   return value > 0.0 ? std::clamp((value - other) / value, 0.0, 1.0) : 0.0;
 }
 
@@ -245,7 +246,7 @@ std::optional<CompassReading> read_compass(const std::optional<CrossSpectrum>& s
   const double other = peaks.size() > 1 ? peaks[1].value : 0.0;
   return CompassReading{peaks[0].heading_rad,
                         std::clamp(peaks[0].value / spectrum->norm, -1.0, 1.0),
-                        distinctness(peaks[0].value, other)};
+                        compute_distinctness(peaks[0].value, other)};
 }
 
 }  // namespace
@@ -267,9 +268,10 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
           "above 0 .. pi");
   const auto spectrum = cross_spectrum(query, reference, components);
   if (!spectrum) return {};
-  // The grid is as fine as that of `find_highest_peaks`.
+  // Eight points per period of the highest frequency, as in `find_highest_peaks`.
   const int steps =
-      1 + static_cast<int>(std::ceil(within_rad * 8.0 * spectrum->highest() / std::numbers::pi));
+      1 +
+      static_cast<int>(std::ceil(within_rad * 8.0 * spectrum->max_frequency() / std::numbers::pi));
   const double step = 2.0 * within_rad / steps;
   const double first = heading_rad - within_rad;
   std::vector<Point> points;
@@ -280,10 +282,10 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
     points.push_back(evaluate(*spectrum, heading));
     if (points.back().value > best.value) best = {heading, points.back().value};
   }
-  // Bernstein's inequality: C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its bound
-  // between two points.
+  // Bernstein's inequality: between two points, C rises by at most (max_frequency * half a step)^2
+  // / 2 <= 0.08 of its bound.
   double bound = 0.0;
-  for (int k = 1; k <= spectrum->highest(); ++k) bound += std::abs(spectrum->term(k));
+  for (int k = 1; k <= spectrum->max_frequency(); ++k) bound += std::abs(spectrum->term(k));
   const double min_value = best.value - 0.08 * bound;
   for (int i = 0; i < steps; ++i) {
     const Point& low = points[i];

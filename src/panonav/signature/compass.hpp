@@ -12,8 +12,8 @@ struct CompassReading {
   double heading_rad = 0.0;
   /// Normalised correlation at this heading without k = 0, -1 .. 1; 1 for the same view turned.
   double correlation = 0.0;
-  /// 0 .. 1: how far the correlation stands above its next highest maximum, as a fraction of
-  /// itself; 0 when another heading fits as well or better, 1 when no other fits at all.
+  /// Relative distance between the highest and the second highest maximum of the correlation, 0 ..
+  /// 1: 0 if another heading fits equally well, 1 if no other fits at all.
   double distinctness = 0.0;
 };
 
@@ -29,15 +29,15 @@ struct CompassReading {
                                                     const FourierSignature& reference,
                                                     int components = 0);
 
-/// Reads the compass from packed signatures, without unpacking; the full scale cancels. Phases in
-/// steps of 2 pi / 256 change the heading by a few thousandths of a radian at most.
+/// Computes the heading directly from packed signatures; the full scale cancels. The quantised
+/// phases (steps of 2 pi / 256) change the heading by at most a few thousandths of a radian.
 [[nodiscard]] std::optional<CompassReading> compass(const PackedSignature& query,
                                                     const PackedSignature& reference,
                                                     int components = 0);
 
-/// Reads the compass within `within_rad` of `heading_rad`, a heading that is known coarsely from
-/// another source. `distinctness` is 1, as no other heading is considered. Throws ContractError
-/// also unless 0 < within_rad <= pi.
+/// Finds the best heading within `within_rad` of `heading_rad`, a coarse heading from another
+/// source. `distinctness` is 1, because other headings are not searched. Throws as `compass`, and
+/// ContractError unless 0 < within_rad <= pi.
 [[nodiscard]] std::optional<CompassReading> compass_near(const PackedSignature& query,
                                                          const PackedSignature& reference,
                                                          double heading_rad, double within_rad,

@@ -6,10 +6,10 @@
 
 namespace panonav {
 
-/// The correlation of two views against the turn between them, all rows summed [S06 eq. 33],
+/// Value and first two derivatives, at one rotation, of the correlation of two views [S06 eq. 33],
 ///   C(sigma) = Re sum_k (real[k] + j imaginary[k]) exp(-j k sigma), k = 1 .. K = size - 1,
-/// and its first two derivatives at one turn. Entry 0 does not count. The compass takes double
-/// precision, homing single.
+/// summed over all rows. Entry 0 of both arrays is ignored.
+/// The compass uses double precision, homing single precision.
 template <class Real>
 struct CorrelationPoint {
   Real value = 0;      ///< C(sigma), in the square of the views' unit
@@ -17,7 +17,8 @@ struct CorrelationPoint {
   Real curvature = 0;  ///< the second derivative, below 0 at a maximum
 };
 
-/// Cost: a sine, a cosine and a few multiplications a frequency.
+/// Evaluates the correlation at `turn_rad`. Cost: one sine, one cosine, and a few multiplications
+/// for each frequency.
 template <class Real>
 [[nodiscard]] CorrelationPoint<Real> correlation_at(std::span<const Real> term_real,
                                                     std::span<const Real> term_imaginary,

@@ -11,8 +11,9 @@ namespace panonav {
 
 namespace {
 
-/// Number of leading magnitudes to compare: all rows of the components wanted.
-std::size_t compared_size(SignatureShape a, SignatureShape b, int components) {
+/// Returns the number of leading magnitudes to compare: all rows of the first `components` (0: of
+/// all). Throws ContractError on different shapes.
+std::size_t count_compared_magnitudes(SignatureShape a, SignatureShape b, int components) {
   if (a != b) {
     throw ContractError("signature of " + std::to_string(a.rows) + " rows x " +
                             std::to_string(a.components) + " components compared with one",
@@ -27,7 +28,7 @@ std::size_t compared_size(SignatureShape a, SignatureShape b, int components) {
 }  // namespace
 
 double dissimilarity_l1(const FourierSignature& a, const FourierSignature& b, int components) {
-  const std::size_t count = compared_size(a.shape(), b.shape(), components);
+  const std::size_t count = count_compared_magnitudes(a.shape(), b.shape(), components);
   double sum = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
     sum += std::abs(static_cast<double>(a.magnitudes()[i]) - b.magnitudes()[i]);
@@ -36,7 +37,7 @@ double dissimilarity_l1(const FourierSignature& a, const FourierSignature& b, in
 }
 
 double dissimilarity_l2(const FourierSignature& a, const FourierSignature& b, int components) {
-  const std::size_t count = compared_size(a.shape(), b.shape(), components);
+  const std::size_t count = count_compared_magnitudes(a.shape(), b.shape(), components);
   double sum = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
     const double difference = static_cast<double>(a.magnitudes()[i]) - b.magnitudes()[i];
@@ -50,22 +51,22 @@ double dissimilarity_weighted(const FourierSignature& a, const FourierSignature&
   require(!weights.empty() && weights.size() <= static_cast<std::size_t>(a.components()),
           "number of weights", static_cast<double>(weights.size()),
           "1 .. " + std::to_string(a.components()) + " (one per component)");
-  compared_size(a.shape(), b.shape(), 0);
+  count_compared_magnitudes(a.shape(), b.shape(), 0);
   double sum = 0.0;
   for (std::size_t k = 0; k < weights.size(); ++k) {
     require(weights[k] >= 0.0 && std::isfinite(weights[k]), "weight", weights[k], "finite, >= 0");
-    double of_component = 0.0;
+    double component_sum = 0.0;
     for (std::size_t i = k * a.rows(); i < (k + 1) * a.rows(); ++i) {
-      of_component += std::abs(static_cast<double>(a.magnitudes()[i]) - b.magnitudes()[i]);
+      component_sum += std::abs(static_cast<double>(a.magnitudes()[i]) - b.magnitudes()[i]);
     }
-    sum += weights[k] * of_component;
+    sum += weights[k] * component_sum;
   }
   return sum;
 }
 
 std::uint32_t dissimilarity_packed(const PackedSignature& a, const PackedSignature& b,
                                    int components) {
-  const std::size_t count = compared_size(a.shape, b.shape, components);
+  const std::size_t count = count_compared_magnitudes(a.shape, b.shape, components);
   std::uint32_t sum = 0;
   for (std::size_t i = 0; i < count; ++i) {
     sum +=

@@ -11,19 +11,20 @@ namespace panonav {
 /// Throws ContractError on different shapes. Sums run in a fixed order.
 [[nodiscard]] double dissimilarity_l1(const FourierSignature& a, const FourierSignature& b,
                                       int components = 0);
-/// Square root of the sum of squares [F11 eq. 2].
+/// Computes the square root of the sum of squared differences of magnitudes [F11 eq. 2].
 [[nodiscard]] double dissimilarity_l2(const FourierSignature& a, const FourierSignature& b,
                                       int components = 0);
-/// Sum of alpha_k |A^a - A^b| [M04 eq. 6]; one weight >= 0 per component; the first weights.size()
-/// components are used.
+/// Computes the sum of alpha_k |A^a - A^b| [M04 eq. 6]; one weight >= 0 per component; the first
+/// weights.size() components are used.
 [[nodiscard]] double dissimilarity_weighted(const FourierSignature& a, const FourierSignature& b,
                                             std::span<const double> weights);
-/// The exact integer L1 of packed magnitudes; the measure of a visual memory.
+/// Computes the L1 distance of packed magnitudes exactly, in integers; visual memories rank places
+/// by this measure.
 [[nodiscard]] std::uint32_t dissimilarity_packed(const PackedSignature& a, const PackedSignature& b,
                                                  int components = 0);
 
-/// Rescales dissimilarities to 0 (the largest) .. 1000 (the smallest) over the whole set [M04 eq.
-/// 3]. All equal: all 1000.
+/// Rescales dissimilarities linearly: the largest becomes 0, the smallest 1000 [M04 eq. 3]. If all
+/// are equal, all become 1000.
 [[nodiscard]] std::vector<double> similarities(std::span<const double> dissimilarities);
 
 }  // namespace panonav

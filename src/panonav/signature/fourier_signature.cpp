@@ -14,8 +14,8 @@ namespace panonav {
 
 namespace {
 
-/// The invariant asks for phases below pi, but the float nearest to an angle just below pi is pi
-/// itself.
+/// Wraps a phase to [-pi, pi). The float nearest to an angle just below pi is pi itself, which the
+/// invariant excludes and which becomes -pi.
 float wrap_phase(double phase_rad) {
   const float phase = static_cast<float>(wrap_angle(phase_rad));
   return phase >= std::numbers::pi_v<float> ? -std::numbers::pi_v<float> : phase;
@@ -94,7 +94,8 @@ PackedSignature pack(const FourierSignature& signature, float full_scale) {
   for (std::size_t i = 0; i < size; ++i) {
     const float magnitude = std::min(signature.magnitudes()[i] * scale, 255.0F);
     packed.magnitudes[i] = static_cast<std::uint8_t>(magnitude + 0.5F);
-    // 256.5 instead of 0.5: the number stays positive, so that cutting off its fraction rounds.
+    // Adds 256.5 instead of 0.5 to keep the number positive, so that truncation rounds it; the 256
+    // vanish in the cast to a byte.
     const int step = static_cast<int>(signature.phases_rad()[i] * steps + 256.5F);
     packed.phases[i] =
         packed.magnitudes[i] == 0 ? std::uint8_t{0} : static_cast<std::uint8_t>(step);

@@ -16,7 +16,7 @@ struct SignatureShape {
   int rows = 80;        ///< rows of the panorama, >= 1 [M04 section 2.1]
   int components = 15;  ///< >= 1 [M04 section 2.1]
 
-  /// Coefficients of a view: rows * components.
+  /// Number of coefficients: rows * components.
   [[nodiscard]] std::size_t size() const noexcept {
     return static_cast<std::size_t>(rows) * components;
   }
@@ -36,9 +36,9 @@ class FourierSignature {
 
   /// Rows and components.
   [[nodiscard]] SignatureShape shape() const noexcept { return shape_; }
-  /// Rows of the panorama, from the highest elevation to the lowest.
+  /// Number of rows, from the highest elevation to the lowest.
   [[nodiscard]] int rows() const noexcept { return shape_.rows; }
-  /// Frequencies k = 0 .. components - 1.
+  /// Number of components: frequencies k = 0 .. components - 1.
   [[nodiscard]] int components() const noexcept { return shape_.components; }
   /// Elevations of the panorama's rows; nullopt: unknown.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
@@ -71,8 +71,8 @@ class FourierSignature {
   std::optional<ElevationBand> elevations_;
 };
 
-/// Transforms every row. Throws ContractError unless 1 <= components <= columns / 2. Cost: rows *
-/// columns * components / 4 multiplications (an odd number of columns: / 2).
+/// Computes the signature of a panorama. Throws ContractError unless 1 <= components <= columns /
+/// 2. Cost: rows * columns * components / 4 multiplications (an odd number of columns: / 2).
 [[nodiscard]] FourierSignature compute_signature(const Panorama& panorama, int components = 15);
 
 /// Computes the signature with existing tables of the transform, for many panoramas of the same
@@ -85,10 +85,10 @@ class FourierSignature {
 [[nodiscard]] FourierSignature turn(const FourierSignature& signature, double turn_rad);
 
 /// A signature in 8 + 8 bit per component and row: 19 kbit for 80 x 15 [M03 table 1]. Magnitudes
-/// are linear up to `full_scale` (kept once per memory, not here) and saturate there; below, the
-/// error is at most full_scale / 510. Phases count steps of 2 pi / 256, modulo 256: the error is at
-/// most pi / 256. Where a magnitude is packed as 0 its phase is too. Component-major like
-/// FourierSignature. Both vectors have shape.size() entries.
+/// are quantised linearly up to `full_scale` (stored once per visual memory, not here), where they
+/// saturate; below, the error is at most full_scale / 510. Phases are integers in steps of 2 pi /
+/// 256, modulo 256: the error is at most pi / 256. A magnitude packed as 0 has phase 0.
+/// Component-major like FourierSignature. Both vectors have shape.size() entries.
 struct PackedSignature {
   SignatureShape shape;                  ///< rows and components of both vectors
   std::vector<std::uint8_t> magnitudes;  ///< 255 stands for `full_scale` and all above

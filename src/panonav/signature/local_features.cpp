@@ -15,19 +15,20 @@ namespace panonav {
 
 namespace {
 
-// Largest distance of the compared points from the corner: with 8 degrees 11 percentage points more
-// places are found than with 14 (docs/decisions.md).
-constexpr double patch_rad = radians(8.0);
-// Half of a stretch of azimuth, and how many corners are kept in it: so they lie all round, and not
-// on one poster.
-constexpr double window_rad = radians(6.0);
+// Radius of the patch around a corner from which points are compared: with 8 degrees 11 percentage
+// points more places are recognised than with 14 (docs/decisions.md).
+constexpr double patch_radius_rad = radians(8.0);
+// Half-width of an azimuth window, and the largest number of corners kept in it. The limit spreads
+// corners over all azimuths, instead of, say, on one poster.
+constexpr double window_half_width_rad = radians(6.0);
 constexpr int max_kept_in_window = 4;
-// Corners closer than this to the upper or lower edge lack a part of their surroundings.
+// Rows at the upper and lower edge in which no corners are searched, because a part of their
+// neighbourhood is missing.
 constexpr int margin_rows = 3;
 constexpr int descriptor_bits = 256;
 
-// Grey levels with columns repeated beyond both ends and the outer rows repeated: loops need no
-// wrapping.
+// A panorama with padding: columns wrap round beyond both ends, the outer rows are repeated. Loops
+// therefore need no index wrapping.
 template <class Value>
 struct Padded {
   Padded(int rows_, int columns_, int pad_rows_, int pad_columns_)
@@ -44,7 +45,7 @@ struct Padded {
   [[nodiscard]] std::ptrdiff_t offset(int y) const {
     return static_cast<std::ptrdiff_t>(y + pad_rows) * stride + pad_columns;
   }
-  void pad() {
+  void fill_padding() {
     for (int y = 0; y < rows; ++y) {
       Value* const at = row(y);
       for (int x = 1; x <= pad_columns; ++x) {
@@ -63,8 +64,8 @@ struct Padded {
 
 using Grey = Padded<float>;
 
-// Sums over squares of 2 radius + 1 pixels. All values are whole numbers below 2^24, or rounded in
-// the same way in each column: sums run in one order.
+// Sums over squares with sides of 2 * radius + 1 pixels. Every column adds in the same order, so a
+// rotated view gives bit-identical sums.
 Grey compute_box_sums(const Grey& from, int radius, int pad_rows, int pad_columns) {
   Grey columns(from.rows, from.columns, radius, 0);
   for (int y = 0; y < from.rows; ++y) {
@@ -75,7 +76,7 @@ Grey compute_box_sums(const Grey& from, int radius, int pad_rows, int pad_column
       for (int x = 0; x < from.columns; ++x) out[x] += in[x + i];
     }
   }
-  columns.pad();
+  columns.fill_padding();
   Grey sums(from.rows, from.columns, pad_rows, pad_columns);
   for (int y = 0; y < from.rows; ++y) {
     float* const out = sums.row(y);
@@ -84,11 +85,11 @@ Grey compute_box_sums(const Grey& from, int radius, int pad_rows, int pad_column
       for (int x = 0; x < from.columns; ++x) out[x] += in[x];
     }
   }
-  sums.pad();
+  sums.fill_padding();
   return sums;
 }
 
-// The smaller eigenvalue of the structure tensor [Shi and Tomasi 1994], over 5 x 5 pixels.
+// Computes the smaller eigenvalue of the structure tensor [Shi and Tomasi 1994], over 5 x 5 pixels.
 Grey compute_corner_strengths(const Grey& smooth) {
   const int rows = smooth.rows;
   const int columns = smooth.columns;
@@ -108,7 +109,7 @@ Grey compute_corner_strengths(const Grey& smooth) {
     }
   }
   for (Grey* products : {&xx, &xy, &yy}) {
-    products->pad();
+    products->fill_padding();
     *products = compute_box_sums(*products, 2, 0, 0);
   }
   Grey strengths(rows, columns, 2, 2);
@@ -120,7 +121,7 @@ Grey compute_corner_strengths(const Grey& smooth) {
       strengths.row(y)[x] = 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
     }
   }
-  strengths.pad();
+  strengths.fill_padding();
   return strengths;
 }
 
@@ -129,7 +130,7 @@ struct Corner {
   float strength;
 };
 
-// A corner is the strongest of the 5 x 5 pixels around it; of equal ones the first.
+// True if the pixel is the strongest of the 5 x 5 pixels around it; of equal ones the first.
 bool is_corner(const Grey& strengths, int row, int column) {
   const float here = strengths.row(row)[column];
   for (int j = -2; j <= 2; ++j) {
@@ -142,8 +143,8 @@ bool is_corner(const Grey& strengths, int row, int column) {
 }
 
 std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row) {
-  // 3 x 3 pixels smooth, two lie between those whose difference is a gradient, 25 are added up: a
-  // grey level a pixel in the direction of the weaker gradient.
+  // Strength of a gradient of one grey level per pixel in its weaker direction: the factor 9 is
+  // from 3 x 3 smoothing, 2 from differences over two pixels, 25 from the sum over 5 x 5 pixels.
   constexpr float min_strength = 25.0F * (2.0F * 9.0F) * (2.0F * 9.0F);
   const Grey strengths = compute_corner_strengths(smooth);
   std::vector<Corner> all;  // by column
@@ -154,7 +155,7 @@ std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row)
     }
   }
   const int columns = strengths.columns;
-  const int window = static_cast<int>(window_rad / (2.0 * std::numbers::pi) * columns);
+  const int window = static_cast<int>(window_half_width_rad / (2.0 * std::numbers::pi) * columns);
   std::vector<Corner> kept;
   for (std::size_t i = 0; i < all.size(); ++i) {
     int stronger = 0;
@@ -178,7 +179,8 @@ std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row)
   return kept;
 }
 
-// Pairs of places around a corner, denser near it, the same for every view [Calonder et al. 2010].
+// Draws the pairs of points around a corner that a descriptor compares: normally distributed about
+// the corner, the same for every view [Calonder et al. 2010].
 std::array<std::array<int, 4>, descriptor_bits> sample_point_pairs(int rows, int columns) {
   Random random(5);
   const auto draw_offset = [&](int radius) {
@@ -197,16 +199,16 @@ std::array<std::array<int, 4>, descriptor_bits> sample_point_pairs(int rows, int
   return pairs;
 }
 
-double row_height(PanoramaShape shape, ElevationBand band) {
+double row_height_rad(PanoramaShape shape, ElevationBand band) {
   return (band.top_rad - band.bottom_rad) / shape.rows;
 }
 
-// Bearings and descriptors of the features of a view, one array for each number.
+// Bearings and descriptors of a view's features, as a structure of arrays.
 struct Bearings {
   explicit Bearings(const LocalFeatures& view) {
     const double column_rad = 2.0 * std::numbers::pi / view.shape.columns;
-    const double row_rad = row_height(view.shape, view.elevations);
-    words.reserve(4 * view.features.size());
+    const double row_rad = row_height_rad(view.shape, view.elevations);
+    descriptor_words.reserve(4 * view.features.size());
     for (const LocalFeatures::Feature& feature : view.features) {
       const double azimuth = column_rad * feature.column;
       azimuths.push_back(azimuth);
@@ -214,17 +216,17 @@ struct Bearings {
       cosines.push_back(static_cast<float>(std::cos(azimuth)));
       tangents.push_back(
           static_cast<float>(std::tan(view.elevations.top_rad - (feature.row + 0.5) * row_rad)));
-      words.insert(words.end(), feature.bits.begin(), feature.bits.end());
+      descriptor_words.insert(descriptor_words.end(), feature.bits.begin(), feature.bits.end());
     }
   }
   std::vector<double> azimuths;
   std::vector<float> sines, cosines, tangents;
-  std::vector<std::uint64_t> words;
+  std::vector<std::uint64_t> descriptor_words;
 };
 
-// The features that are each other's nearest, by the azimuth in the query minus that in the
-// reference: those that a turn brings within a right angle of each other stand side by side. All
-// stand there twice, so that this holds beyond the end.
+// Features that are each other's nearest, sorted by azimuth in the query minus azimuth in the
+// reference: the pairs that a rotation brings within a right angle of each other are contiguous.
+// The list is stored twice, so that ranges across the wrap are contiguous, too.
 class MutualMatches {
  public:
   struct Window {
@@ -232,25 +234,26 @@ class MutualMatches {
   };
 
   MutualMatches(const Bearings& query, const Bearings& reference,
-                std::span<const std::uint16_t> of_query,
-                std::span<const std::uint16_t> of_reference) {
+                std::span<const std::uint16_t> nearest_of_query,
+                std::span<const std::uint16_t> nearest_of_reference) {
     struct Pair {
       double azimuth_rad;
       std::size_t query, reference;
     };
     std::vector<Pair> pairs;
-    for (std::size_t i = 0; i < of_query.size() && !of_reference.empty(); ++i) {
-      const std::size_t j = of_query[i];
-      if (of_reference[j] == i) pairs.push_back({query.azimuths[i] - reference.azimuths[j], i, j});
+    for (std::size_t i = 0; i < nearest_of_query.size() && !nearest_of_reference.empty(); ++i) {
+      const std::size_t j = nearest_of_query[i];
+      if (nearest_of_reference[j] == i)
+        pairs.push_back({query.azimuths[i] - reference.azimuths[j], i, j});
     }
     for (Pair& pair : pairs) {
       if (pair.azimuth_rad < 0.0) pair.azimuth_rad += 2.0 * std::numbers::pi;
     }
     std::ranges::sort(pairs, {}, [](const Pair& p) { return std::pair(p.azimuth_rad, p.query); });
-    for (const double once_more : {0.0, 2.0 * std::numbers::pi}) {
+    for (const double period_offset_rad : {0.0, 2.0 * std::numbers::pi}) {
       for (const auto& [azimuth_rad, i, j] : pairs) {
-        azimuths_.push_back(azimuth_rad + once_more);
-        const float numbers[numbers_of_each] = {
+        azimuths_.push_back(azimuth_rad + period_offset_rad);
+        const float numbers[numbers_per_match] = {
             query.sines[i],
             query.cosines[i],
             query.tangents[i],
@@ -259,16 +262,16 @@ class MutualMatches {
             reference.tangents[j],
             query.sines[i] * reference.cosines[j] - query.cosines[i] * reference.sines[j],
             query.cosines[i] * reference.cosines[j] + query.sines[i] * reference.sines[j]};
-        for (std::size_t n = 0; n < numbers_of_each; ++n) values_[n].push_back(numbers[n]);
+        for (std::size_t n = 0; n < numbers_per_match; ++n) values_[n].push_back(numbers[n]);
       }
     }
   }
 
   [[nodiscard]] std::size_t size() const { return azimuths_.size() / 2; }
 
-  /// Returns the matches that a turn by `turn` steps brings within a right angle of each other;
-  /// 0 <= turn * step_rad < 2 pi.
-  [[nodiscard]] Window within_right_angle(int turn, double step_rad) const {
+  /// Returns the range of matches whose features a rotation by `turn` steps brings within a right
+  /// angle of each other; 0 <= turn * step_rad < 2 pi.
+  [[nodiscard]] Window select_within_right_angle(int turn, double step_rad) const {
     constexpr double right_angle = 0.5 * std::numbers::pi;
     double from = -turn * step_rad - right_angle;
     while (from < 0.0) from += 2.0 * std::numbers::pi;
@@ -284,22 +287,23 @@ class MutualMatches {
   }
 
  private:
-  static constexpr std::size_t numbers_of_each = 8;
+  static constexpr std::size_t numbers_per_match = 8;
   std::vector<double> azimuths_;
-  std::array<std::vector<float>, numbers_of_each> values_;  // as MatchedBearings has them
+  std::array<std::vector<float>, numbers_per_match> values_;  // as MatchedBearings has them
 };
 
-constexpr int turns = 128;
+constexpr int rotation_steps = 128;
 constexpr double tolerance_rad = radians(2.0);
-// A feature is at least half as far away as the views are apart, as seen from either.
+// Largest accepted ratio of the distance between the views to the distance of a feature from either
+// view.
 constexpr float max_ratio = 2.0F;
 
-struct Circle2 {
-  std::array<float, turns> sines, cosines;
+struct AngleTable {
+  std::array<float, rotation_steps> sines, cosines;
 };
 // Tabulates cosines and sines of the multiples of `step`.
-Circle2 make_circle(double step) {
-  Circle2 circle{};
+AngleTable make_angle_table(double step) {
+  AngleTable circle{};
   for (std::size_t i = 0; i < circle.sines.size(); ++i) {
     circle.sines[i] = static_cast<float>(std::sin(step * static_cast<double>(i)));
     circle.cosines[i] = static_cast<float>(std::cos(step * static_cast<double>(i)));
@@ -316,10 +320,11 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
   require_unmasked_rows(preprocessing, shape.rows);
   LocalFeatures view{shape, *panorama.elevations(), {}};
   const int radius_columns = std::max(
-      3, static_cast<int>(std::lround(patch_rad / (2.0 * std::numbers::pi) * shape.columns)));
-  const int radius_rows =
-      std::clamp(static_cast<int>(std::lround(patch_rad / row_height(shape, view.elevations))), 3,
-                 std::max(3, shape.rows));
+      3,
+      static_cast<int>(std::lround(patch_radius_rad / (2.0 * std::numbers::pi) * shape.columns)));
+  const int radius_rows = std::clamp(
+      static_cast<int>(std::lround(patch_radius_rad / row_height_rad(shape, view.elevations))), 3,
+      std::max(3, shape.rows));
   Grey grey(shape.rows, shape.columns, 1, 1);
   for (int y = 0; y < shape.rows; ++y) {
     const std::span<const float> from = panorama.row(y);
@@ -328,7 +333,7 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
       to[x] = static_cast<float>(static_cast<int>(std::clamp(from[x], 0.0F, 1.0F) * 255.0F + 0.5F));
     }
   }
-  grey.pad();
+  grey.fill_padding();
   const Grey smooth = compute_box_sums(grey, 1, std::max(1, radius_rows), radius_columns);
   const std::vector<Corner> corners =
       find_corners(smooth, std::max(margin_rows, preprocessing.masked_rows_top),
@@ -398,16 +403,17 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
   const Bearings query_bearings(query);
   const Bearings reference_bearings(reference);
   const std::size_t count = query.features.size();
-  std::vector<std::uint16_t> of_query(count);
-  std::vector<std::uint16_t> of_reference(reference.features.size());
+  std::vector<std::uint16_t> nearest_of_query(count);
+  std::vector<std::uint16_t> nearest_of_reference(reference.features.size());
   const kernels::Instructions instructions = kernels::chosen_instructions();
-  kernels::nearest_descriptors(query_bearings.words, reference_bearings.words, of_query,
-                               of_reference, instructions);
-  const MutualMatches matched(query_bearings, reference_bearings, of_query, of_reference);
+  kernels::nearest_descriptors(query_bearings.descriptor_words, reference_bearings.descriptor_words,
+                               nearest_of_query, nearest_of_reference, instructions);
+  const MutualMatches matched(query_bearings, reference_bearings, nearest_of_query,
+                              nearest_of_reference);
   if (static_cast<std::int64_t>(matched.size()) <= more_than) return {};
 
-  static const Circle2 whole = make_circle(2.0 * std::numbers::pi / turns);
-  static const Circle2 half = make_circle(std::numbers::pi / turns);
+  static const AngleTable full_angles = make_angle_table(2.0 * std::numbers::pi / rotation_steps);
+  static const AngleTable half_angles = make_angle_table(std::numbers::pi / rotation_steps);
   static const kernels::MotionHypotheses hypotheses = [] {
     kernels::MotionHypotheses made{};
     for (int d = 0; d < kernels::motion_axes; ++d) {
@@ -420,9 +426,10 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
     return made;
   }();
   // A rotation can explain at most the features that it brings within a right angle of each other.
-  std::array<MutualMatches::Window, turns> windows;
-  for (std::size_t t = 0; t < turns; ++t) {
-    windows[t] = matched.within_right_angle(static_cast<int>(t), 2.0 * std::numbers::pi / turns);
+  std::array<MutualMatches::Window, rotation_steps> windows;
+  for (std::size_t t = 0; t < rotation_steps; ++t) {
+    windows[t] = matched.select_within_right_angle(static_cast<int>(t),
+                                                   2.0 * std::numbers::pi / rotation_steps);
   }
   std::ranges::sort(windows, [](const auto& a, const auto& b) {  // the best come first
     return std::pair(-a.count, a.turn) < std::pair(-b.count, b.turn);
@@ -434,12 +441,13 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
     if (bound <= std::max(match.verified, more_than)) break;
     const auto t = static_cast<std::size_t>(turn);
     kernels::count_explained(matched.bearings(begin, bound),
-                             {whole.sines[t], whole.cosines[t], half.sines[t], half.cosines[t]},
+                             {full_angles.sines[t], full_angles.cosines[t], half_angles.sines[t],
+                              half_angles.cosines[t]},
                              hypotheses, explained, instructions);
     const std::int32_t max_explained = *std::ranges::max_element(explained);
     if (max_explained > std::max(match.verified, more_than)) {
       match.verified = max_explained;
-      match.heading_rad = wrap_angle(2.0 * std::numbers::pi * turn / turns);
+      match.heading_rad = wrap_angle(2.0 * std::numbers::pi * turn / rotation_steps);
     }
   }
   return match;

@@ -11,12 +11,12 @@
 
 namespace panonav {
 
-/// The local features of one panorama: corners that stand out among those within 6 degrees of
-/// azimuth, at most `max_count`, each with an upright binary descriptor. A turn of the robot by
-/// whole columns moves them and changes nothing else.
+/// Local features of one panorama: the strongest corners within 6 degrees of azimuth, at most
+/// `max_count` in all, each with an upright binary descriptor. A rotation of the robot by whole
+/// columns only shifts their columns.
 struct LocalFeatures {
-  /// Number of features that two views share when a robot with a vertical axis has turned and moved
-  /// on level ground from one to the other.
+  /// Result of matching two views: the number of features consistent with one planar motion
+  /// (rotation and translation on level ground) between them.
   struct Match {
     int verified = 0;  ///< matched features that one turn and one direction of motion explain
     /// Heading of the query minus heading of the reference, in [-pi, pi), in steps of 2 pi / 128; 0
@@ -34,7 +34,7 @@ struct LocalFeatures {
   };
 
   static constexpr int max_count = 256;  ///< features kept of a view at most, the strongest ones
-  /// Of the packed form: column, row, bits, all little-endian.
+  /// Bytes of a packed feature: column, row, bits, all little-endian.
   static constexpr std::size_t packed_bytes = 36;
 
   PanoramaShape shape;            ///< of the panorama
@@ -43,9 +43,9 @@ struct LocalFeatures {
   friend bool operator==(const LocalFeatures&, const LocalFeatures&) = default;
 };
 
-/// Extracts the features; nullopt where the elevations of the rows are unknown: features of two
-/// views are compared by their directions in space. A view without structure has no features.
-/// Masked rows hold none. Cost: about 1 ms for 80 x 512.
+/// Extracts the features; nullopt if the elevations of the rows are unknown, since features are
+/// compared by their directions in space. Masked rows and views without structure yield no
+/// features. Cost: about 1 ms for 80 x 512.
 [[nodiscard]] std::optional<LocalFeatures> extract_features(
     const Panorama& panorama, const PreprocessingOptions& preprocessing = {});
 
@@ -58,10 +58,10 @@ struct LocalFeatures {
 
 /// Verifies matches spatially (docs/equations.md, Local features): features that are each other's
 /// nearest by Hamming distance, and of these the largest set that one turn and one direction of
-/// motion explain, with nothing nearer than half the way. The number is the same when query and
-/// reference change places, but for rounding. Where `more_than` features or fewer are verified, the
-/// answer is that of none, and comes sooner. Throws ContractError on views of another shape or
-/// band. Cost: about 0.06 ms with AVX2 for 120 features each.
+/// motion explain, where no feature is nearer than half the distance moved. Swapping query and
+/// reference gives the same number, up to rounding. If at most `more_than` features can be
+/// verified, the result is 0 features, and the search ends early. Throws ContractError on views of
+/// another shape or band. Cost: about 0.06 ms with AVX2 for 120 features each.
 [[nodiscard]] LocalFeatures::Match match_features(const LocalFeatures& query,
                                                   const LocalFeatures& reference,
                                                   int more_than = 0);

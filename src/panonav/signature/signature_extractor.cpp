@@ -13,8 +13,8 @@ namespace panonav {
 
 namespace {
 
-/// Mean and sum of squared deviations from it, of all values so far. Blocks are merged by the rule
-/// of Chan, Golub and LeVeque, so that nothing cancels however small the contrast is.
+/// Running mean and standard deviation of all values added. Blocks are merged by the formula of
+/// Chan, Golub and LeVeque, which avoids cancellation even at very low contrast.
 class Moments {
  public:
   void add(std::span<const float> values) {
@@ -35,8 +35,8 @@ class Moments {
   [[nodiscard]] double standard_deviation() const { return std::sqrt(squares_ / count_); }
 
  private:
-  /// Sixteen partial sums: the compiler adds them as vectors, in an order that is the same
-  /// everywhere.
+  /// Sums function(value) in 16 partial sums, which the compiler vectorises without changing the
+  /// order of the additions, so that results are equal on all machines.
   template <class Function>
   static double sum(std::span<const float> values, Function function) {
     std::array<float, 16> partial{};
@@ -57,10 +57,10 @@ class Moments {
 
 }  // namespace
 
-/// Takes a panorama's rows in blocks from the top, then gives its signature.
-class SignatureExtractor::Rows {
+/// Transforms the rows of a panorama block by block and then computes its signature.
+class SignatureExtractor::RowAccumulator {
  public:
-  Rows(const SignatureExtractor& extractor, Workspace& workspace)
+  RowAccumulator(const SignatureExtractor& extractor, Workspace& workspace)
       : extractor_(extractor),
         rows_(static_cast<std::size_t>(extractor.rows_)),
         columns_(static_cast<std::size_t>(extractor.transform_.columns())),
@@ -84,7 +84,8 @@ class SignatureExtractor::Rows {
     }
   }
 
-  /// The steps of `preprocess` are linear in each row, so they may as well follow the transform.
+  /// Applies preprocessing to the coefficients and returns the signature. Subtracting the mean and
+  /// scaling commute with the linear transform, so both can follow it.
   [[nodiscard]] FourierSignature finish(const std::optional<ElevationBand>& elevations) {
     if (extractor_.preprocessing_.remove_mean) {
       // k = 0 is twice the mean of its row.
@@ -146,7 +147,7 @@ FourierSignature SignatureExtractor::signature(const Panorama& panorama,
   if (preprocessing_.edge_channel) {
     return compute_signature(preprocess(panorama, preprocessing_), transform_);
   }
-  Rows rows(*this, workspace);
+  RowAccumulator rows(*this, workspace);
   const auto values = panorama.values();
   const auto columns = static_cast<std::size_t>(panorama.columns());
   const std::size_t block = Unwarper::rows_per_block * columns;
@@ -162,7 +163,7 @@ FourierSignature SignatureExtractor::signature(const Unwarper& unwarper, ImageVi
   if (preprocessing_.edge_channel) {
     return signature(unwarper.unwrap(image, workspace.unwarping), workspace);
   }
-  Rows rows(*this, workspace);
+  RowAccumulator rows(*this, workspace);
   unwarper.unwrap_blocks(image, workspace.unwarping,
                          [&](int first_row, std::span<const float> values) {
                            rows.add_rows(static_cast<std::size_t>(first_row), values);

@@ -11,15 +11,15 @@
 
 namespace panonav {
 
-/// Makes signatures of pictures: preprocessing and transform in one pass, row by row while a row is
-/// in the cache. The result is that of
+/// Computes signatures of panoramas or camera images: preprocessing and transform
+/// in one pass over blocks of rows, while they are in the cache. The result equals
 ///   compute_signature(preprocess(panorama, preprocessing), components)
-/// up to rounding: coefficients differ by at most 2e-6 of the largest magnitude before the mean is
-/// removed. Only the edge channel needs the whole panorama at once. Immutable after construction;
-/// several threads may use one at a time, each with its own Workspace.
+/// up to rounding: coefficients differ by at most 2e-6 of the largest magnitude before the
+/// mean is removed. Only the edge channel needs the whole panorama at once. Immutable after
+/// construction; several threads may share an extractor, each with its own Workspace.
 class SignatureExtractor {
  public:
-  /// Buffers that are reused from picture to picture; what they hold between calls does not matter.
+  /// Buffers reused from image to image; their contents between calls are irrelevant.
   struct Workspace {
     Unwarper::Workspace unwarping;  ///< of `Unwarper`
     std::vector<float> real,        ///< Fourier sums of the rows, the cosine parts
@@ -35,21 +35,20 @@ class SignatureExtractor {
   [[nodiscard]] const PreprocessingOptions& preprocessing() const noexcept {
     return preprocessing_;
   }
-  /// Rows and components of the signatures that it makes.
+  /// Rows and components of the computed signatures.
   [[nodiscard]] SignatureShape shape() const noexcept { return {rows_, transform_.components()}; }
 
   /// Computes the signature of a panorama. Throws ContractError on another shape.
   [[nodiscard]] FourierSignature signature(const Panorama& panorama, Workspace& workspace) const;
 
-  /// Computes the signature of the panorama that `unwarper` would make of the image, to the bit.
-  /// Throws
-  /// ContractError unless the image has the camera's size (colour becomes grey) and the unwarper's
-  /// cylinder this shape.
+  /// Unwarps the image and computes its signature; the result is bit-identical to that of
+  /// `unwarper.unwrap(image)`. Throws ContractError unless the image has the camera's size (colour
+  /// becomes grey) and the unwarper this extractor's rows and columns.
   [[nodiscard]] FourierSignature signature(const Unwarper& unwarper, ImageView image,
                                            Workspace& workspace) const;
 
  private:
-  class Rows;
+  class RowAccumulator;
   void require_shape(int rows, int columns) const;
 
   int rows_;

@@ -19,12 +19,12 @@ namespace {
 /// Directions in which the coarse search samples a circle; finer searches sample it every 3 px.
 constexpr int coarse_directions = 96;
 
-/// One sample for each `spacing` of circumference, 48 to 720.
+/// Returns the number of samples of a circle: one per `spacing` of its circumference, 48 to 720.
 int sample_count(double radius, double spacing) {
   return std::clamp(static_cast<int>(2 * std::numbers::pi * radius / spacing), 48, 720);
 }
 
-/// Bilinear; the point must lie inside [0.5, width - 0.5] x [0.5, height - 0.5] or is clamped to
+/// Interpolates bilinearly; points outside [0.5, width - 0.5] x [0.5, height - 0.5] are clamped to
 /// it.
 template <class Planes>
 float sample_bilinear(const Planes& image, const std::vector<float>& plane, double u, double v) {
@@ -60,7 +60,7 @@ std::array<Direction, coarse_directions> make_directions() {
   return result;
 }
 
-/// Sums the edge field along one circle.
+/// Averages the edge field along one circle, in sectors.
 class SectorScore {
  public:
   static constexpr int sectors = 12;
@@ -71,10 +71,10 @@ class SectorScore {
     ++samples_[sector];
     ++visible_;
   }
-  [[nodiscard]] CircleScore result(int count, Evenness evenness) const {
+  [[nodiscard]] CircleScore result(int count, EdgeAveraging averaging) const {
     if (visible_ == 0) return {};
     const double visible = static_cast<double>(visible_) / count;
-    if (evenness == Evenness::mean) {
+    if (averaging == EdgeAveraging::mean) {
       return {static_cast<double>(std::accumulate(sum_.begin(), sum_.end(), 0.0F)) / visible_,
               visible};
     }
@@ -95,7 +95,7 @@ class SectorScore {
   int visible_ = 0;
 };
 
-/// Score by the nearest pixels in 96 directions, for exhaustive search.
+/// Computes the merit of a circle from the nearest pixels in 96 directions, for exhaustive search.
 double coarse_merit(const EdgeField& field, const std::array<Direction, coarse_directions>& rays,
                     const FieldCircle& circle, const CircleRange& range) {
   SectorScore total;
@@ -108,11 +108,11 @@ double coarse_merit(const EdgeField& field, const std::array<Direction, coarse_d
     total.add(i, coarse_directions,
               field.cosine[at] * ray.double_cosine + field.sine[at] * ray.double_sine);
   }
-  return figure_of_merit(total.result(coarse_directions, range.evenness), range);
+  return figure_of_merit(total.result(coarse_directions, range.averaging), range);
 }
 
-/// Computes the merit of all centres at once: a circle about every pixel is a sum of the field
-/// shifted by its radius in each direction, in loops that a compiler vectorises.
+/// Computes the merit of circles of one radius around all pixels at once: sums copies of the field
+/// that are shifted by the radius in each direction, in loops that the compiler vectorises.
 class ShiftedSums {
  public:
   explicit ShiftedSums(const EdgeField& field) : width_(field.width), height_(field.height) {
@@ -126,19 +126,19 @@ class ShiftedSums {
     }
   }
 
-  /// The merit of the circles of one radius about every pixel's centre.
+  /// Computes the merit of the circle of this radius around each pixel's centre.
   void compute_merits(int radius, const CircleRange& range, std::span<float> merit) const {
     std::vector<float> sum(merit.size());
     std::vector<float> samples(merit.size());
     std::vector<float> roots(merit.size(), 0.0F);
     std::vector<float> sectors_seen(merit.size(), 0.0F);
     std::vector<float> visible(merit.size(), 0.0F);
-    constexpr int in_sector = coarse_directions / SectorScore::sectors;
+    constexpr int directions_per_sector = coarse_directions / SectorScore::sectors;
     for (int sector = 0; sector < SectorScore::sectors; ++sector) {
       std::fill(sum.begin(), sum.end(), 0.0F);
       std::fill(samples.begin(), samples.end(), 0.0F);
-      for (int i = sector * in_sector; i < (sector + 1) * in_sector; ++i) {
-        add_shifted(i, radius, sum, samples);
+      for (int i = sector * directions_per_sector; i < (sector + 1) * directions_per_sector; ++i) {
+        add_shifted_plane(i, radius, sum, samples);
       }
       for (std::size_t k = 0; k < merit.size(); ++k) {
         const float mean = std::max(0.0F, sum[k]) / std::max(1.0F, samples[k]);
@@ -155,8 +155,8 @@ class ShiftedSums {
   }
 
  private:
-  void add_shifted(int direction, int radius, std::vector<float>& sum,
-                   std::vector<float>& samples) const {
+  void add_shifted_plane(int direction, int radius, std::vector<float>& sum,
+                         std::vector<float>& samples) const {
     const Direction& ray = rays_[direction];
     const std::vector<float>& plane = across_[direction % (coarse_directions / 2)];
     const int du = static_cast<int>(std::lround(radius * ray.cosine));
@@ -185,7 +185,8 @@ struct EdgePoint {
   double v = 0.0;
 };
 
-/// Along the ray the strongest edge within `reach` of the radius, near ones preferred.
+/// Finds the strongest edge on the ray within `reach` px of the circle; edges near the circle are
+/// preferred.
 std::optional<EdgePoint> find_edge_on_ray(std::span<const SmoothPlanes> images,
                                           const FieldCircle& circle, double cosine, double sine,
                                           double reach) {
@@ -240,7 +241,8 @@ std::optional<EdgePoint> find_edge_on_ray(std::span<const SmoothPlanes> images,
   return EdgePoint{circle.u + r * cosine, circle.v + r * sine};
 }
 
-/// A circle through points as `minimise` sees it: Tukey's weights of their distances to it.
+/// The least-squares problem of `minimise` for a circle through points, with Tukey weights of their
+/// distances to it.
 class CircleProblem {
  public:
   using Equations = DenseEquations<3>;
@@ -256,7 +258,7 @@ class CircleProblem {
     for (const EdgePoint& p : points_) {
       deviations.push_back(std::abs(std::hypot(p.u - circle.u, p.v - circle.v) - circle.radius));
     }
-    // A parabola through an edge is accurate to a tenth of a pixel at best.
+    // Interpolated edge positions are accurate to a tenth of a pixel at best.
     const double scale = tukey * std::max(0.1, 1.4826 * upper_median(deviations));
     equations.set_zero();
     double weights = 0;
@@ -295,13 +297,13 @@ class CircleProblem {
   CircleFit fit_;
 };
 
-/// Returns the circle of least squares, its residual the weighted root mean square. Empty when the
-/// points do not determine a circle.
+/// Fits a circle by robust least squares; the residual is the weighted root mean square distance.
+/// nullopt if the points do not determine a circle.
 std::optional<CircleFit> fit_circle_to_points(const std::vector<EdgePoint>& points,
                                               FieldCircle circle) {
   CircleProblem problem(points, circle);
   CircleProblem::Equations equations;
-  // An arc too short leaves centre and radius undetermined.
+  // Rejects arcs that are too short to determine centre and radius.
   equations.min_reciprocal_condition = 1e-5;
   const LeastSquaresReport solved = minimise(problem, equations, {.max_steps = 20});
   if (!solved.solvable || problem.fit().circle.radius <= 0) return std::nullopt;
@@ -310,10 +312,12 @@ std::optional<CircleFit> fit_circle_to_points(const std::vector<EdgePoint>& poin
 
 }  // namespace
 
-CircleScore score_circle(const EdgeField& field, const FieldCircle& circle, Evenness evenness) {
+CircleScore score_circle(const EdgeField& field, const FieldCircle& circle,
+                         EdgeAveraging averaging) {
   const int count = sample_count(circle.radius, 3.0);
   SectorScore total;
-  // One turn in equal steps by rotating a unit vector; the rounding of 720 steps stays below 1e-12.
+  // Steps around the circle by rotating a unit vector; after 720 steps the rounding error is below
+  // 1e-12.
   const double step_cosine = std::cos(2 * std::numbers::pi / count);
   const double step_sine = std::sin(2 * std::numbers::pi / count);
   double next_cosine = 1;
@@ -332,13 +336,13 @@ CircleScore score_circle(const EdgeField& field, const FieldCircle& circle, Even
               sample_bilinear(field, field.cosine, u, v) * across +
                   sample_bilinear(field, field.sine, u, v) * along);
   }
-  return total.result(count, evenness);
+  return total.result(count, averaging);
 }
 
 std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleRange& range,
                                            int count) {
-  const int lowest = std::max(2, static_cast<int>(std::floor(range.lowest_radius)));
-  const int highest = std::max(lowest, static_cast<int>(std::ceil(range.highest_radius)));
+  const int lowest = std::max(2, static_cast<int>(std::floor(range.min_radius)));
+  const int highest = std::max(lowest, static_cast<int>(std::ceil(range.max_radius)));
   const int radii = highest - lowest + 1;
   const std::size_t area = field.index(0, field.height);
   const auto at = [&](int u, int v, int r) { return r * area + field.index(u, v); };
@@ -351,7 +355,7 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
     float merit;
     FieldCircle circle;
   };
-  const auto highest_around = [&](int u, int v, int r) {
+  const auto is_local_maximum = [&](int u, int v, int r) {
     const float here = merit[at(u, v, r)];
     for (int k = std::max(0, r - 1); k <= std::min(radii - 1, r + 1); ++k) {
       for (int y = std::max(0, v - 1); y <= std::min(field.height - 1, v + 1); ++y) {
@@ -362,13 +366,14 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
     }
     return true;
   };
-  // About the centre of a mirror there is more than one circle: disc, holder, arcs of the scene. A
-  // circle counts by its own merit and by half of what its whole centre has.
-  std::vector<float> about_centre(area, 0.0F);
+  // A mirror has several circles around its centre: disc, holder, arcs of the scene. Circles are
+  // therefore ranked by their own merit plus half of the root of the summed squared merits of all
+  // circles around the same centre.
+  std::vector<float> centre_merit(area, 0.0F);
   for (int r = 0; r < radii; ++r) {
     for (std::size_t k = 0; k < area; ++k) {
       const float here = std::max(0.0F, merit[r * area + k]);
-      about_centre[k] += here * here;
+      centre_merit[k] += here * here;
     }
   }
   std::vector<Candidate> candidates;
@@ -376,8 +381,8 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
     for (int v = 0; v < field.height; ++v) {
       for (int u = 0; u < field.width; ++u) {
         const float here = merit[at(u, v, r)];
-        if (here <= 0 || !highest_around(u, v, r)) continue;
-        const float total = here + 0.5F * std::sqrt(about_centre[field.index(u, v)]);
+        if (here <= 0 || !is_local_maximum(u, v, r)) continue;
+        const float total = here + 0.5F * std::sqrt(centre_merit[field.index(u, v)]);
         candidates.push_back({total, {u + 0.5, v + 0.5, static_cast<double>(lowest + r)}});
       }
     }
@@ -397,7 +402,7 @@ std::vector<FieldCircle> concentric_candidates(const EdgeField& field, double u,
   const auto rays = make_directions();
   std::vector<double> merits;
   std::vector<FieldCircle> circles;
-  for (double radius = range.lowest_radius; radius <= range.highest_radius; radius += step) {
+  for (double radius = range.min_radius; radius <= range.max_radius; radius += step) {
     double best = -1;
     FieldCircle best_circle{u, v, radius};
     for (double y = -centre_reach; y <= centre_reach; y += step) {
@@ -425,7 +430,7 @@ std::vector<FieldCircle> concentric_candidates(const EdgeField& field, double u,
 FieldCircle climb_to_maximum(const EdgeField& field, const FieldCircle& start,
                              const CircleRange& range) {
   FieldCircle best = start;
-  double best_merit = figure_of_merit(score_circle(field, best, range.evenness), range);
+  double best_merit = figure_of_merit(score_circle(field, best, range.averaging), range);
   for (double step = 2; step >= 0.25; step /= 2) {
     for (int round = 0; round < 20; ++round) {
       const FieldCircle from = best;
@@ -435,7 +440,7 @@ FieldCircle climb_to_maximum(const EdgeField& field, const FieldCircle& start,
           for (int dr = -1; dr <= 1; ++dr) {
             const FieldCircle next{from.u + du * step, from.v + dv * step, from.radius + dr * step};
             if (next.radius < 2) continue;
-            const double merit = figure_of_merit(score_circle(field, next, range.evenness), range);
+            const double merit = figure_of_merit(score_circle(field, next, range.averaging), range);
             if (merit > best_merit) {
               best_merit = merit;
               best = next;
@@ -450,7 +455,7 @@ FieldCircle climb_to_maximum(const EdgeField& field, const FieldCircle& start,
   return best;
 }
 
-double fit_tolerance(double radius) {
+double fit_tolerance_px(double radius) {
   return std::max(0.75, 0.002 * radius);
 }
 
@@ -459,7 +464,8 @@ std::optional<CircleFit> fit_circle(std::span<const SmoothPlanes> images,
   require(!images.empty(), "number of images", 0, "at least 1");
   FieldCircle circle = start;
   CircleFit fit;
-  // Half the window at first: what the coarse search may be off; at last: the width of an edge.
+  // Half-widths of the search window, in px: first the error of the coarse search, last the width
+  // of an edge.
   for (const double reach :
        {std::max(4.0, 0.03 * start.radius), std::max(3.0, 0.01 * start.radius), 2.5, 2.5}) {
     const int count = sample_count(circle.radius, 1.5);
@@ -485,7 +491,7 @@ std::optional<CircleFit> fit_circle(std::span<const SmoothPlanes> images,
     circle = fit.circle;
     const auto near = std::count_if(points.begin(), points.end(), [&](const EdgePoint& p) {
       return std::abs(std::hypot(p.u - circle.u, p.v - circle.v) - circle.radius) <=
-             fit_tolerance(circle.radius);
+             fit_tolerance_px(circle.radius);
     });
     fit.support = static_cast<double>(near) / visible;
   }

@@ -28,8 +28,8 @@ std::vector<float> make_gaussian_kernel(double sigma_px) {
   return kernel;
 }
 
-std::vector<float> smooth(const std::vector<float>& plane, int width, int height,
-                          const std::vector<float>& kernel) {
+std::vector<float> smooth_plane(const std::vector<float>& plane, int width, int height,
+                                const std::vector<float>& kernel) {
   const int reach = static_cast<int>(kernel.size() / 2);
   std::vector<float> rows(plane.size());
   std::vector<float> result(plane.size());
@@ -56,7 +56,8 @@ std::vector<float> smooth(const std::vector<float>& plane, int width, int height
   return result;
 }
 
-/// The steepest slope over the channels; one-sided at the frame.
+/// Computes the gradient of the channel with the steepest slope; one-sided differences at the
+/// frame.
 Gradient find_largest_gradient(const SmoothPlanes& planes, int u, int v) {
   const int left = std::max(0, u - 1);
   const int right = std::min(planes.width - 1, u + 1);
@@ -76,7 +77,7 @@ Gradient find_largest_gradient(const SmoothPlanes& planes, int u, int v) {
 
 }  // namespace
 
-SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
+SmoothPlanes make_smooth_planes(ImageView image, int reduction, double sigma_px) {
   require(image.data != nullptr && image.width >= 1 && image.height >= 1, "image width",
           image.width, "an image with pixels");
   require(reduction >= 1 && reduction <= std::min(image.width, image.height), "reduction",
@@ -101,7 +102,7 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
         plane[planes.index(u, v)] = static_cast<float>(sum) / area;
       }
     }
-    planes.channels.push_back(smooth(plane, planes.width, planes.height, kernel));
+    planes.channels.push_back(smooth_plane(plane, planes.width, planes.height, kernel));
   }
   std::vector<float> slopes;
   slopes.reserve(size);
@@ -109,9 +110,9 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
     for (int u = 0; u < planes.width; ++u)
       slopes.push_back(find_largest_gradient(planes, u, v).squared);
   }
-  const auto fifth = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() * 4 / 5);
-  std::nth_element(slopes.begin(), fifth, slopes.end());
-  planes.slope_scale = std::max(1.0F, std::sqrt(*fifth));
+  const auto percentile_80 = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() * 4 / 5);
+  std::nth_element(slopes.begin(), percentile_80, slopes.end());
+  planes.slope_scale = std::max(1.0F, std::sqrt(*percentile_80));
   return planes;
 }
 

@@ -14,49 +14,52 @@ namespace panonav::dual_fisheye {
 /// prior.
 class LensFit {
  public:
-  /// Takes the standard deviation of each parameter about the prior, and how far apart the finest
-  /// values of the pictures are. `mirror_sign`: see `PosedLens`.
-  LensFit(const Eigen::VectorXd& prior_deviations, double fine_rad, double mirror_sign,
+  /// `prior_deviations`: standard deviation of each parameter about the prior. `fine_step_rad`:
+  /// angle between samples at the finest resolution. `mirror_sign`: see `PosedLens`.
+  LensFit(const Eigen::VectorXd& prior_deviations, double fine_step_rad, double mirror_sign,
           Executor& executor);
 
-  /// A prior, and how far the parameters are from it.
+  /// Parameters as a prior and their offset from it.
   struct Parameters {
     State prior;
     Eigen::VectorXd offset;
   };
-  /// Begins again at a prior.
-  void restart(const State& prior);
-  [[nodiscard]] const Parameters& parameters() const { return at_; }
-  /// Continues from there.
-  void set_parameters(const Parameters& parameters) { at_ = parameters; }
+  /// Sets the parameters to the prior.
+  void reset_to_prior(const State& prior);
+  [[nodiscard]] const Parameters& parameters() const { return current_; }
+  /// Sets the parameters and their prior, for example to those of an earlier fit.
+  void set_parameters(const Parameters& parameters) { current_ = parameters; }
 
-  /// Moves the parameters to the nearest minimum of `cost`; learns the deviation of a match.
+  /// Minimises `cost` from the present parameters; also estimates the standard deviation of a
+  /// match.
   void solve(const std::vector<Match>& matches);
-  /// Ends the lenses at these radii in pixels; false where the image's radius does not grow up to
-  /// there.
+  /// Sets the fields of view so that they end at these image radii; false if a lens's image radius
+  /// does not grow monotonically up to there.
   [[nodiscard]] bool set_max_angles(const std::array<double, 2>& radii_px);
 
-  [[nodiscard]] State state() const { return apply_change(at_.prior, at_.offset); }
-  /// Returns the standard deviation of a match.
+  [[nodiscard]] State state() const { return apply_change(current_.prior, current_.offset); }
+  /// Returns the estimated standard deviation of a match.
   [[nodiscard]] double deviation_rad() const { return deviation_rad_; }
   /// Returns the covariance of all parameters for residuals that are correlated within a region
   /// (White's sandwich with clusters).
   [[nodiscard]] Eigen::MatrixXd covariance(const std::vector<Match>& matches) const;
 
  private:
-  using Slopes = Eigen::Matrix<double, 2, 2 * (lens_size + rotation_size)>;
-  class Linearised;
+  using Slopes = Eigen::Matrix<double, 2, 2 * (lens_parameter_count + rotation_parameter_count)>;
+  class LinearisedLenses;
   class Problem;
-  /// Returns the information of the matches about all parameters; `right`: where the cost falls.
-  [[nodiscard]] Eigen::MatrixXd normal(const State& state, const std::vector<Match>& matches,
-                                       Eigen::VectorXd& right) const;
+  /// Computes the normal equations of prior and matches: returns the matrix, and in `right` the
+  /// negative gradient of the cost.
+  [[nodiscard]] Eigen::MatrixXd compute_normal_equations(const State& state,
+                                                         const std::vector<Match>& matches,
+                                                         Eigen::VectorXd& right) const;
   [[nodiscard]] double cost(const Eigen::VectorXd& offset, const std::vector<Match>& matches) const;
-  /// Takes the deviation of a match from the median residual.
+  /// Estimates the standard deviation of a match from the median residual.
   void update_deviation(const std::vector<Match>& matches);
 
-  Parameters at_;
+  Parameters current_;
   Eigen::VectorXd prior_information_;
-  double fine_rad_;
+  double fine_step_rad_;
   double mirror_sign_;
   Executor& executor_;
   double deviation_rad_ = 0.01;

@@ -32,16 +32,16 @@ Matrix3d rig_from_lens(const FisheyeLens& lens) {
 
 }  // namespace
 
-void add_to(FisheyeLens& lens, int parameter, double change) {
+void add_to_parameter(FisheyeLens& lens, int parameter, double change) {
   using L = FisheyeLens;
-  constexpr std::array<double L::*, lens_size> members{
+  constexpr std::array<double L::*, lens_parameter_count> members{
       &L::centre_u_px, &L::centre_v_px, &L::focal_length_px, &L::k3,
       &L::k5,          &L::azimuth_rad, &L::elevation_rad,   &L::roll_rad};
   double& value = lens.*members[parameter];
   value = parameter == 2 ? value * std::exp(change) : value + change;
 }
 
-void add_to(RigRotation& rotation, int parameter, double change) {
+void add_to_parameter(RigRotation& rotation, int parameter, double change) {
   (parameter == 0   ? rotation.yaw_rad
    : parameter == 1 ? rotation.roll_rad
                     : rotation.pitch_rad) += change;
@@ -49,11 +49,12 @@ void add_to(RigRotation& rotation, int parameter, double change) {
 
 State apply_change(State state, const Eigen::VectorXd& change) {
   for (int lens = 0; lens < 2; ++lens) {
-    for (int i = 0; i < lens_size; ++i) add_to(state.lenses[lens], i, change[lens_at(lens) + i]);
+    for (int i = 0; i < lens_parameter_count; ++i)
+      add_to_parameter(state.lenses[lens], i, change[lens_at(lens) + i]);
   }
   for (int p = 0; p < static_cast<int>(state.rotations.size()); ++p) {
-    for (int i = 0; i < rotation_size; ++i)
-      add_to(state.rotations[p], i, change[rotation_at(p) + i]);
+    for (int i = 0; i < rotation_parameter_count; ++i)
+      add_to_parameter(state.rotations[p], i, change[rotation_offset(p) + i]);
   }
   return state;
 }
@@ -64,7 +65,8 @@ Matrix3d world_from_lens(const RigRotation& rotation, const FisheyeLens& lens) {
 
 PosedLens::PosedLens(const FisheyeLens& lens, const RigRotation& rotation, double mirror_sign)
     : lens_(lens), world_from_lens_(world_from_lens(rotation, lens)), mirror_sign_(mirror_sign) {
-  // Rays that other parameters see beyond the circle still have a slope.
+  // Extends the field of view by 10 %, so that rays slightly beyond the circle still have a
+  // derivative.
   lens_.max_angle_rad = std::min(std::numbers::pi, 1.1 * lens_.max_angle_rad);
 }
 

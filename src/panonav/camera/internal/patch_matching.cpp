@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// The light of one picture, smoothed to a distance of values.
+/// Grey levels of one picture, reduced by `reduction` and smoothed.
 struct Plane {
   int reduction = 1, width = 0, height = 0;
   const std::vector<float>* values = nullptr;
@@ -28,12 +28,14 @@ Plane make_plane(const SmoothPlanes& smooth, int reduction) {
   return {reduction, smooth.width, smooth.height, &smooth.channels[0]};
 }
 
-/// Patches are 15 x 15 values; at the finest level about 5 degrees in pictures of 1280 x 640.
-constexpr int reach = 7;
-constexpr int side_length = 2 * reach + 1;
-/// Weaker patches are noise: 8-bit rounding, and what is left of a sensor's noise after smoothing.
+/// Half-width of a patch, which has 15 x 15 values: at the finest level about 5 degrees in pictures
+/// of 1280 x 640.
+constexpr int patch_radius = 7;
+constexpr int patch_side = 2 * patch_radius + 1;
+/// Smallest standard deviation of a patch, in grey levels: weaker ones are dominated by 8-bit
+/// rounding and sensor noise.
 constexpr double min_contrast = 3.0;
-/// Correlation from which on two patches show the same thing.
+/// Smallest correlation of two patches that are accepted as a match.
 constexpr double min_correlation = 0.7;
 
 struct Patch {
@@ -62,8 +64,8 @@ struct Correlation {
 };
 Correlation correlate(const Patch& a, const Patch& b, int dx, int dy) {
   double n = 0, sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
-  for (int y = -reach; y <= reach; ++y) {
-    for (int x = -reach; x <= reach; ++x) {
+  for (int y = -patch_radius; y <= patch_radius; ++y) {
+    for (int x = -patch_radius; x <= patch_radius; ++x) {
       const double p = a.at(x, y);
       const double q = b.at(x + dx, y + dy);
       if (p < 0 || q < 0) continue;
@@ -75,7 +77,7 @@ Correlation correlate(const Patch& a, const Patch& b, int dx, int dy) {
       sab += p * q;
     }
   }
-  if (n < 0.5 * side_length * side_length) return {};
+  if (n < 0.5 * patch_side * patch_side) return {};
   const double va = saa - sa * sa / n;
   const double vb = sbb - sb * sb / n;
   if (!(va > 0 && vb > 0.25 * min_contrast * min_contrast * n)) return {};
@@ -83,23 +85,26 @@ Correlation correlate(const Patch& a, const Patch& b, int dx, int dy) {
           std::log(std::max(sb, 1.0) / std::max(sa, 1.0))};
 }
 
-/// Computes the weights of errors across edges and along them; nullopt where contrast is too low.
+/// Computes a matrix that weights position errors: 1 across the patch's main edge direction, less
+/// along it. nullopt if the contrast is too low.
 std::optional<Eigen::Matrix2d> compute_whitener(const Patch& patch) {
   double n = 0, sum = 0, squares = 0;
   Eigen::Matrix2d tensor = Eigen::Matrix2d::Zero();
-  for (int y = -reach; y <= reach; ++y) {
-    for (int x = -reach; x <= reach; ++x) {
+  for (int y = -patch_radius; y <= patch_radius; ++y) {
+    for (int x = -patch_radius; x <= patch_radius; ++x) {
       const double here = patch.at(x, y);
       if (here < 0) continue;
       n += 1;
       sum += here;
       squares += here * here;
-      if (x == reach || y == reach || patch.at(x + 1, y) < 0 || patch.at(x, y + 1) < 0) continue;
+      if (x == patch_radius || y == patch_radius || patch.at(x + 1, y) < 0 ||
+          patch.at(x, y + 1) < 0)
+        continue;
       const Vector2d slope(patch.at(x + 1, y) - here, patch.at(x, y + 1) - here);
       tensor += slope * slope.transpose();
     }
   }
-  if (n < 0.5 * side_length * side_length) return std::nullopt;
+  if (n < 0.5 * patch_side * patch_side) return std::nullopt;
   if (squares - sum * sum / n < min_contrast * min_contrast * n) return std::nullopt;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(tensor);
@@ -110,14 +115,14 @@ std::optional<Eigen::Matrix2d> compute_whitener(const Patch& patch) {
   return Eigen::Matrix2d(axes * roots.asDiagonal() * axes.transpose());
 }
 
-/// A direction of the world with two directions orthogonal to it.
+/// A direction in the world with two directions orthogonal to it, and its region.
 struct Direction {
   Vector3d middle, east, north;
   int region = 0;
 };
-/// Returns direction i of `count`: evenly over the sphere (Fibonacci), but for the poles: floor or
-/// tripod, and the hand above.
-Direction direction_at(std::size_t i, int count) {
+/// Returns direction i of `count` evenly spread directions (Fibonacci lattice). The poles are left
+/// out, because they show floor or tripod and the hand above.
+Direction make_direction(std::size_t i, int count) {
   const double z = 0.94 * (1 - (2.0 * static_cast<double>(i) + 1) / count);
   const double azimuth = std::numbers::pi * (3 - std::sqrt(5.0)) * static_cast<double>(i);
   const double flat = std::sqrt(1 - z * z);
@@ -129,9 +134,9 @@ Direction direction_at(std::size_t i, int count) {
   return {middle, east, middle.cross(east), region};
 }
 
-/// Returns the pairs of views to match: the lenses of each picture, and all of one with all of the
-/// next; the last picture's next is the first.
-std::vector<std::array<int, 2>> view_pairs(int pictures) {
+/// Returns the pairs of views to match: both lenses of each picture, and each lens of a picture
+/// with each lens of the next one (cyclically).
+std::vector<std::array<int, 2>> list_view_pairs(int pictures) {
   std::vector<std::array<int, 2>> pairs;
   for (int p = 0; p < pictures; ++p) {
     pairs.push_back({2 * p, 2 * p + 1});
@@ -146,7 +151,7 @@ std::vector<std::array<int, 2>> view_pairs(int pictures) {
 
 }  // namespace
 
-/// One lens in one picture, posed as the state has it.
+/// One lens in one picture, with the pose given by the state.
 class PatchMatcher::View {
  public:
   View(const State& state, int picture, int lens, const Plane& plane, double mirror_sign)
@@ -163,7 +168,7 @@ class PatchMatcher::View {
     return Vector2d(lens_.centre_u_px + mirror_sign_ * point->right_px,
                     lens_.centre_v_px - point->up_px);
   }
-  /// Its grey level there; negative: not seen.
+  /// Returns the grey level in this direction; negative if the view does not show it.
   [[nodiscard]] float value(const Vector3d& in_world) const {
     const auto at = pixel(in_world);
     if (!at) return -1.0F;
@@ -188,12 +193,12 @@ class PatchMatcher::View {
 
 int Matching::count_near_expected() const {
   return static_cast<int>(
-      std::ranges::count_if(matches, [](const Match& match) { return match.off_steps <= 1.0; }));
+      std::ranges::count_if(matches, [](const Match& match) { return match.offset_steps <= 1.0; }));
 }
 
 void PatchMatcher::estimate_yaws(State& state, double step_rad, double left_azimuth_rad) {
-  static_cast<void>(planes(state, step_rad));
-  // The first reduction serves all fields of view that are tried: they differ little.
+  static_cast<void>(get_or_make_planes(state, step_rad));
+  // Uses the first reduction for all fields of view, which differ little.
   const int reduction = planes_.front().first;
   const std::vector<SmoothPlanes>& smooth_pictures = planes_.front().second;
   constexpr int columns = 360;  // a value a degree
@@ -241,25 +246,27 @@ void PatchMatcher::estimate_yaws(State& state, double step_rad, double left_azim
 /// Matches patches around one direction of the world between pairs of views that see it.
 class PatchMatcher::Search {
  public:
-  Search(const std::vector<View>& views, const Direction& direction, double step_rad, int search)
+  Search(const std::vector<View>& views, const Direction& direction, double step_rad,
+         int search_steps)
       : views_(views),
         direction_(direction),
         step_rad_(step_rad),
-        search_(search),
-        areas_(views.size()) {}
+        search_steps_(search_steps),
+        search_areas_(views.size()) {}
 
-  /// Adds the match of views a and b to `found`, where both see a patch with contrast that agrees.
+  /// Matches the patch of view a in view b and appends the match, if there is one, to `found`;
+  /// counts the patch as textured if both views have contrast there.
   void add_match(int a, int b, Matching& found) {
     const auto pixel = views_[a].pixel(direction_.middle);
     if (!pixel || !views_[b].pixel(direction_.middle)) return;
-    const auto whitener = compute_whitener(area(a));
+    const auto whitener = compute_whitener(get_or_cut_area(a));
     if (!whitener) return;
-    const std::vector<Correlation> at = correlations(a, b);
+    const std::vector<Correlation> at = correlate_all_offsets(a, b);
     const auto best =
         static_cast<int>(std::ranges::max_element(at, {}, &Correlation::value) - at.begin());
-    if (at[best].value < -0.5) return;  // the other view lacks the patch, or contrast there
-    ++found.textured;
-    const int width = 2 * search_ + 1;
+    if (at[best].value < -0.5) return;  // view b does not show the patch, or has no contrast there
+    ++found.textured_count;
+    const int width = 2 * search_steps_ + 1;
     const int x = best % width;
     const int y = best / width;
     if (at[best].value < min_correlation || x == 0 || y == 0 || x == width - 1 || y == width - 1) {
@@ -272,8 +279,8 @@ class PatchMatcher::Search {
       return bend < 0 ? std::clamp(0.5 * (low - high) / bend, -0.5, 0.5) : 0.0;
     };
     const auto& [middle, east, north, region] = direction_;
-    const double dx = x - search_ + vertex(1);
-    const double dy = y - search_ + vertex(width);
+    const double dx = x - search_steps_ + vertex(1);
+    const double dy = y - search_steps_ + vertex(width);
     const auto other = views_[b].pixel(middle + step_rad_ * (dx * east + dy * north));
     if (!other) return;
     found.matches.push_back({{ImagePoint{a / 2, a % 2, *pixel}, ImagePoint{b / 2, b % 2, *other}},
@@ -286,21 +293,22 @@ class PatchMatcher::Search {
   }
 
  private:
-  /// Returns the patch of a view with all that is searched around it.
-  [[nodiscard]] const Patch& area(int view) {
-    if (!areas_[view]) {
-      areas_[view] = cut_patch(views_[view], direction_.middle, direction_.east, direction_.north,
-                               step_rad_, reach + search_);
+  /// Returns the search area of a view, cut from the image at the first call.
+  [[nodiscard]] const Patch& get_or_cut_area(int view) {
+    if (!search_areas_[view]) {
+      search_areas_[view] = cut_patch(views_[view], direction_.middle, direction_.east,
+                                      direction_.north, step_rad_, patch_radius + search_steps_);
     }
-    return *areas_[view];
+    return *search_areas_[view];
   }
-  /// Correlates the patch of view a with view b at every offset of the search window, in row-major
-  /// order.
-  [[nodiscard]] std::vector<Correlation> correlations(int a, int b) {
+  /// Correlates the patch of view a with view b at every offset of the search window; the result is
+  /// row-major.
+  [[nodiscard]] std::vector<Correlation> correlate_all_offsets(int a, int b) {
     std::vector<Correlation> at;
-    const int width = 2 * search_ + 1;
+    const int width = 2 * search_steps_ + 1;
     for (int i = 0; i < width * width; ++i) {
-      at.push_back(correlate(area(a), area(b), i % width - search_, i / width - search_));
+      at.push_back(correlate(get_or_cut_area(a), get_or_cut_area(b), i % width - search_steps_,
+                             i / width - search_steps_));
     }
     return at;
   }
@@ -308,35 +316,36 @@ class PatchMatcher::Search {
   const std::vector<View>& views_;
   Direction direction_;
   double step_rad_;
-  int search_;
-  std::vector<std::optional<Patch>> areas_;
+  int search_steps_;
+  std::vector<std::optional<Patch>> search_areas_;
 };
 
-Matching PatchMatcher::match(const State& state, double step_rad, int search, int directions) {
-  const auto& [reduction, smooth] = planes(state, step_rad);
+Matching PatchMatcher::match(const State& state, double step_rad, int search_steps,
+                             int directions) {
+  const auto& [reduction, smooth] = get_or_make_planes(state, step_rad);
   const int count = static_cast<int>(grey_.size());
   std::vector<View> views;
   for (int p = 0; p < count; ++p) {
     const Plane plane = make_plane(smooth[p], reduction);
     for (int lens = 0; lens < 2; ++lens) views.emplace_back(state, p, lens, plane, mirror_sign_);
   }
-  const auto pairs = view_pairs(count);
+  const auto pairs = list_view_pairs(count);
   const auto directions_size = static_cast<std::size_t>(directions);
   std::vector<Matching> found(directions_size);
   executor_.for_chunks(directions_size, 1, [&](std::size_t begin, std::size_t, std::size_t) {
-    Search here(views, direction_at(begin, directions), step_rad, search);
+    Search here(views, make_direction(begin, directions), step_rad, search_steps);
     for (const auto& [a, b] : pairs) here.add_match(a, b, found[begin]);
   });
   Matching all;
   for (Matching& part : found) {
-    all.textured += part.textured;
+    all.textured_count += part.textured_count;
     std::ranges::move(part.matches, std::back_inserter(all.matches));
   }
   return all;
 }
 
-const std::pair<int, std::vector<SmoothPlanes>>& PatchMatcher::planes(const State& state,
-                                                                      double step_rad) {
+const std::pair<int, std::vector<SmoothPlanes>>& PatchMatcher::get_or_make_planes(
+    const State& state, double step_rad) {
   const int reduction =
       std::max(1, static_cast<int>(std::lround(state.lenses[0].focal_length_px * step_rad)));
   for (const auto& known : planes_) {
@@ -345,7 +354,7 @@ const std::pair<int, std::vector<SmoothPlanes>>& PatchMatcher::planes(const Stat
   constexpr double sigma_px = 0.7;  // against aliasing of the reduced pictures
   std::vector<SmoothPlanes> smooth;
   for (const Image& picture : grey_) {
-    smooth.push_back(smooth_planes(picture.view(), reduction, sigma_px));
+    smooth.push_back(make_smooth_planes(picture.view(), reduction, sigma_px));
   }
   return planes_.emplace_back(reduction, std::move(smooth));
 }

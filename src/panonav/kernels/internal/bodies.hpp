@@ -1,8 +1,7 @@
 #pragma once
 
-// The bodies of the kernels, declared once for all instruction sets. `internal/NAME_body.cpp`
-// defines NAMEBody and is compiled once for each set. No C++ standard header here: see
-// CMakeLists.txt.
+// Declarations of the kernels' bodies for all instruction sets. `internal/NAME_body.cpp` defines
+// NAMEBody and is compiled once per set. Must not include C++ standard headers: see CMakeLists.txt.
 
 #include "panonav/kernels/types.hpp"
 
@@ -73,7 +72,7 @@ struct RemapBody {
   static void remap(const RemapJob& job);
 };
 
-/// Components are handled in blocks of this many; tables are padded to whole blocks.
+/// Number of components in a block; tables are padded to whole blocks.
 inline constexpr int row_transform_block = 16;
 
 struct RowTransformJob {
@@ -87,8 +86,8 @@ struct RowTransformJob {
   size_t stride;
 };
 
-/// Four rows are folded at a time, each into pairs (even k, odd k) for the cosines and for the
-/// sines.
+/// Returns the number of scratch floats: for each of four rows folded at a time, pairs (even k, odd
+/// k) for the cosines and for the sines.
 constexpr size_t row_transform_scratch(int folded) {
   return 4 * 4 * static_cast<size_t>(folded);
 }
@@ -106,8 +105,8 @@ struct SimilarityBody {
   static void exponentials(const float* logarithms, float scale, float* values, int count);
 };
 
-/// Calls `run` with the Body of an instruction set; of a set that this build lacks, with the scalar
-/// one.
+/// Calls `run` with the body for an instruction set, or with the scalar body if this build lacks
+/// the set.
 template <template <Instructions> class Body, class Run>
 decltype(auto) with_body(Instructions set, Run run) {
   switch (set) {

@@ -4,17 +4,18 @@ namespace panonav::kernels {
 namespace {
 
 #ifdef __AVX2__
-// Turn s of 4 e + f puts query column c on reference column 4 (c + e) + f: with all columns of one
-// f behind each other, neighbouring turns of one f meet neighbouring columns, and all sums stay in
-// registers. Columns are there twice, so that no turn has to start again at the front.
+// Rotation s = 4 e + f compares query column c with reference column 4 (c + e) + f. Columns with
+// the same f are stored consecutively, so that neighbouring rotations read neighbouring columns and
+// all sums stay in registers. The columns are stored twice, so that no index has to wrap.
 constexpr int matched_residues = matched_reference_columns / matched_query_columns;
 constexpr int matched_halves = matched_bands / 8;
-struct HalvedColumns {
+struct TransposedColumns {
   alignas(64) uint8_t at[matched_residues][matched_halves][2 * matched_query_columns][8];
 };
 
-// Transposes 16 bands of 128 bytes each: eight bands of sixteen columns at a time.
-inline void halve_columns(const uint8_t* reference, HalvedColumns& halved) {
+// Transposes 16 bands of 128 bytes into `TransposedColumns`, by eight bands and sixteen columns at
+// a time.
+inline void transpose_columns(const uint8_t* reference, TransposedColumns& transposed) {
   for (int half = 0; half < matched_halves; ++half) {
     for (int first = 0; first < matched_reference_columns; first += 16) {
       __m128i rows[8];
@@ -41,16 +42,16 @@ inline void halve_columns(const uint8_t* reference, HalvedColumns& halved) {
           const __m128i high = columns[f / 2 + 2];
           const __m128i both =
               f % 2 == 0 ? _mm_unpacklo_epi64(low, high) : _mm_unpackhi_epi64(low, high);
-          _mm_store_si128(reinterpret_cast<__m128i*>(halved.at[f][half][e]), both);
-          _mm_store_si128(reinterpret_cast<__m128i*>(halved.at[f][half][e + matched_query_columns]),
-                          both);
+          _mm_store_si128(reinterpret_cast<__m128i*>(transposed.at[f][half][e]), both);
+          _mm_store_si128(
+              reinterpret_cast<__m128i*>(transposed.at[f][half][e + matched_query_columns]), both);
         }
       }
     }
   }
 }
 
-// Sums eight absolute differences by one instruction.
+// Matches columns with the instruction that sums eight absolute differences.
 template <Instructions set>
 void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* costs) {
   using Vector = ByteVector<set>;
@@ -59,8 +60,8 @@ void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* cost
   using Words = typename Vectors<lanes_of<set>>::Words;  // sums wrap round
   using Floats = typename Vectors<lanes_of<set>>::Floats;
   constexpr int width = sizeof(Register) / sizeof(uint64_t);
-  HalvedColumns halved;
-  halve_columns(reference, halved);
+  TransposedColumns transposed;
+  transpose_columns(reference, transposed);
   for (int first = 0; first < matched_query_columns; first += width) {
     Words sums[2] = {};  // turns of f = 0 and 1, side by side; of 2 and 3
     for (int c = 0; c < matched_query_columns; ++c) {
@@ -68,20 +69,21 @@ void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* cost
       const Register upper = Vector::broadcast(load_group(column));
       const Register lower = Vector::broadcast(load_group(column + 8));
       const auto l1 = [&](int f) {
-        return Vector::sad(upper, Vector::load(halved.at[f][0][first + c])) +
-               Vector::sad(lower, Vector::load(halved.at[f][1][first + c]));
+        return Vector::sad(upper, Vector::load(transposed.at[f][0][first + c])) +
+               Vector::sad(lower, Vector::load(transposed.at[f][1][first + c]));
       };
       for (int pair = 0; pair < 2; ++pair) {
         const Register both = l1(2 * pair) | (l1(2 * pair + 1) << 32);
         const Floats root =
             Vector::root(__builtin_convertvector(reinterpret_cast<Ints>(both), Floats));
-        // 1.5 * 2^23: adding it rounds to a whole number, which the last bits then hold.
+        // Adding 1.5 * 2^23 rounds to an integer, which is then in the low bits of the float.
         sums[pair] += reinterpret_cast<Words>(root * 16.0F + 12582912.0F);
       }
     }
     for (int e = 0; e < width; ++e) {
       for (int f = 0; f < matched_residues; ++f) {
-        // Each root came with the bits of the float that rounded it; whole multiples of 65,536.
+        // Each summand also contains the bits of the float 1.5 * 2^23, a multiple of 65,536, which
+        // the cast removes.
         costs[4 * (first + e) + f] = static_cast<uint16_t>(sums[f / 2][2 * e + f % 2]);
       }
     }
@@ -94,24 +96,26 @@ void match_by_loops(const uint8_t* __restrict query, const uint8_t* __restrict r
                     uint16_t* __restrict costs) {
   constexpr int columns = matched_reference_columns;
   constexpr int step = columns / matched_query_columns;
-  // Query column c meets reference column d at the turn d - step c, from -columns + step on.
+  // Query column c is compared with reference column d at the rotation d - step * c, which is at
+  // least -columns + step.
   uint16_t totals[2 * columns] = {};
   for (int c = 0; c < matched_query_columns; ++c) {
     uint16_t sums[columns] = {};
     for (int band = 0; band < matched_bands; ++band) {
-      const uint8_t mine = query[c * matched_bands + band];
-      const uint8_t* const theirs = reference + band * columns;
+      const uint8_t query_value = query[c * matched_bands + band];
+      const uint8_t* const reference_band = reference + band * columns;
       for (int d = 0; d < columns; ++d) {
-        const uint8_t larger = theirs[d] > mine ? theirs[d] : mine;
-        const uint8_t smaller = theirs[d] > mine ? mine : theirs[d];
+        const uint8_t larger = reference_band[d] > query_value ? reference_band[d] : query_value;
+        const uint8_t smaller = reference_band[d] > query_value ? query_value : reference_band[d];
         sums[d] = static_cast<uint16_t>(sums[d] + static_cast<uint8_t>(larger - smaller));
       }
     }
-    uint16_t* const met = totals + columns - step * c;
+    uint16_t* const shifted_totals = totals + columns - step * c;
     for (int d = 0; d < columns; ++d) {
-      // 256 L1 is a whole number below 2^24 and roots are rounded correctly: the same everywhere.
+      // 256 * L1 is an integer below 2^24, and square roots are correctly rounded, so the result is
+      // the same on all machines.
       const float root = __builtin_sqrtf(static_cast<float>(static_cast<int>(sums[d]) << 8));
-      met[d] = static_cast<uint16_t>(met[d] + static_cast<int>(root + 0.5F));
+      shifted_totals[d] = static_cast<uint16_t>(shifted_totals[d] + static_cast<int>(root + 0.5F));
     }
   }
   for (int s = 0; s < columns; ++s) {

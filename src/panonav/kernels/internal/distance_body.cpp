@@ -19,7 +19,7 @@ uint32_t compute_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, siz
     }
     sums = Vector::add_sad(sums, x, y);
   };
-  if constexpr (set != Instructions::scalar) {  // the compiler makes more of plain loops
+  if constexpr (set != Instructions::scalar) {  // plain loops are faster for scalar
     for (; i + sizeof(Register) <= count; i += sizeof(Register)) add(Vector::load);
   }
   if constexpr (requires { Vector::load_first(a, i); }) {
@@ -37,16 +37,17 @@ uint32_t compute_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, siz
   return total;
 }
 
-/// `fixed_groups` > 0: that many groups, whose part of the query then stays in registers.
+/// Computes `sketch_bounds`. If `fixed_groups` > 0, the number of groups is this constant and the
+/// query stays in registers.
 template <Instructions set, size_t fixed_groups, bool masked>
-uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
-                            const DistanceKernels::SketchQuery& query, uint32_t* bounds) {
+uint32_t compute_interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
+                                    const DistanceKernels::SketchQuery& query, uint32_t* bounds) {
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
   constexpr size_t registers = 64 / sizeof(Register);
-  constexpr size_t kept = fixed_groups > 0 ? fixed_groups : 1;
-  Register kept_values[kept];
-  Register kept_steps[kept];
+  constexpr size_t kept_groups = fixed_groups > 0 ? fixed_groups : 1;
+  Register kept_values[kept_groups];
+  Register kept_steps[kept_groups];
   for (size_t group = 0; group < fixed_groups; ++group) {
     kept_values[group] = Vector::broadcast(load_group(query.values + group * 8));
     kept_steps[group] = Vector::broadcast(query.steps[group]);
@@ -79,10 +80,10 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
     *reinterpret_cast<EightInts*>(bounds + octet * 8) = bound;
     smallest = bound < smallest ? bound : smallest;
   }
-  uint32_t each[8];
-  __builtin_memcpy(each, &smallest, sizeof each);
-  uint32_t min_bound = each[0];
-  for (const uint32_t bound : each) min_bound = bound < min_bound ? bound : min_bound;
+  uint32_t bounds_of_lanes[8];
+  __builtin_memcpy(bounds_of_lanes, &smallest, sizeof bounds_of_lanes);
+  uint32_t min_bound = bounds_of_lanes[0];
+  for (const uint32_t bound : bounds_of_lanes) min_bound = bound < min_bound ? bound : min_bound;
   return min_bound;
 }
 
@@ -110,14 +111,14 @@ template <Instructions set>
 uint32_t DistanceBody<set>::sketch_bounds(const uint8_t* sketches, const int32_t* slacks,
                                           size_t octets, const DistanceKernels::SketchQuery& query,
                                           uint32_t* bounds) {
-  // 15 components make 5 groups; other shapes take the general body, and so do sets that have too
-  // few registers to keep the query in them.
+  // The default of 15 components has 5 groups. Other shapes, and instruction sets with too few
+  // registers for the query, use the general body.
   if constexpr (set == Instructions::avx512) {
     if (query.groups == 5 && is_unmasked(query)) {
-      return interleaved_bounds<set, 5, false>(sketches, slacks, octets, query, bounds);
+      return compute_interleaved_bounds<set, 5, false>(sketches, slacks, octets, query, bounds);
     }
   }
-  return interleaved_bounds<set, 0, true>(sketches, slacks, octets, query, bounds);
+  return compute_interleaved_bounds<set, 0, true>(sketches, slacks, octets, query, bounds);
 }
 
 template <Instructions set>
@@ -127,10 +128,11 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
                                          uint32_t* bounds) {
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
-  constexpr size_t ahead = 24;
+  constexpr size_t prefetch_distance = 24;
   for (size_t i = 0; i < count; ++i) {
-    if (i + ahead < count) {
-      const uint8_t* const next = sketches + indices[i + ahead] * query.stored_groups * 8;
+    if (i + prefetch_distance < count) {
+      const uint8_t* const next =
+          sketches + indices[i + prefetch_distance] * query.stored_groups * 8;
       for (size_t group = 0; group < query.groups; group += 8) __builtin_prefetch(next + group * 8);
     }
     const uint8_t* const sketch = sketches + indices[i] * query.stored_groups * 8;
@@ -217,8 +219,9 @@ size_t DistanceBody<set>::collect_at_most(const uint32_t* values, size_t count, 
   size_t found = 0;
   size_t i = 0;
   if constexpr (set != Instructions::scalar) {
-    constexpr size_t together = sizeof(typename ByteVector<set>::Register) / sizeof(uint32_t);
-    for (; i + together <= count; i += together) {
+    constexpr size_t values_per_register =
+        sizeof(typename ByteVector<set>::Register) / sizeof(uint32_t);
+    for (; i + values_per_register <= count; i += values_per_register) {
       found +=
           ByteVector<set>::collect(values + i, limit, static_cast<uint32_t>(i), indices + found);
     }

@@ -8,7 +8,8 @@ template <Instructions set>
 void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_count,
                                                 const uint64_t* b, size_t b_count,
                                                 uint16_t* nearest_of_a, uint16_t* nearest_of_b) {
-  // Distance above number: the smallest is the nearest, and the first of equal ones.
+  // Packs the distance in the high and the index in the low bits: the minimum is the nearest
+  // descriptor, and the first of equal ones.
   constexpr uint32_t none = ~0U;
   uint32_t best_of_a[max_descriptors];
   for (size_t i = 0; i < a_count; ++i) best_of_a[i] = none;
@@ -40,9 +41,10 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
   for (size_t first = 0; first < matched.count; first += max_descriptors) {
     const size_t left = matched.count - first;
     const size_t count = left < max_descriptors ? left : max_descriptors;
-    // In a frame between those of both views. Azimuths are mirrored where the query's lies
-    // clockwise of the reference's, so that the angle from the direction of motion to either must
-    // have a sine of at least `min_sine`; more than 1 where nothing can explain the match.
+    // Sines and cosines of the azimuths in the frame halfway between both views. If the query's
+    // azimuth is clockwise of the reference's, both vectors are reversed, so that a direction of
+    // motion must have a sine of at least `min_sine` to both bearings; `min_sine` is above 1 if no
+    // motion can explain the match.
     float query_sine[max_descriptors], query_cosine[max_descriptors];
     float reference_sine[max_descriptors], reference_cosine[max_descriptors];
     float min_sine[max_descriptors];

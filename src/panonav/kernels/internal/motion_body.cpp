@@ -5,11 +5,11 @@
 namespace panonav::kernels {
 namespace {
 
-// ln x of 2^-33 <= x <= 1; error below 1e-7 of the value and 1e-7.
+// Approximates ln x for 2^-33 <= x <= 1; error below 1e-7 relative plus 1e-7 absolute.
 inline float approximate_log(float x) {
   int bits;
   __builtin_memcpy(&bits, &x, sizeof bits);
-  // From sqrt(1/2) up to sqrt(2), so that the exponent of 1 is 0.
+  // Normalises the mantissa to sqrt(1/2) .. sqrt(2), so that numbers near 1 have exponent 0.
   const int shifted = bits - 0x3F3504F3;
   const int exponent = shifted >> 23;
   const int mantissa_bits = (shifted & 0x007FFFFF) + 0x3F3504F3;
@@ -28,7 +28,7 @@ inline float approximate_log(float x) {
 template <Instructions set>
 void MotionBody<set>::normal_pairs(const uint64_t* __restrict bits, float* __restrict first,
                                    float* __restrict second, int count) {
-  constexpr float rounder = 12582912.0F;  // adding it rounds to whole numbers: 1.5 * 2^23
+  constexpr float rounder = 12582912.0F;  // 1.5 * 2^23: adding it rounds to an integer
   for (int i = 0; i < count; ++i) {
     const auto radius_bits = static_cast<unsigned int>(bits[i] >> 32U);
     const auto angle_bits = static_cast<unsigned int>(bits[i]);
@@ -67,7 +67,8 @@ void MotionBody<set>::move_poses(double* __restrict x_m, double* __restrict y_m,
     long long quarter;
     __builtin_memcpy(&quarter, &rounded, sizeof quarter);
     const double quarters = rounded - rounder;
-    // pi / 2 in two parts, the first with bits to spare.
+    // Subtracts multiples of pi / 2 in two parts; the first part has trailing zero bits, so that
+    // its product is exact.
     const double angle =
         (direction - quarters * 1.57079632673412561) - quarters * 6.07710050650619225e-11;
     // Taylor, over -pi / 4 .. pi / 4; error below 1e-12.

@@ -2,8 +2,8 @@
 
 namespace panonav::kernels {
 
-// Without vector instructions, the library's arc tangent; else one loop without branches, which the
-// compiler vectorises for each instruction set.
+// The scalar body uses the library's arc tangent; the others are a loop without branches that the
+// compiler vectorises.
 template <Instructions set>
 void PolarBody<set>::to_polar(const float* __restrict real, const float* __restrict imaginary,
                               float* __restrict magnitudes, float* __restrict phases_rad,
@@ -24,8 +24,8 @@ void PolarBody<set>::to_polar(const float* __restrict real, const float* __restr
     const float larger = x > y ? x : y;
     const float smaller = x > y ? y : x;
     const float magnitude = __builtin_sqrtf(x * x + y * y);
-    // Angle from the nearer axis, 0 .. pi / 4; above pi / 8 measured back from pi / 4, so that the
-    // tangent is at most tan(pi / 8).
+    // Reduces the angle to the nearer axis, 0 .. pi / 4; angles above pi / 8 are measured from pi /
+    // 4, so that t is at most tan(pi / 8).
     const bool is_far = smaller > tan_pi_8 * larger;
     const float numerator = is_far ? smaller - larger : smaller;
     const float denominator = is_far ? smaller + larger : larger;

@@ -3,8 +3,8 @@
 namespace panonav::kernels {
 namespace {
 
-/// The four pixels of each of `count` taps. Measured: ordinary loads beat the gather instructions
-/// of AVX2 and AVX-512, and NEON has none.
+/// Loads the four pixels of each of `count` taps. Ordinary loads were measured to be faster than
+/// the gather instructions of AVX2 and AVX-512; NEON has none.
 inline void gather_pairs(const uint16_t* pairs, const uint32_t* positions, int count,
                          uint32_t* pixels) {
 #pragma GCC unroll 8
@@ -16,7 +16,7 @@ inline void gather_pairs(const uint16_t* pairs, const uint32_t* positions, int c
   }
 }
 
-/// Samples i .. i + count - 1.
+/// Computes the values i .. i + count - 1.
 template <Instructions set, int count>
 [[gnu::always_inline]] inline void remap_lanes(const RemapJob& job, int i) {
   using Vector = ByteVector<set>;
@@ -27,7 +27,8 @@ template <Instructions set, int count>
     const long entry = t * job.count + i;
     gather_pairs(job.pairs, job.positions + entry, count, pixels);
     for (int j = 0; j < count / lanes; ++j) {
-      // Pixels are unsigned, weights add up to 127: sums of two stay below 2^15.
+      // Bytes are at most 255 and weights add up to at most 127, so sums of two products stay below
+      // 2^15.
       sums[j] = Vector::add_products(sums[j], Vector::load(pixels + j * lanes),
                                      Vector::load(job.weights + entry + j * lanes));
     }

@@ -13,7 +13,7 @@ inline void store(float* to, typename Vectors<lanes>::Floats value) {
   *reinterpret_cast<typename Vectors<lanes>::UnalignedFloats*>(to) = value;
 }
 
-/// Two floats, repeated over all lanes.
+/// Repeats a pair of floats over all lanes.
 template <int lanes>
 inline typename Vectors<lanes>::Floats broadcast_pair(const float* pair) {
   int64_t bits;
@@ -51,9 +51,10 @@ inline void store_interleaved(float* to, typename Vectors<lanes>::Floats a,
   }
 }
 
-/// Columns c .. c + lanes - 1 of a row with an even number of columns, like fold_one.
+/// Folds columns c .. c + lanes - 1 of a row with an even number of columns, as fold_column does
+/// for column c.
 template <int lanes>
-inline void fold_quarter(const float* row, int columns, int c, float* even, float* odd) {
+inline void fold_columns(const float* row, int columns, int c, float* even, float* odd) {
   const int half = columns / 2;
   const auto a = load<lanes>(row + c);
   const auto b = reverse_lanes<lanes>(load<lanes>(row + columns - c - lanes + 1));
@@ -68,8 +69,9 @@ inline void fold_quarter(const float* row, int columns, int c, float* even, floa
                            near_difference + far_difference);
 }
 
-/// Interleaved: index 2 c belongs to even k, 2 c + 1 to odd k.
-inline void fold_one(const float* row, int columns, int c, float* even, float* odd) {
+/// Folds column c and its three mirror images; results are interleaved: index 2 c for even k, 2 c +
+/// 1 for odd k.
+inline void fold_column(const float* row, int columns, int c, float* even, float* odd) {
   const int half = columns / 2;
   const float near_sum = row[c] + row[columns - c];
   const float near_difference = row[c] - row[columns - c];
@@ -82,7 +84,7 @@ inline void fold_one(const float* row, int columns, int c, float* even, float* o
 }
 
 template <int lanes>
-inline void fold(const float* row, int columns, int folded, float* even, float* odd) {
+inline void fold_row(const float* row, int columns, int folded, float* even, float* odd) {
   if (columns % 2 != 0) {
     even[0] = even[1] = row[0];
     odd[0] = odd[1] = 0.0F;
@@ -93,18 +95,19 @@ inline void fold(const float* row, int columns, int folded, float* even, float* 
     return;
   }
   const int half = columns / 2;
-  const int end = (half + 1) / 2;  // columns 1 .. end - 1 fold fourfold
+  const int end = (half + 1) / 2;  // columns 1 .. end - 1 have three mirror images
   even[0] = row[0] + row[half];
   even[1] = row[0] - row[half];
   odd[0] = odd[1] = 0.0F;
   if (end > lanes) {
-    for (int c = 1; c + lanes <= end; c += lanes) fold_quarter<lanes>(row, columns, c, even, odd);
-    fold_quarter<lanes>(row, columns, end - lanes, even, odd);  // overlaps what is there already
+    for (int c = 1; c + lanes <= end; c += lanes) fold_columns<lanes>(row, columns, c, even, odd);
+    fold_columns<lanes>(row, columns, end - lanes, even, odd);  // overlaps, equal values
   } else {
-    for (int c = 1; c < end; ++c) fold_one(row, columns, c, even, odd);
+    for (int c = 1; c < end; ++c) fold_column(row, columns, c, even, odd);
   }
   if (half % 2 == 0) {
-    // A quarter turn folds onto itself: its cosine is 0 for odd k, its sine for even k.
+    // The column at a quarter turn has only one mirror image: its cosine is 0 for odd k, its sine
+    // is 0 for even k.
     const int c = half / 2;
     even[2 * c] = row[c] + row[columns - c];
     even[2 * c + 1] = 0.0F;
@@ -113,8 +116,8 @@ inline void fold(const float* row, int columns, int folded, float* even, float* 
   }
 }
 
-/// Transforms `rows` folded rows at once, so that each table entry is read once for all of them and
-/// the sums of different rows hide each other's latency.
+/// Folds and transforms `rows` rows at once, so that each table entry is read once for all rows and
+/// their independent sums hide latency.
 template <int lanes, int rows>
 inline void transform_rows(const RowTransformJob& job, int first_row) {
   using Floats = typename Vectors<lanes>::Floats;
@@ -122,9 +125,9 @@ inline void transform_rows(const RowTransformJob& job, int first_row) {
   float* const even = job.scratch;
   float* const odd = job.scratch + static_cast<long>(rows) * length;
   for (int r = 0; r < rows; ++r) {
-    fold<lanes>(job.values + static_cast<long>(first_row + r) * job.columns, job.columns,
-                job.folded, even + static_cast<long>(r) * length,
-                odd + static_cast<long>(r) * length);
+    fold_row<lanes>(job.values + static_cast<long>(first_row + r) * job.columns, job.columns,
+                    job.folded, even + static_cast<long>(r) * length,
+                    odd + static_cast<long>(r) * length);
   }
   for (int first = 0; first < job.components; first += lanes) {
     const int block = first / row_transform_block;

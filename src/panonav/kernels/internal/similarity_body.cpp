@@ -5,7 +5,7 @@
 namespace panonav::kernels {
 namespace {
 
-// Adding it rounds to whole numbers: 1.5 * 2^23.
+// Adding and subtracting 1.5 * 2^23 rounds a float to an integer.
 constexpr float rounder = 12582912.0F;
 
 // Approximates exp(x) for x < 80, at least 2^min_exponent; relative error below 4e-6.
@@ -22,40 +22,43 @@ inline float approximate_exp(float x, float min_exponent) {
   return series * power;
 }
 
-inline float wrapped(float angle_rad) {
+inline float wrap_angle(float angle_rad) {
   constexpr float turn_rad = 6.28318530717959F;
   const float turns = (angle_rad * (1.0F / turn_rad) + rounder) - rounder;
   return angle_rad - turn_rad * turns;
 }
 
-// Poses whose sums stay in registers.
-constexpr int poses_together = 16;
+// Number of poses processed at once, so that their sums stay in registers.
+constexpr int poses_per_block = 16;
 
 inline void explain_similarity_lanes(const SimilarityLanes& lanes,
                                      const SimilarityLanes::Fall& fall, const float* __restrict x_m,
                                      const float* __restrict y_m,
                                      const float* __restrict heading_rad,
                                      float* __restrict explained) {
-  constexpr float min_exponent = -60.0F;  // the squares are normal numbers still: others are slow
-  float squares[poses_together] = {};
-  float products[poses_together] = {};
+  constexpr float min_exponent = -60.0F;  // squares stay normal numbers; denormal ones are slow
+  float squares[poses_per_block] = {};
+  float products[poses_per_block] = {};
   for (int i = 0; i < similarity_lanes; ++i) {
-    for (int p = 0; p < poses_together; ++p) {
+    for (int p = 0; p < poses_per_block; ++p) {
       const float dx = lanes.x_m[i] - x_m[p];
       const float dy = lanes.y_m[i] - y_m[p];
       const float apart = __builtin_sqrtf(dx * dx + dy * dy + fall.blur_square_m2);
       const float expected = approximate_exp(-apart * fall.per_metre, min_exponent);
-      const float turn = wrapped(heading_rad[p] - lanes.heading_rad[i]);
-      const float other_turn = wrapped(heading_rad[p] - lanes.other_heading_rad[i]);
-      const float facing = lanes.log_similarity[i] + turn * turn * lanes.per_square_turn[i];
-      const float other =
+      const float turn = wrap_angle(heading_rad[p] - lanes.heading_rad[i]);
+      const float other_turn = wrap_angle(heading_rad[p] - lanes.other_heading_rad[i]);
+      const float best_exponent = lanes.log_similarity[i] + turn * turn * lanes.per_square_turn[i];
+      const float second_exponent =
           lanes.other_log_similarity[i] + other_turn * other_turn * lanes.per_square_turn[i];
       squares[p] += expected * expected;
-      products[p] += approximate_exp(facing > other ? facing : other, min_exponent) * expected;
+      products[p] +=
+          approximate_exp(best_exponent > second_exponent ? best_exponent : second_exponent,
+                          min_exponent) *
+          expected;
     }
   }
-  for (int p = 0; p < poses_together; ++p) {
-    // The rounding residue of similarity 0 becomes 0.
+  for (int p = 0; p < poses_per_block; ++p) {
+    // Sets the residue of similarity 0 (2^min_exponent) to 0.
     const float product = products[p] > 1e-16F ? products[p] : 0.0F;
     explained[p] = product * product / (squares[p] + 1e-30F);
   }
@@ -71,15 +74,15 @@ void SimilarityBody<set>::explain_similarity(const SimilarityLanes& lanes,
                                              const float* __restrict heading_rad,
                                              float* __restrict explained, int count) {
   int done = 0;
-  for (; done + poses_together <= count; done += poses_together) {
+  for (; done + poses_per_block <= count; done += poses_per_block) {
     explain_similarity_lanes(lanes, fall, x_m + done, y_m + done, heading_rad + done,
                              explained + done);
   }
   if (done == count) return;
-  float x[poses_together] = {};
-  float y[poses_together] = {};
-  float heading[poses_together] = {};
-  float last[poses_together];
+  float x[poses_per_block] = {};
+  float y[poses_per_block] = {};
+  float heading[poses_per_block] = {};
+  float last[poses_per_block];
   for (int p = done; p < count; ++p) {
     x[p - done] = x_m[p];
     y[p - done] = y_m[p];

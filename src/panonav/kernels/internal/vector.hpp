@@ -1,6 +1,7 @@
 #pragma once
 
-// The vectors of an instruction set. In an unnamed namespace, so that each has a copy of its own.
+// Vector types and operations of one instruction set. They are in an unnamed namespace, so that
+// each compiled body has its own copy for its set.
 
 #include "panonav/kernels/internal/bodies.hpp"
 
@@ -48,8 +49,8 @@ constexpr int lanes_of = set == Instructions::avx512 ? 16
 //   add_products(sums, bytes, weights)   adds to each number of 32 bits its four bytes times their
 //                          weights, which add up to at most 127
 
-/// The few instructions that no compiler makes of a loop. A Register holds groups of eight bytes,
-/// which are numbers of 64 bits too (`+`, `&`), or twice as many of 32.
+/// Operations that compilers do not generate from loops. A Register holds groups of eight bytes,
+/// each of which is also a 64-bit number (for `+` and `&`) or two 32-bit numbers.
 template <Instructions set>
 struct ByteVector;
 
@@ -61,7 +62,7 @@ inline uint64_t load_group(const void* from) {
   return group;
 }
 
-inline size_t write_set_bits(unsigned bits, uint32_t first, uint32_t* to) {
+inline size_t write_set_bit_positions(unsigned bits, uint32_t first, uint32_t* to) {
   size_t count = 0;
   for (; bits != 0; bits &= bits - 1) {
     to[count++] = first + static_cast<uint32_t>(__builtin_ctz(bits));
@@ -83,7 +84,7 @@ struct ByteVector<Instructions::scalar> {
     const Octet differences = (x > y ? x : y) - (x > y ? y : x);
     uint64_t bytes;
     __builtin_memcpy(&bytes, &differences, sizeof bytes);
-    // Four sums of two in 16 bits each; the product adds them up in the highest.
+    // Four sums of two bytes, 16 bits each; the multiplication adds them in the highest 16 bits.
     constexpr uint64_t every_other = 0x00FF00FF00FF00FFU;
     const uint64_t sums = (bytes & every_other) + ((bytes >> 8U) & every_other);
     return (sums * 0x0001000100010001U) >> 48U;
@@ -129,8 +130,8 @@ struct ByteVector<Instructions::avx2> {
     const Register x = load(values);
     const Register top = _mm256_set1_epi32(static_cast<int>(limit));
     const Register low = _mm256_cmpeq_epi32(_mm256_min_epu32(x, top), x);
-    return write_set_bits(static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(low))),
-                          first, to);
+    return write_set_bit_positions(
+        static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(low))), first, to);
   }
   static Register broadcast_table(const uint8_t* table) {
     return _mm256_broadcastsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(table)));
@@ -155,7 +156,8 @@ struct ByteVector<Instructions::avx2> {
                                             _mm256_maddubs_epi16(load(lower + at), ones));
       return _mm256_srli_epi16(_mm256_add_epi16(sum, _mm256_set1_epi16(2)), 2);
     };
-    // Packing works within halves of the register; the permutation puts the quarters in order.
+    // The pack instruction works on each half of the register separately; the permutation restores
+    // the order of the quarters.
     const Register packed =
         _mm256_permute4x64_epi64(_mm256_packus_epi16(means(0), means(32)), 0xd8);
     __builtin_memcpy(to, &packed, sizeof packed);
@@ -169,7 +171,7 @@ template <>
 struct ByteVector<Instructions::avx512> {
   using Register = __m512i;
   static Register load(const void* from) { return _mm512_loadu_si512(from); }
-  /// The first `count` bytes, 1 .. 63, and zeros.
+  /// Loads the first `count` bytes, 1 .. 63, and fills the rest with zeros.
   static Register load_first(const void* from, size_t count) {
     return _mm512_maskz_loadu_epi8(~__mmask64{0} >> (64 - count), from);
   }
@@ -191,7 +193,8 @@ struct ByteVector<Instructions::avx512> {
     const Register of_two = _mm512_maddubs_epi16(bytes, weights);
     return _mm512_add_epi32(sums, _mm512_madd_epi16(of_two, _mm512_set1_epi16(1)));
   }
-  /// 32 bytes, each beside the one below; other sets are served as well by a loop.
+  /// Interleaves 32 bytes of a row with those of the row below; on other sets a plain loop is
+  /// equally fast.
   static void pair(const uint8_t* upper, const uint8_t* lower, uint16_t* to) {
     const auto widened = [](const uint8_t* from) {
       return _mm512_cvtepu8_epi16(ByteVector<Instructions::avx2>::load(from));
@@ -258,7 +261,7 @@ struct ByteVector<Instructions::neon> {
     __builtin_memcpy(reinterpret_cast<uint8_t*>(&eight) + sizeof low, &high, sizeof high);
   }
   static Register add_products(Register sums, Register a, Register weights) {
-    // Two sums of two for each number, then one.
+    // Adds pairs of products, and then pairs of these sums.
     const uint8x16_t w = bytes(weights);
     const uint32x4_t low = vpaddlq_u16(vmull_u8(vget_low_u8(bytes(a)), vget_low_u8(w)));
     const uint32x4_t high = vpaddlq_u16(vmull_high_u8(bytes(a), w));
@@ -286,7 +289,7 @@ struct ByteVector<Instructions::neon> {
   static size_t collect(const uint32_t* values, uint32_t limit, uint32_t first, uint32_t* to) {
     const uint32x4_t low = vcleq_u32(vld1q_u32(values), vdupq_n_u32(limit));
     const uint32x4_t bit = {1, 2, 4, 8};
-    return write_set_bits(vaddvq_u32(vandq_u32(low, bit)), first, to);
+    return write_set_bit_positions(vaddvq_u32(vandq_u32(low, bit)), first, to);
   }
 };
 #endif

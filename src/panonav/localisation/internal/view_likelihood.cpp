@@ -165,7 +165,7 @@ void ViewLikelihood::load_profiles(std::span<const std::uint32_t> sites) {
 
 void ViewLikelihood::compare_loaded(std::uint32_t site) {
   Site& s = sites_[site];
-  const auto [match, other] = match_columns_twice(*view_, *profiles_[site]);
+  const auto [match, other] = match_columns_two_best(*view_, *profiles_[site]);
   const double far = model_.far_difference;
   s.compared_at = number_;
   const auto to_similarity = [far](const ColumnMatch& m) {

@@ -39,7 +39,7 @@ class ViewLikelihood {
     float heading_rad;  ///< absolute, of the robot that took the compared view; NaN: not known
     float similarity;   ///< 0: dissimilar, or not compared
     float log_similarity;
-    float other_heading_rad;  ///< the second heading that fits (`match_columns_twice`)
+    float other_heading_rad;  ///< the second heading that fits (`match_columns_two_best`)
     float other_similarity;   ///< in the second heading
     float other_log_similarity;
     std::uint32_t compared_at;  ///< number of the view with which it was compared

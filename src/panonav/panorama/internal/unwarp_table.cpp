@@ -15,7 +15,8 @@ namespace panonav {
 
 namespace {
 
-/// The upper left one of four pixels of a halved image, and the weights of all four.
+/// Position of the upper left of four neighbouring pixels of a halved image, and the weights of the
+/// four.
 struct Tap {
   int level = 0;
   int u = -1;  // -1: nothing is seen there
@@ -28,7 +29,8 @@ struct Tap {
 /// direction follow each other.
 using Taps = std::vector<Tap>;
 
-/// Packs four weights that add up to `sum` exactly: the rest goes to those that rounding cut most.
+/// Packs the four bilinear weights as bytes that add up to `sum` exactly. The units lost by
+/// rounding down go to the weights with the largest fractions.
 std::uint32_t pack_weights(double fraction_u, double fraction_v, int sum) {
   const std::array<double, 4> exact = {(1 - fraction_u) * (1 - fraction_v),
                                        (1 - fraction_u) * fraction_v, fraction_u * (1 - fraction_v),
@@ -64,15 +66,16 @@ class RowSampler {
         top_rad_(band.top_rad),
         column_rad_(2.0 * std::numbers::pi / columns),
         row_rad_((band.top_rad - band.bottom_rad) / rows),
-        lenses_(lens_count(camera)) {
+        lens_count_(lens_count(camera)) {
     if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
-      // Both lenses as bright as the darker one, so that no weight is above its share.
+      // Scales the brighter lens down to the darker one, so that no weight exceeds
+      // `tap_weight_sum`.
       const double darker = std::min(model->lenses[0].gain, model->lenses[1].gain);
-      for (int i = 0; i < 2; ++i) brightness_[i] = darker / model->lenses[i].gain;
+      for (int i = 0; i < 2; ++i) brightness_factors_[i] = darker / model->lenses[i].gain;
     }
   }
 
-  [[nodiscard]] Taps sample(int row) const {
+  [[nodiscard]] Taps make_row_taps(int row) const {
     const double elevation_rad = top_rad_ - row_rad_ * (row + 0.5);
     const Spacing spacing = measure_spacing(elevation_rad);
     const int smaller_side = std::min(camera_.image_size.width, camera_.image_size.height);
@@ -93,7 +96,7 @@ class RowSampler {
   };
   struct Placement {
     Taps taps;
-    /// Some taps had to be moved inward to stay clear of the mirror's border.
+    /// True if a tap was moved radially because its pixels would have crossed the mirror's border.
     bool crosses_border = false;
   };
 
@@ -106,9 +109,10 @@ class RowSampler {
     double low_px, high_px;
   };
 
-  /// Distances from the centre at which all four pixels of a tap are within the mirror, corners
-  /// included. An inner radius of 0 is no border.
-  [[nodiscard]] static RadiusRange usable_radii(const ImageCircle& circle, double pixel) {
+  /// Returns the distances from the centre at which all four pixels of a tap are entirely inside
+  /// the mirror's ring. An inner radius of 0 sets no limit. `pixel`: pixel size of the level, in
+  /// image pixels.
+  [[nodiscard]] static RadiusRange compute_usable_radii(const ImageCircle& circle, double pixel) {
     const double reach_px = 1.5 * std::numbers::sqrt2 * pixel;
     const double inner_px = circle.inner_radius_px;
     const double middle_px = 0.5 * (inner_px + circle.rim_radius_px);
@@ -116,7 +120,8 @@ class RowSampler {
             std::max(circle.rim_radius_px - reach_px, middle_px)};
   }
 
-  /// Means over some azimuths; 0 where nothing is seen.
+  /// Measures the mean distances between neighbouring values, over 32 azimuths; 0 if the camera
+  /// sees none of them.
   [[nodiscard]] Spacing measure_spacing(double elevation_rad) const {
     Spacing sum;
     int across_count = 0;
@@ -146,23 +151,24 @@ class RowSampler {
     const int across = std::max(1, static_cast<int>(std::lround(spacing.across_px / pixel)));
     const int down = std::max(1, static_cast<int>(std::lround(spacing.down_px / pixel)));
     Placement placement;
-    placement.taps.resize(static_cast<std::size_t>(across) * down * lenses_ * columns_);
+    placement.taps.resize(static_cast<std::size_t>(across) * down * lens_count_ * columns_);
     const std::array<ImageCircle, 2> circles{image_circle(camera_, 0),
-                                             image_circle(camera_, lenses_ - 1)};
+                                             image_circle(camera_, lens_count_ - 1)};
     auto tap = placement.taps.begin();
     for (int i = 0; i < down; ++i) {
       const double tap_elevation_rad = elevation_rad + row_rad_ * (0.5 - (i + 0.5) / down);
-      for (int j = 0; j < across; ++j, tap += static_cast<std::ptrdiff_t>(lenses_) * columns_) {
+      for (int j = 0; j < across; ++j, tap += static_cast<std::ptrdiff_t>(lens_count_) * columns_) {
         for (int c = 0; c < columns_; ++c) {
           const double azimuth_rad = column_rad_ * (c + (j + 0.5) / across - 0.5);
           const auto points =
               project_all(camera_, Direction3::from_angles(azimuth_rad, tap_elevation_rad));
-          // Rounds the sum over both lenses, so that equal shares add up to the whole.
+          // Rounds the running sum of both lenses' shares, so that their integer weights add up to
+          // `tap_weight_sum`.
           double share = 0.0;
           int assigned = 0;
-          for (int lens = 0; lens < lenses_; ++lens) {
+          for (int lens = 0; lens < lens_count_; ++lens) {
             if (!points[lens] || points[lens]->weight == 0.0) continue;
-            share += points[lens]->weight * brightness_[lens];
+            share += points[lens]->weight * brightness_factors_[lens];
             const int sum =
                 static_cast<int>(std::lround(share * kernels::tap_weight_sum)) - assigned;
             assigned += sum;
@@ -170,8 +176,9 @@ class RowSampler {
             placed =
                 make_tap(points[lens]->pixel, sum, circles[lens], level, placement.crosses_border);
           }
-          if (lenses_ == 1) continue;
-          // A direction that one lens shows alone costs the other a tap without weight.
+          if (lens_count_ == 1) continue;
+          // If only one lens sees the direction, the other lens gets a copy of its tap with weight
+          // 0, so that all columns have the same number of taps.
           Tap& first = tap[c];
           Tap& second = tap[columns_ + c];
           if (first.is_visible() == second.is_visible()) continue;
@@ -189,7 +196,7 @@ class RowSampler {
     const double pixel = 1 << level;
     const int width = camera_.image_size.width >> level;
     const int height = camera_.image_size.height >> level;
-    const RadiusRange range = usable_radii(circle, pixel);
+    const RadiusRange range = compute_usable_radii(circle, pixel);
     const double radius_px = distance_px(point, circle.centre);
     const double usable_px = std::clamp(radius_px, range.low_px, range.high_px);
     crosses_border |= usable_px != radius_px;
@@ -211,26 +218,26 @@ class RowSampler {
   const Camera& camera_;
   int columns_;
   double top_rad_, column_rad_, row_rad_;
-  int lenses_;
-  std::array<double, 2> brightness_{1.0, 1.0};
+  int lens_count_;
+  std::array<double, 2> brightness_factors_{1.0, 1.0};
 };
 
-/// Replaces taps that are not seen by those of the same value that are; taps of several lenses go
-/// together. Returns which columns are seen.
+/// Replaces each invisible tap by the first visible tap of the same value (the taps of both lenses
+/// together). Returns 1 for each column that has a visible tap.
 std::vector<std::uint8_t> fill_missing_taps(Taps& taps, int columns, int lenses) {
-  std::vector<std::uint8_t> seen(static_cast<std::size_t>(columns), 0);
+  std::vector<std::uint8_t> visible(static_cast<std::size_t>(columns), 0);
   const int count = static_cast<int>(taps.size()) / columns;
   for (int c = 0; c < columns; ++c) {
     const auto tap = [&](int t) -> Tap& { return taps[static_cast<std::size_t>(t) * columns + c]; };
     int instead = 0;
     while (instead < count && !tap(instead).is_visible()) instead += lenses;
     if (instead == count) continue;
-    seen[c] = 1;
+    visible[c] = 1;
     for (int t = 0; t < count; ++t) {
       if (!tap(t).is_visible()) tap(t) = tap(instead + t % lenses);
     }
   }
-  return seen;
+  return visible;
 }
 
 void copy_column(const Taps& from, int from_column, Taps& to, int to_column, int columns) {
@@ -254,39 +261,39 @@ std::optional<int> find_nearest_index(int start, int count, bool wraps, Predicat
   return {};
 }
 
-/// Fills directions that the camera does not see with the taps of the nearest row seen in the same
-/// column, and columns in which nothing is seen with those of the nearest column.
+/// Gives directions that the camera does not see the taps of the nearest visible row of the same
+/// column, or of the nearest column with a visible row.
 void fill_invisible_directions(std::vector<Taps>& rows,
-                               const std::vector<std::vector<std::uint8_t>>& seen, int columns) {
+                               const std::vector<std::vector<std::uint8_t>>& visible, int columns) {
   const int count = static_cast<int>(rows.size());
-  std::vector<std::uint8_t> column_seen(static_cast<std::size_t>(columns), 0);
-  for (const auto& row : seen) {
-    for (int c = 0; c < columns; ++c) column_seen[c] |= row[c];
+  std::vector<std::uint8_t> column_visible(static_cast<std::size_t>(columns), 0);
+  for (const auto& row : visible) {
+    for (int c = 0; c < columns; ++c) column_visible[c] |= row[c];
   }
-  if (std::ranges::count(column_seen, 0) == columns) {
+  if (std::ranges::count(column_visible, 0) == columns) {
     throw ContractError("elevations", "out of sight", "a band of which the camera sees something");
   }
   const std::vector<Taps> original = rows;
   for (int y = 0; y < count; ++y) {
-    // A row of which nothing is seen is as fine as the one whose columns it takes.
-    if (std::ranges::count(seen[y], 0) == columns) {
+    // An invisible row gets as many taps per value as the visible row that is copied into it.
+    if (std::ranges::count(visible[y], 0) == columns) {
       const auto like = find_nearest_index(
-          y, count, false, [&](int row) { return std::ranges::count(seen[row], 0) < columns; });
+          y, count, false, [&](int row) { return std::ranges::count(visible[row], 0) < columns; });
       rows[y].assign(original[*like].size(), Tap{});
     }
     for (int c = 0; c < columns; ++c) {
-      if (seen[y][c] != 0) continue;
-      const int column =
-          *find_nearest_index(c, columns, true, [&](int other) { return column_seen[other] != 0; });
-      const int row =
-          *find_nearest_index(y, count, false, [&](int other) { return seen[other][column] != 0; });
+      if (visible[y][c] != 0) continue;
+      const int column = *find_nearest_index(c, columns, true,
+                                             [&](int other) { return column_visible[other] != 0; });
+      const int row = *find_nearest_index(y, count, false,
+                                          [&](int other) { return visible[other][column] != 0; });
       copy_column(original[row], column, rows[y], c, columns);
     }
   }
 }
 
-/// Finds the needed parts of the halved images and lays them out in their buffers.
-void lay_out_levels(const std::vector<Taps>& rows, UnwarpTable& table) {
+/// Finds the part of each halved image that the taps need, and its offsets in the buffers.
+void compute_level_layout(const std::vector<Taps>& rows, UnwarpTable& table) {
   int highest = 0;
   for (const Taps& taps : rows) {
     for (const Tap& tap : taps) highest = std::max(highest, tap.level);
@@ -311,12 +318,12 @@ void lay_out_levels(const std::vector<Taps>& rows, UnwarpTable& table) {
       level.top = std::min(level.top, level.pair_top);
       level.right = std::max(level.right, level.pair_right);
       level.bottom = std::max(level.bottom, level.pair_bottom + 1);
-      level.pairs_at = table.pairs_size;
+      level.pairs_offset = table.pairs_size;
       table.pairs_size += static_cast<std::size_t>(level.pair_right - level.pair_left) *
                           (level.pair_bottom - level.pair_top);
     }
     if (i == 0) break;
-    level.halved_at = table.halved_size;
+    level.halved_offset = table.halved_size;
     table.halved_size +=
         static_cast<std::size_t>(level.right - level.left) * (level.bottom - level.top);
     UnwarpTable::Level& finer = table.levels[static_cast<std::size_t>(i) - 1];
@@ -333,26 +340,26 @@ UnwarpTable make_unwarp_table(const Camera& camera, int rows, int columns,
                               const ElevationBand& band) {
   const RowSampler sampler(camera, rows, columns, band);
   std::vector<Taps> taps_of_rows;
-  std::vector<std::vector<std::uint8_t>> seen;
+  std::vector<std::vector<std::uint8_t>> visible;
   for (int y = 0; y < rows; ++y) {
-    taps_of_rows.push_back(sampler.sample(y));
-    seen.push_back(fill_missing_taps(taps_of_rows.back(), columns, lens_count(camera)));
+    taps_of_rows.push_back(sampler.make_row_taps(y));
+    visible.push_back(fill_missing_taps(taps_of_rows.back(), columns, lens_count(camera)));
   }
-  fill_invisible_directions(taps_of_rows, seen, columns);
+  fill_invisible_directions(taps_of_rows, visible, columns);
 
   UnwarpTable table;
-  lay_out_levels(taps_of_rows, table);
+  compute_level_layout(taps_of_rows, table);
   for (const Taps& taps : taps_of_rows) {
     table.rows.push_back({static_cast<int>(taps.size()) / columns, table.positions.size()});
     for (const Tap& tap : taps) {
       const UnwarpTable::Level& level = table.levels[tap.level];
       const auto width = static_cast<std::size_t>(level.pair_right - level.pair_left);
       table.positions.push_back(static_cast<std::uint32_t>(
-          level.pairs_at + (tap.v - level.pair_top) * width + (tap.u - level.pair_left)));
+          level.pairs_offset + (tap.v - level.pair_top) * width + (tap.u - level.pair_left)));
       table.weights.push_back(tap.weights);
     }
   }
-  for (const auto& row : seen) table.seen.insert(table.seen.end(), row.begin(), row.end());
+  for (const auto& row : visible) table.visible.insert(table.visible.end(), row.begin(), row.end());
   return table;
 }
 
