@@ -150,7 +150,7 @@ TEST(LoopClosureFinder, RefusesAHeadingBeyondTheDrift) {
   const auto closures_with_heading_error = [&](double error_rad, std::size_t component) {
     VisualMemory memory = empty_memory();
     LoopClosureFinder finder(memory, {}, in_metres);
-    std::vector<PassedNode> nodes;
+    std::vector<PathNode> nodes;
     std::vector<Pose2> poses;
     std::size_t closures = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) {

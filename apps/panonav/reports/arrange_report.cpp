@@ -65,7 +65,7 @@ std::vector<std::optional<Point2>> align_to_end(const std::vector<Pose2>& poses,
 
 }  // namespace
 
-LatticeWatch LatticeSteps::watch() {
+LatticeStepCallback LatticeSteps::watch() {
   constexpr std::size_t max_steps = 200;
   return [this](std::span<const Pose2> poses, std::span<const std::size_t> components) {
     const std::size_t number = count_++;

@@ -16,7 +16,7 @@ namespace panonav::command {
 class LatticeSteps {
  public:
   /// For `arrange`; *this must outlive it.
-  [[nodiscard]] LatticeWatch watch();
+  [[nodiscard]] LatticeStepCallback watch();
   /// The steps as a map that unfolds. Groups of views are laid over where they end, as they are
   /// turned and deformed then; views alone and in pairs are not drawn. Of long arrangements
   /// fewer steps and the two shortest springs of each view, so that a page stays small.

@@ -138,7 +138,7 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
   session.detail(std::to_string(memory.size()) + " views loaded");
   if (arguments.report) prepare_report_folder(*arguments.report, "arrange");
   LatticeSteps steps;
-  const LatticeWatch watch = arguments.report ? steps.watch() : LatticeWatch();
+  const LatticeStepCallback watch = arguments.report ? steps.watch() : LatticeStepCallback();
   const Lattice lattice = arrange(memory, arguments.lattice,
                                   read_motions(arguments, file.header().source, memory, session),
                                   session.executor(), watch);

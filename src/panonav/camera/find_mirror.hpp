@@ -63,8 +63,7 @@ void visit_options(MirrorCircle::SearchOptions& options, OptionVisitor& visitor)
 /// circle reaches `min_quality`. Limits: other round objects that fill the picture are taken for a
 /// mirror; a mirror in patterned surroundings may be missed; a ring with almost as much structure
 /// as the scene is included in the mirror. Throws ContractError when there is no image, sizes
-/// differ, or a side is shorter than 32 px; OptionError. Cost: about 0.4 s for each image of 640 x
-/// 480.
+/// differ, or a side is shorter than 32 px; OptionError. Cost: 0.4 s for an image of 640 x 480.
 [[nodiscard]] std::optional<MirrorCircle> find_mirror(
     std::span<const ImageView> images, const MirrorCircle::SearchOptions& options = {});
 

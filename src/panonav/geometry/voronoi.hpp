@@ -29,8 +29,8 @@ struct Circle {
 /// site than to any other, clipped to a square of side `spacing_m` around the site that is
 /// aligned with the direction to the nearest other site. In a square grid of that spacing every
 /// cell therefore has the area spacing^2, also at the border and for any rotation of the grid;
-/// along a path, cells form a strip as wide as the spacing; an isolated site gets the whole
-/// square. Cells do not overlap, so the area of a set of sites is the sum of their cells' areas.
+/// along a path, cells form a strip as wide as the spacing. Cells do not overlap, so the area of a
+/// set of sites is the sum of their cells' areas.
 class VoronoiCells {
  public:
   /// Default of `spacing_m`: the (lower) median over all sites of the distance to the

@@ -16,7 +16,8 @@ constexpr int stages_of_coarse_to_fine = 3;
 constexpr int stages_of_recovering = 4;
 /// Factor of the step when a vector opposes the one before it.
 constexpr double opposing_factor = 0.5;
-/// Factor when they agree: two such steps do not undo one halving, so random directions shorten it.
+/// Factor of the step when both vectors agree: two such steps do not undo one halving, so steps
+/// shrink when directions are random.
 constexpr double agreeing_factor = 1.25;
 
 }  // namespace
@@ -44,9 +45,9 @@ void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
 
 HomingPursuit::HomingPursuit(HomingView home, const HomingPursuitOptions& options,
                              const FourierHomingOptions& vector)
-    : home_(std::move(home)), options_(options), vector_(vector) {
+    : home_(std::move(home)), options_(options), vector_options_(vector) {
   validate(options_);
-  validate(vector_);
+  validate(vector_options_);
 }
 
 bool HomingPursuit::has_next_stage(double difference) const noexcept {
@@ -62,7 +63,7 @@ bool HomingPursuit::has_next_stage(double difference) const noexcept {
 }
 
 FourierHomingOptions HomingPursuit::vector_options_of_stage(const HomingView& current) const {
-  FourierHomingOptions vector = vector_;
+  FourierHomingOptions vector = vector_options_;
   int highest = 0;
   if (options_.strategy == HomingPursuitOptions::Strategy::coarse_to_fine) {
     highest = std::array{options_.coarse, options_.middle,
@@ -76,13 +77,13 @@ FourierHomingOptions HomingPursuit::vector_options_of_stage(const HomingView& cu
   return vector;
 }
 
-// Returns the view of a robot that is tilted as at home. The heading is better known once the view
-// is level, and then the tilt, too.
+// Returns the view as a robot with the same tilt as at home would take it. The second pass has a
+// better heading, from the levelled view, and so a better tilt.
 HomingView HomingPursuit::align_tilt_to_home(const HomingView& view) const {
   constexpr int passes = 2;
   HomingView level = view;
   for (int i = 0; i < passes; ++i) {
-    const HomeVector vector = home_vector(home_, level, vector_);
+    const HomeVector vector = home_vector(home_, level, vector_options_);
     const Tilt tilt = relative_tilt(home_, view, vector.heading_rad);
     if (tilt == Tilt{}) return view;
     level = level_view(view, tilt);
@@ -91,7 +92,8 @@ HomingView HomingPursuit::align_tilt_to_home(const HomingView& view) const {
 }
 
 HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
-  const HomingView current = vector_.tilt && home_.elevations() ? align_tilt_to_home(view) : view;
+  const HomingView current =
+      vector_options_.tilt && home_.elevations() ? align_tilt_to_home(view) : view;
   Decision decision;
   decision.difference = image_difference(home_, current);
   ++steps_since_min_;
@@ -104,16 +106,17 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
     const HomeVector vector = home_vector(home_, current, options);
     decision.vector = vector;
     decision.stage = stage_;
-    // Vectors are in the constant frame of the robot at home.
+    // Directions are compared in the frame of the robot at home, which does not change.
     const double direction_in_home_rad = vector.direction_rad() - vector.heading_rad;
     if (direction_in_home_rad_) {
       const bool is_opposing = std::cos(direction_in_home_rad - *direction_in_home_rad_) < 0.0;
-      gain_ = is_opposing ? gain_ * opposing_factor : std::min(1.0, gain_ * agreeing_factor);
+      step_factor_ = is_opposing ? step_factor_ * opposing_factor
+                                 : std::min(1.0, step_factor_ * agreeing_factor);
     }
     direction_in_home_rad_ = direction_in_home_rad;
     decision.turn_rad = vector.direction_rad();
     decision.advance_m =
-        gain_ * std::min(options_.max_step_m, options_.typical_distance_m * vector.length());
+        step_factor_ * std::min(options_.max_step_m, options_.typical_distance_m * vector.length());
     const bool stops = vector.length() < options_.stop_length ||
                        decision.advance_m < options_.min_step_m ||
                        steps_since_min_ >= options_.patience;
@@ -128,7 +131,7 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
       ++stage_;
       min_difference_ = decision.difference;
       steps_since_min_ = 0;
-      gain_ = 1.0;
+      step_factor_ = 1.0;
       direction_in_home_rad_.reset();
       continue;
     }

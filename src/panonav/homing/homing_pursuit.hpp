@@ -12,24 +12,25 @@ namespace panonav {
 struct HomingPursuitOptions {
   /// Which frequencies count at which stage.
   enum class Strategy {
-    steady,          ///< those of the home vector's options throughout
+    steady,          ///< the frequencies of the home vector's options throughout
     coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
-    /// Ours: steady first. If homing stops where the difference of the views is too large for home,
-    /// coarse to fine from there, then steady once more. Such a wrong end is mostly too far from
-    /// home for any but the lowest frequencies.
+    /// Our rule: steady first. If homing stops where the views differ too much to be at home,
+    /// coarse to fine from there, then steady again: most such wrong ends are too far from home for
+    /// all but the lowest frequencies.
     recovering,
   };
 
   /// Which frequencies count at which stage.
   Strategy strategy = Strategy::recovering;
-  /// Highest frequencies of the stages of coarse_to_fine [S06 figure 13]; the first two count for
-  /// `recovering`, too. Where the views have fewer, all that they have.
+  /// Highest frequency of the first stage of coarse_to_fine, followed by those of the other stages
+  /// [S06 figure 13]; limited to the frequencies of the views. `recovering` uses the first two.
   int coarse = 2;
   int middle = 4;                   ///< of the second stage, >= 1
   int fine = 10;                    ///< of the third stage, >= 1
   double typical_distance_m = 3.0;  ///< R_typ, distance of the things around [S06 section 3]
   double max_step_m = 0.3;          ///< l_max [S06 section 3]
-  /// Homing stops when the vector is shorter, in units of R: the root of S06's epsilon.
+  /// Homing stops when the home vector is shorter than this, in units of R: the square root of
+  /// S06's epsilon.
   double stop_length = 0.01;
   /// Homing also stops when steps become shorter than this, because successive vectors oppose each
   /// other.
@@ -44,10 +45,10 @@ struct HomingPursuitOptions {
 };
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor);
 
-/// Homing of S06 section 3: one step for each view. Direction by the home vector, length
-/// min(l_max, R_typ length) [S06 section 3, step 3]. With a wrong R or noise that alone
-/// oscillates around the goal. The step is therefore halved when a vector opposes the one before
-/// it, both in the frame of the home view, and grows by a quarter when they agree.
+/// Homing step by step [S06 section 3]: each step has the direction of the home vector and the
+/// length min(l_max, R_typ length) [S06 section 3, step 3]. With a wrong R or with noise this alone
+/// would oscillate around the goal. So the step is halved when a vector opposes the previous one,
+/// both in the frame of the home view, and grows by a quarter when they agree.
 ///
 /// Holds the state of one run. Does not depend on how the robot moves: a differential robot turns
 /// and drives, a holonomic one drives sideways, and the heading does not matter.
@@ -66,7 +67,7 @@ class HomingPursuit {
     double turn_rad = 0.0;        ///< direction of the motion, in the current robot frame
     double advance_m = 0.0;       ///< length of the step; 0 unless moving
     HomeVector vector;            ///< of the decision
-    int stage = 0;                ///< counts changes of the frequencies
+    int stage = 0;                ///< index of the stage, which determines the frequencies
     double difference = 1.0;      ///< of the views, by `image_difference`
   };
 
@@ -92,10 +93,10 @@ class HomingPursuit {
 
   HomingView home_;
   HomingPursuitOptions options_;
-  FourierHomingOptions vector_;
+  FourierHomingOptions vector_options_;
   int stage_ = 0;
   int steps_ = 0;
-  double gain_ = 1.0;
+  double step_factor_ = 1.0;
   std::optional<double> direction_in_home_rad_;  // of the step before
   double min_difference_ = 2.0;                  // of the stage
   int steps_since_min_ = 0;

@@ -13,8 +13,7 @@ namespace panonav {
 
 namespace {
 
-/// Tolerance of distances, so that rounding does not decide whether a step of exactly the limit
-/// counts.
+/// Tolerance of distances, so that a step of exactly the limit is accepted in spite of rounding.
 constexpr double rounding_m = 1e-9;
 
 // Finds the place nearest to a point, if one is within a fixed reach.
@@ -27,7 +26,7 @@ class PlaceFinder {
     }
   }
 
-  /// Returns `otherwise` when nothing is in reach; of equally near places the first.
+  /// Returns the nearest place, of equally near ones the first; `otherwise` if none is in reach.
   [[nodiscard]] std::uint32_t find_nearest(Point2 point, std::uint32_t otherwise) const {
     std::uint32_t best = otherwise;
     double best_square = reach_m_ * reach_m_;
@@ -125,7 +124,7 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
 }
 
 std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey, double bin_m) {
-  // Curves of more points are drawn by nobody; a bin takes 24 bytes.
+  // Limits the memory of the bins, 24 bytes each; plots need fewer points.
   constexpr double max_bins = 1e5;
   double farthest_m = 0.0;
   for (const Pose2& goal : survey.goals) {

@@ -53,7 +53,7 @@ struct HomingSurvey {
   }
 };
 
-/// Progress 0 .. 1; called from several threads at once, but never by two at the same time.
+/// Receives the progress, 0 .. 1. Called from several threads, but never from two at the same time.
 using SurveyProgress = std::function<void(double fraction)>;
 
 /// Applies the rule to all pairs. Same bits on any number of threads. Throws OptionError;
@@ -64,25 +64,26 @@ using SurveyProgress = std::function<void(double fraction)>;
                                          const HomingSurveyOptions& options, Executor& executor,
                                          const SurveyProgress& progress = {});
 
-/// Averages the homeward component by distance [S06 eq. 48]. Bin i holds the distances within half
-/// a bin of i `bin_m`; so places on a grid of this spacing fall into the middle of bins. Throws
-/// ContractError unless bin_m > 0 and there are at most 100,000 bins.
+/// Averages the homeward component by distance [S06 eq. 48]. Bin i contains the distances from (i -
+/// 0.5) bin_m to (i + 0.5) bin_m, so that the distances on a grid of this spacing are in the middle
+/// of bins. Throws ContractError unless bin_m > 0 and there are at most 100,000 bins.
 [[nodiscard]] std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey,
                                                                   double bin_m = 0.025);
 
-/// Averages the homeward component over all pairs above 0 and up to `max_m`; NaN when there is
-/// none.
+/// Averages the homeward component over all pairs whose distance is above 0 and at most `max_m`;
+/// NaN if there is none.
 [[nodiscard]] double mean_homeward_component(const HomingSurvey& survey, double max_m);
 
-/// Returns the place where the run to the goal ends that starts at each place. With several stages
-/// a run continues with the next one where the last has stopped [S06 section 5]: surveys of the
-/// same goals and places. Throws ContractError on none, on different sizes and on a goal out of
+/// Returns for each place the place where a run to the goal that starts there ends. Each stage
+/// continues where the previous one has stopped [S06 section 5]; stages are surveys of the same
+/// goals and places. Throws ContractError without stages, on different sizes and on a goal out of
 /// range.
 [[nodiscard]] std::vector<std::uint32_t> final_places(std::span<const HomingSurvey* const> stages,
                                                       std::size_t goal,
                                                       const HomingSurveyOptions& options = {});
 
-/// Returns the metres between goal and end of the run from each place, goal after goal.
+/// Returns the distance in metres between the goal and the end of the run from each place: all
+/// places of the first goal, then of the next.
 [[nodiscard]] std::vector<float> final_distances(std::span<const HomingSurvey* const> stages,
                                                  const HomingSurveyOptions& options,
                                                  Executor& executor);

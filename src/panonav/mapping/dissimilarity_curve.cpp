@@ -9,8 +9,8 @@ namespace panonav {
 
 namespace {
 
-/// Share of the level of far views from which on the curve counts as flat [M04 figure 7].
-constexpr double share_of_level = 0.95;
+/// Dissimilarity at which the curve becomes flat, as a share of that of far views [M04 figure 7].
+constexpr double max_level_share = 0.95;
 
 struct DistanceGroup {
   double dissimilarity = 0.0;
@@ -19,8 +19,8 @@ struct DistanceGroup {
   double weight = 0.0;
 };
 
-/// Makes the values rise: the nearest rising sequence in weighted least squares (pool adjacent
-/// violators).
+/// Replaces the values by the nearest non-decreasing sequence in weighted least squares (pool
+/// adjacent violators).
 template <class Value>
 void make_monotonic(std::vector<DistanceGroup>& groups, Value value) {
   struct Block {
@@ -73,8 +73,8 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityCurve::Sampl
     return a.dissimilarity != b.dissimilarity ? a.dissimilarity < b.dissimilarity
                                               : a.distance < b.distance;
   });
-  // The pairs limit the number of groups: the deviation of a group's mean and its place on the axis
-  // shrink by the same factor.
+  // The number of groups is the square root of the number of pairs, so that the noise of the means
+  // and the spacing of the groups shrink by the same factor.
   const std::size_t count = std::clamp<std::size_t>(
       static_cast<std::size_t>(std::sqrt(static_cast<double>(sorted.size()))), 1, 40);
   std::vector<DistanceGroup> groups(count);
@@ -99,14 +99,15 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityCurve::Sampl
   knots_.push_back({});
   for (const DistanceGroup& group : groups) {
     if (!(group.dissimilarity > knots_.back().dissimilarity)) {
-      // Identical views are most likely at one place.
+      // Groups of equal dissimilarity add no knot; at 0 the distance is 0, as identical views are
+      // most likely at one place.
       continue;
     }
     knots_.push_back({group.dissimilarity, group.distance, std::sqrt(group.square)});
   }
   if (knots_.size() == 1) knots_.push_back({1.0, 0.0, 0.0});
 
-  max_dissimilarity_ = share_of_level * level;
+  max_dissimilarity_ = max_level_share * level;
   range_ = distance(max_dissimilarity_);
 }
 

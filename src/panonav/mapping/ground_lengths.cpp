@@ -12,16 +12,19 @@ namespace panonav {
 
 namespace {
 
-/// Latest steps that predict the next one, and from how many on they do.
-constexpr std::size_t max_latest = 15;
-constexpr std::size_t min_latest = 3;
-/// Starts of the first steps, times the length by the default scale: octaves around it.
-constexpr std::array<double, 4> first_guesses{0.5, 1.0, 2.0, 4.0};
-/// Largest standard deviation of a length that is used, as a share of it.
+/// Largest and smallest number of latest steps from which the scale is estimated.
+constexpr std::size_t max_scale_steps = 15;
+constexpr std::size_t min_scale_steps = 3;
+/// Start lengths of the search before a scale is known, as multiples of the length by the default
+/// scale.
+constexpr std::array<double, 4> initial_length_factors{0.5, 1.0, 2.0, 4.0};
+/// Largest relative standard deviation of an accepted length.
 constexpr double max_relative_deviation = 0.2;
-/// Largest factor between a length and the one by the latest steps, either way.
+/// Largest ratio of a length to the one that the scale predicts, or of the prediction to the
+/// length.
 constexpr double max_relative_change = 2.0;
-/// Shortest length in camera heights that shows a scale: below it rounding of pixels decides.
+/// Shortest length, in camera heights, from which the scale is learnt: shorter ones are dominated
+/// by the rounding of pixels.
 constexpr double min_length = 0.03;
 
 }  // namespace
@@ -32,7 +35,7 @@ GroundLengths::GroundLengths(double camera_height_m) : camera_height_m_(camera_h
 }
 
 std::optional<double> GroundLengths::scale_m() const {
-  if (latest_scales_m_.size() < min_latest) return std::nullopt;
+  if (latest_scales_m_.size() < min_scale_steps) return std::nullopt;
   return upper_median(latest_scales_m_);
 }
 
@@ -54,7 +57,7 @@ bool GroundLengths::correct_step(const HomingView& before, const HomingView& aft
   if (known_m) {
     search_near(*known_m * step.length_in_views);
   } else {
-    for (const double guess : first_guesses) search_near(guess * length_m);
+    for (const double guess : initial_length_factors) search_near(guess * length_m);
   }
   if (found) {
     const double length = std::hypot(found->x, found->y);
@@ -64,7 +67,8 @@ bool GroundLengths::correct_step(const HomingView& before, const HomingView& aft
       if (length > min_length) {
         latest_scales_m_.push_back(length * camera_height_m_ / step.length_in_views);
       }
-      if (latest_scales_m_.size() > max_latest) latest_scales_m_.erase(latest_scales_m_.begin());
+      if (latest_scales_m_.size() > max_scale_steps)
+        latest_scales_m_.erase(latest_scales_m_.begin());
       motion = {found->x * camera_height_m_, found->y * camera_height_m_, motion.heading_rad};
       return true;
     }

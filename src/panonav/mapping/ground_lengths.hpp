@@ -9,20 +9,20 @@ namespace panonav {
 
 struct VisualStep;
 
-/// Reads lengths of successive steps from the ground. The latest steps predict the next one and
-/// replace it where the ground shows nothing.
+/// Measures the metric lengths of successive steps from images of the ground. Where the ground
+/// shows nothing, the scale of the latest steps gives the length.
 class GroundLengths {
  public:
   /// Throws ContractError unless the height is above 0.
   explicit GroundLengths(double camera_height_m);
 
-  /// Replaces the displacement of `step`, which must be that of these views, by the one that the
-  /// ground shows, in metres, else its length by that of the latest steps. False where neither is
-  /// known; the step then stays as it is.
+  /// Replaces the displacement of `step`, the visual step between both views, by the one that the
+  /// ground shows, in metres, or else only its length, by the scale of the latest steps. Returns
+  /// false and leaves the step unchanged if neither is known.
   bool correct_step(const HomingView& before, const HomingView& after, VisualStep& step);
 
   /// Metric scale of visual displacements in metres per unit of length, estimated from the latest
-  /// steps; nullopt before the first.
+  /// steps; nullopt before the third.
   [[nodiscard]] std::optional<double> scale_m() const;
 
  private:

@@ -21,13 +21,14 @@ namespace panonav {
 
 namespace {
 
-/// Weight of a link at the limit of agreement (`GrownLayout::weights`).
+/// Smallest weight (`GrownLayout::weights`) of a spring that is kept without a direction: the
+/// weight at the limit of agreement.
 constexpr double min_grown_weight = 0.25;
-/// Largest error of headings laid out by motion and phases: half of the quarter turn after which
-/// symmetric rooms look similar.
+/// Largest error of headings in a layout by motion and phases: 45 degrees, half of the rotation
+/// after which symmetric rooms look similar.
 constexpr double max_heading_error_rad = 0.25 * std::numbers::pi;
-/// Share of the triangles of a spring of which more must close, where no motion shows which views
-/// are near (docs/decisions.md).
+/// A spring is kept if more than this share of its triangles close, where no motion shows which
+/// views are near (docs/decisions.md).
 constexpr double min_closing_triangles = 0.5;
 
 /// The measured pairs of views, each once, ascending.
@@ -38,7 +39,7 @@ class MeasuredPairs {
 
   [[nodiscard]] const std::vector<Lattice::Spring>& springs() const { return springs_; }
 
-  /// Measures the pairs that are not known yet, with the headings of `window(pair)`.
+  /// Measures the pairs that are not measured yet, at the headings that `window(pair)` allows.
   template <class Window>
   void add(const std::vector<NodePair>& pairs, const Window& window) {
     std::vector<NodePair> added;
@@ -69,7 +70,8 @@ class MeasuredPairs {
 class Arranger {
  public:
   Arranger(const VisualMemory& memory, const LatticeOptions& options,
-           std::span<const CoarseMotion> motion, Executor& executor, const LatticeWatch& watch)
+           std::span<const CoarseMotion> motion, Executor& executor,
+           const LatticeStepCallback& watch)
       : options_(options),
         executor_(executor),
         watch_(watch),
@@ -98,7 +100,7 @@ class Arranger {
         lay_out_if_needed();
         relax();  // [M04 section 3.2]
       }
-      set_unit();
+      rescale_layout();
       if (watch_) watch_(layout_.poses, layout_.components);
     }
     finish();
@@ -108,7 +110,8 @@ class Arranger {
  private:
   [[nodiscard]] std::size_t size() const { return lattice_.nodes.size(); }
 
-  /// Returns the window of headings between two nodes by motion or by the headings so far.
+  /// Returns the relative headings of two nodes that their motion or the layout allows; nullopt:
+  /// all headings.
   [[nodiscard]] std::optional<HeadingWindow> heading_window(NodePair pair) const {
     if (!by_motion_) return std::nullopt;
     if (layout_.poses.empty()) return motions_.heading_between(pair);
@@ -126,7 +129,7 @@ class Arranger {
     std::vector<NodePair> pairs;
     for (const auto& step : motions_.all()) pairs.push_back(std::minmax(step.a, step.b));
     if (!by_motion_) {
-      const auto similar = views_.find_most_similar(options_, executor_);
+      const auto similar = views_.find_most_similar_pairs(options_, executor_);
       pairs.insert(pairs.end(), similar.begin(), similar.end());
     }
     measure(pairs);
@@ -143,7 +146,8 @@ class Arranger {
       for (const std::size_t j : near[i]) pairs.push_back(std::minmax(i, j));
     }
     if (by_motion_) {
-      // Headings are better known now, and so is which of several fits is right.
+      // All pairs are measured again: the headings of the layout select the right one of several
+      // fits.
       for (const auto& spring : measured_.springs()) pairs.emplace_back(spring.a, spring.b);
       measured_.clear();
     }
@@ -158,8 +162,8 @@ class Arranger {
     fit_phase_unit(lattice_.springs, layout_.poses, lattice_.errors);
   }
 
-  /// Grows the layout from the most certain springs. Keeps the springs inside the components that
-  /// agree with the layout; views without any of these leave their component.
+  /// Grows the layout from the most certain springs. Keeps the springs that agree with the layout;
+  /// views without such a spring leave their component.
   void grow_from_most_certain() {
     measure(proposals_);
     const double unit = lattice_.errors.phase_unit;
@@ -195,7 +199,7 @@ class Arranger {
       add_spring(spring);
     }
     if (options_.phases) {
-      drop_unconfirmed(size(), by_motion_ ? 0.0 : min_closing_triangles, lattice_.springs);
+      drop_unconfirmed_springs(size(), by_motion_ ? 0.0 : min_closing_triangles, lattice_.springs);
     }
   }
 
@@ -209,12 +213,12 @@ class Arranger {
     return spring;
   }
 
-  /// Returns the springs, and the motions where there is no spring.
+  /// Returns the springs and, as further springs, all motions.
   [[nodiscard]] std::vector<Lattice::Spring> springs_and_motions() const {
     std::vector<Lattice::Spring> all = lattice_.springs;
     for (const auto& step : motions_.all()) {
       const NodePair pair = std::minmax(step.a, step.b);
-      all.push_back({.a = pair.first, .b = pair.second, .length = travel(step)});
+      all.push_back({.a = pair.first, .b = pair.second, .length = step_length(step)});
     }
     return all;
   }
@@ -223,7 +227,7 @@ class Arranger {
     layout_ = by_motion_ ? lay_out_by_motion(size(), motions_.all(), measured_.springs())
                          : lay_out_by_springs(size(), springs_and_motions(), options_.landmarks);
   }
-  /// Lays out the nodes again when the springs connect other views than before.
+  /// Lays out the nodes if there is no layout yet or the connected components have changed.
   void lay_out_if_needed() {
     if (by_motion_) return;
     std::vector<GraphEdge> edges;
@@ -253,7 +257,7 @@ class Arranger {
 
   /// Scales the layout to metres where there is motion, else to a median distance of 1 between
   /// nearest views.
-  void set_unit() {
+  void rescale_layout() {
     const auto scale = lattice_.metric ? motions_.layout_scale(layout_.poses) : unit_scale();
     if (!scale) return;
     for (Pose2& pose : layout_.poses) {
@@ -296,14 +300,14 @@ class Arranger {
 
   LatticeOptions options_;
   Executor& executor_;
-  const LatticeWatch& watch_;
+  const LatticeStepCallback& watch_;
   SpringViews views_;
   NodeMotions motions_;
   bool by_motion_ = false;  // motion connects all views
   MeasuredPairs measured_;
   bool curve_is_fitted_ = false;
-  LatticeStart layout_;              // empty before the first
-  std::vector<NodePair> proposals_;  // worth measuring in the next round
+  LatticeLayout layout_;             // no poses before the first layout
+  std::vector<NodePair> proposals_;  // pairs to measure in the next round
   Lattice lattice_;
 };
 
@@ -352,7 +356,7 @@ CoarseMotion make_coarse_motion(ViewId from, ViewId to, const Pose2& step,
 
 Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                 std::span<const CoarseMotion> motion, Executor& executor,
-                const LatticeWatch& watch) {
+                const LatticeStepCallback& watch) {
   validate(options);
   return Arranger(memory, options, motion, executor, watch).arrange();
 }

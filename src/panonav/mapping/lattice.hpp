@@ -18,11 +18,11 @@ namespace panonav {
 
 /// Options of an arrangement.
 struct LatticeOptions {
-  int neighbours = 12;  ///< springs from each view to the most similar ones
-  int components = 0;   ///< of the signatures; 0 takes all
+  int neighbours = 12;  ///< number of most similar views to which each view gets springs
+  int components = 0;   ///< number of compared Fourier components; 0: all
   bool phases = true;   ///< directions and headings from phases [M04 section 3.4]
-  int landmarks = 150;  ///< views from which the initial arrangement is made
-  int rounds = 3;       ///< times that curve and springs are made from the arrangement
+  int landmarks = 150;  ///< landmark views of the multidimensional scaling
+  int rounds = 3;       ///< number of times that curve and springs are computed
 };
 void visit_options(LatticeOptions& options, OptionVisitor& visitor);
 
@@ -30,14 +30,14 @@ void visit_options(LatticeOptions& options, OptionVisitor& visitor);
 struct CoarseMotion {
   ViewId from;                         ///< where the motion begins
   ViewId to;                           ///< where it ends
-  Pose2 step;                          ///< from_from_to, metres
+  Pose2 step;                          ///< pose of `to` in the frame of `from`, metres
   double distance_deviation_m = 0.06;  ///< above 0
   double direction_deviation_rad =
       0.2;                          ///< above 0, of the direction of travel in the frame `from`
   double turn_deviation_rad = 0.2;  ///< above 0
 };
 
-/// Uncertainty of a robot's motion; the defaults are those of wheels that slip.
+/// Standard deviations of a robot's motion; the defaults are for wheels that slip.
 struct CoarseMotionOptions {
   double distance_deviation = 0.06;       ///< standard deviation, share of the distance
   double direction_deviation_rad = 0.15;  ///< of the direction of travel
@@ -45,43 +45,44 @@ struct CoarseMotionOptions {
 };
 void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor);
 
-/// Makes a motion with the deviations of the options, for at least one centimetre of travel. Throws
-/// OptionError.
+/// Makes a motion with the standard deviations of the options. Steps below 1 cm get the distance
+/// deviation of 1 cm, so that it is above 0. Throws OptionError.
 [[nodiscard]] CoarseMotion make_coarse_motion(ViewId from, ViewId to, const Pose2& step,
                                               const CoarseMotionOptions& options = {});
 
-/// Views with the poses that follow from their springs.
+/// Views, the springs between them and the poses computed from the springs [M04 section 3].
 struct Lattice {
   /// A view in the arrangement.
   struct Node {
     ViewId view;                ///< an id of the memory
     Pose2 pose;                 ///< in its component's frame; heading 0 without phases
-    std::size_t component = 0;  ///< index of its group
+    std::size_t component = 0;  ///< index of its connected component
   };
-  /// A pair of views with a distance read from their dissimilarity.
+  /// Two views and their distance, estimated from their dissimilarity.
   struct Spring {
     std::size_t a = 0;                   ///< nodes, a < b
     std::size_t b = 0;                   ///< the other node
     double dissimilarity = 0.0;          ///< of the two views, over the components of the options
     double length = 0.0;                 ///< rest length, read from the dissimilarity
     double stiffness = 1.0;              ///< K of [M04 eq. 5]
-    double weight = 1.0;                 ///< robust weight, 1 .. 0: near 0 it is an outlier
+    double weight = 1.0;                 ///< robust weight, 0 .. 1; near 0: an outlier
     std::optional<PhaseReading> phases;  ///< nullopt without phases
   };
-  /// Standard deviations of springs, estimated from the arrangement itself; lengths in its unit.
+  /// Standard deviations of springs, estimated from the arrangement. Lengths are in the unit of the
+  /// arrangement.
   struct Errors {
     double length = 0.25;        ///< of the rest length of a spring of stiffness 1
     double direction_rad = 0.1;  ///< of a direction in which both views agree
     double turn_rad = 0.1;       ///< of a turn in which both views agree
-    /// Length of the unit of lengths by phases.
+    /// Length in the arrangement of one unit of the lengths that phases give.
     double phase_unit = 1.0;
-    double phase_length = 0.25;  ///< standard deviation of such lengths, as a share
+    double phase_length = 0.25;  ///< relative standard deviation of lengths from phases
   };
-  /// A connected component: views that springs join. Each component has its own frame, and nothing
-  /// is known of their relative poses.
+  /// A connected component: views that springs connect. Each component has its own frame; the
+  /// relative poses of components are unknown.
   struct Component {
     std::size_t views = 0;  ///< nodes of the component
-    /// False: it may be the mirror image.
+    /// False if the component may be mirrored.
     bool handedness_known = false;
   };
 
@@ -90,20 +91,19 @@ struct Lattice {
   std::vector<Component> components;  ///< the largest first
   DissimilarityCurve curve{1.0};      ///< of the last round
   Errors errors;                      ///< of the last round
-  /// Pairs of views whose relative pose, without phases whose dissimilarity, was read; those that
-  /// are no springs were rejected.
+  /// Number of pairs of views that were measured; those that are no springs were rejected.
   std::size_t candidates = 0;
-  /// True: metres, from the coarse motion. False: the unit is the median distance of a view to its
-  /// nearest one.
+  /// True if lengths are in metres, from the coarse motion. Otherwise the unit is the median
+  /// distance between a view and its nearest one.
   bool metric = false;
   double energy = 0.0;  ///< sum over springs of weight times squared strain in deviations
   int iterations = 0;   ///< of the solver, over all rounds
 };
 
-/// Called after each step of an arrangement with the poses of all views in the memory's order, each
-/// in the frame of its component, and the component of each. Lengths change their unit from step to
-/// step. The spans are valid during the call.
-using LatticeWatch =
+/// Called after each step of an arrangement with the pose and the component of each view, in the
+/// memory's order. Poses are in the frame of their component; the unit of length changes between
+/// steps. The spans are valid during the call only.
+using LatticeStepCallback =
     std::function<void(std::span<const Pose2> poses, std::span<const std::size_t> components)>;
 
 /// Arranges the views of a memory by their similarity alone [M04 section 3]:
@@ -113,20 +113,20 @@ using LatticeWatch =
 /// 4. The curve from dissimilarity to distance is fitted, near views get springs, and step 2 or 3
 ///    is repeated, `rounds` times in all.
 ///
-/// `motion` [M04 section 3.4]: motions of the robot between views. It makes the map metric;
-/// similarity then gives consistent springs only. Throws OptionError; ContractError on a motion
-/// with an unknown view or numbers that are not finite. Same bits on any number of threads.
+/// `motion` [M04 section 3.4]: motions between views. With it lengths are in metres;
+/// if it connects all views, only near views and those along a motion get springs. Throws
+/// OptionError; ContractError on a motion with an unknown view. Same bits on any number of threads.
 [[nodiscard]] Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                               std::span<const CoarseMotion> motion, Executor& executor,
-                              const LatticeWatch& watch = {});
+                              const LatticeStepCallback& watch = {});
 
 /// Adds the views of the memory that the lattice does not have, one after the other. A view gets
-/// springs to the most similar views of the lattice and, of the poses to which they point, that of
-/// minimum energy; then a few nodes around it are adjusted. Other views stay where they are. Cost
-/// of a view: the search and one pass over the springs. A view joins the connected component to
-/// which the majority of its springs lead; without springs it is a new one. Does not join
-/// components. The lattice must come from the same memory, to which views may have been added.
-/// Throws OptionError, ContractError.
+/// springs to the most similar views of the lattice. Each spring proposes a pose; the one with the
+/// least energy is used, then the view and its neighbours are adjusted. All other views are fixed.
+/// Cost of a view: the search and one pass over the springs. A view joins the connected component
+/// to which most of its springs lead; without springs it becomes a new one. Components are never
+/// joined. The lattice must come from the same memory, to which views may have been added. Throws
+/// OptionError, ContractError.
 void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options = {});
 
 /// Converts the arrangement into a map that can be stored and exported: its views with their poses

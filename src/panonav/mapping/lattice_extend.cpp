@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-/// Some nodes of the lattice with the springs among them, numbered from 0.
+/// Some nodes of the lattice, renumbered from 0, and the springs between them.
 struct Neighbourhood {
   std::vector<std::size_t> nodes;
   std::vector<Pose2> poses;
@@ -48,22 +48,23 @@ class Extender {
     for (const Lattice::Node& node : lattice.nodes) {
       require(memory.contains(node.view), "view of the lattice", node.view.value,
               "a view of the memory");
-      require(number_.empty() || number_.rbegin()->first < node.view, "view of the lattice",
-              node.view.value, "later than the one before");
-      number_.emplace(node.view, number_.size());
+      require(node_of_view_.empty() || node_of_view_.rbegin()->first < node.view,
+              "view of the lattice", node.view.value, "later than the one before");
+      node_of_view_.emplace(node.view, node_of_view_.size());
     }
     for (const ViewId view : memory.views()) {
-      if (!number_.contains(view)) unknown_.push_back(view);
+      if (!node_of_view_.contains(view)) new_views_.push_back(view);
     }
-    require(unknown_.empty() || number_.empty() || number_.rbegin()->first < unknown_.front(),
-            "new view", unknown_.empty() ? 0.0 : unknown_.front().value,
+    require(new_views_.empty() || node_of_view_.empty() ||
+                node_of_view_.rbegin()->first < new_views_.front(),
+            "new view", new_views_.empty() ? 0.0 : new_views_.front().value,
             "later than those of the lattice");
   }
 
   void add_all() {
-    // Views that come later are not in the lattice yet.
-    std::vector<ViewId> excluded = unknown_;
-    for (const ViewId view : unknown_) {
+    // The search must not find views that are not in the lattice yet.
+    std::vector<ViewId> excluded = new_views_;
+    for (const ViewId view : new_views_) {
       add_view(view, excluded);
       excluded.erase(excluded.begin());
     }
@@ -74,7 +75,7 @@ class Extender {
   void add_view(ViewId view, std::span<const ViewId> excluded) {
     const std::size_t node = lattice_.nodes.size();
     std::vector<Lattice::Spring> springs = make_springs(view, node, excluded);
-    number_.emplace(view, node);
+    node_of_view_.emplace(view, node);
     std::map<std::size_t, std::size_t> links_to_component;
     for (const auto& spring : springs) ++links_to_component[lattice_.nodes[spring.a].component];
     if (links_to_component.empty()) {
@@ -104,7 +105,7 @@ class Extender {
                                       {.excluded_views = excluded});
     for (const Match& match : found.matches) {
       if (match.dissimilarity > lattice_.curve.max_dissimilarity()) continue;
-      Lattice::Spring spring{.a = number_.at(match.view),
+      Lattice::Spring spring{.a = node_of_view_.at(match.view),
                              .b = node,
                              .dissimilarity = static_cast<double>(match.dissimilarity)};
       if (options_.phases) spring.phases = read_phases(homing(match.view), homing(view));
@@ -122,7 +123,8 @@ class Extender {
                                    : coefficients;
   }
 
-  /// Sets the pose of least energy among those to which the springs point.
+  /// Sets the pose of the node: of the poses that its springs propose, the one with the least
+  /// energy.
   void place_node(std::size_t node, std::span<const Lattice::Spring> springs) {
     std::vector<std::size_t> nodes;
     for (const auto& spring : springs) nodes.push_back(spring.a);
@@ -145,7 +147,8 @@ class Extender {
     }
   }
 
-  /// Moves the new node and its neighbours; the neighbours of these are fixed.
+  /// Relaxes the poses of the new node and its neighbours; the neighbours of its neighbours are
+  /// fixed.
   void relax_around(std::size_t node, std::span<const Lattice::Spring> springs) {
     std::vector<unsigned char> role(lattice_.nodes.size(), 0);  // 1: fixed, 2: moves
     role[node] = 2;
@@ -173,8 +176,8 @@ class Extender {
   Lattice& lattice_;
   const VisualMemory& memory_;
   LatticeOptions options_;
-  std::map<ViewId, std::size_t> number_;
-  std::vector<ViewId> unknown_;
+  std::map<ViewId, std::size_t> node_of_view_;
+  std::vector<ViewId> new_views_;
 };
 
 }  // namespace

@@ -10,29 +10,32 @@ namespace panonav {
 /// Conditions of a loop closure. Wrong closures are worse than missing ones, so a candidate must
 /// pass every check.
 struct LoopClosureOptions {
-  int candidates = 5;  ///< for each view, from the memory's search
-  /// Shortest loop: views nearer along the path are no candidates.
+  int candidates = 5;  ///< number of candidates for each view, from the memory's search
+  /// Shortest path length of a loop; views that are closer along the path are no candidates.
   double min_loop_m = 3.0;
   /// Largest share of the energy of both views that may be unexplained.
   double max_residual = 0.2;
-  /// Largest distance between the views in units of R: farther ones are not reliable.
+  /// Largest distance between the views in units of R, the distance of the things around; home
+  /// vectors between farther views are not reliable.
   double max_length = 0.3;
-  /// Largest disagreement on the heading between the compass and the home vectors there and back.
+  /// Largest heading difference between compass and home vector, and between the home vectors in
+  /// both directions.
   double heading_tolerance_rad = 0.15;
-  /// Largest distance between start and end after both home vectors, in units of R.
+  /// Largest length of the sum of the home vectors there and back, in units of R; 0 if each is the
+  /// inverse of the other.
   double return_tolerance = 0.1;
-  /// Factor by which the residual of the best must be smaller than that of any other place: else
-  /// the closure is ambiguous.
+  /// Smallest ratio of the residual at any other place to that at the best place; below it the
+  /// closure is ambiguous.
   double distinctness = 1.5;
-  /// Rank within which the search from the candidate must find the present view.
+  /// Number of best matches of the candidate among which the present view must be.
   int reciprocal_rank = 5;
   /// Number of successive views whose closures must agree with the motion between them.
   int sequence = 3;
-  /// Path length between reported closures: closer ones add nothing and cost time.
+  /// Shortest path between reported closures: closer ones cost time and add no information.
   double spacing_m = 0.5;
-  /// Largest drift of the odometry, in metres for each metre since the last closure; a fifth of it
-  /// along the rest of the loop, and one R in addition. The heading may be off by twice this, in
-  /// rad, and `heading_tolerance_rad`.
+  /// Largest drift of the odometry in metres per metre since the last closure. The rest of the loop
+  /// adds a fifth of it per metre, and R is added in any case. The heading may be off by twice this
+  /// value, in rad, plus `heading_tolerance_rad`.
   double max_drift = 0.1;
 };
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);

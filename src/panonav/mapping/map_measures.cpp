@@ -12,7 +12,8 @@ namespace panonav {
 namespace {
 
 constexpr int compared_neighbours = 8;
-/// Comparing the neighbours of all takes time with the square of the points; more are thinned out.
+/// Largest number of points whose neighbours are compared, as the time grows with its square; more
+/// points are thinned out.
 constexpr std::size_t max_neighbour_points = 2000;
 
 // Returns for each point its rank by distance from the centre, from 1; 0 for the centre itself.

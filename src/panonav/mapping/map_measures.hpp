@@ -19,14 +19,14 @@ struct MapComparison {
     double trustworthiness = 1.0;  ///< neighbours in the map are neighbours in truth
     double continuity = 1.0;       ///< neighbours in truth are neighbours in the map
   };
-  /// Closures of a map by how far apart their views truly are.
+  /// Number of loop closures by the true distance between their views.
   struct Closures {
-    std::size_t right = 0;    ///< at most the distance of the call
+    std::size_t right = 0;    ///< true distance at most `right_within_m`
     std::size_t wrong = 0;    ///< farther
     std::size_t unknown = 0;  ///< the true position of a view is not known
   };
 
-  std::size_t compared = 0;              ///< positions
+  std::size_t compared = 0;              ///< number of compared positions
   ShapeDifference shape;                 ///< mu [F11]
   Alignment truth_from_map;              ///< least squares, without reflection
   std::optional<Neighbours> neighbours;  ///< nullopt for fewer than 13 positions
@@ -36,10 +36,10 @@ struct MapComparison {
 /// three, and neither all at one place.
 [[nodiscard]] bool is_comparable(std::span<const Point2> map, std::span<const Point2> truth);
 
-/// Compares shape, distances and the 8 nearest neighbours of at most 2000 points, evenly spread.
-/// nullopt unless the sets are comparable. `allow_scale`: the map's unit of length is free. Throws
-/// ContractError on a coordinate that is not finite. Cost O(n^2 log n) up to 2000 points, O(n)
-/// above.
+/// Compares the shape and the positions of two sets of points, and the 8 nearest neighbours of at
+/// most 2000 points, evenly spread. nullopt unless the sets are comparable. `allow_scale`: the
+/// scale of the map is fitted, too. Throws ContractError on a coordinate that is not finite. Cost
+/// O(n^2 log n) up to 2000 points, O(n) above.
 [[nodiscard]] std::optional<MapComparison> compare_positions(std::span<const Point2> map,
                                                              std::span<const Point2> truth,
                                                              bool allow_scale = true);
@@ -51,7 +51,8 @@ struct MapComparison {
                                                                std::span<const Point2> truth,
                                                                int neighbours);
 
-/// Counts the edges of kind closure by the true distance of their views, which `truth` returns.
+/// Counts the loop closures of a map by the true distance of their views. `truth` returns the true
+/// position of a view; nullopt: unknown.
 [[nodiscard]] MapComparison::Closures count_closures(
     const TopologicalMap& map, const std::function<std::optional<Point2>(ViewId)>& truth,
     double right_within_m = 1.0);

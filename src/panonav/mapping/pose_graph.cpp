@@ -44,7 +44,7 @@ struct EdgeError {
 };
 
 // Returns the error in the frame of node a, in standard deviations.
-EdgeError edge_error_of(const PoseEdge& edge, const Pose2& a, const Pose2& b) {
+EdgeError compute_edge_error(const PoseEdge& edge, const Pose2& a, const Pose2& b) {
   const Pose2 present = inverse(a) * b;
   const double position = 1.0 / edge.position_deviation_m;
   return {position * (present.x_m - edge.a_from_b.x_m),
@@ -53,11 +53,12 @@ EdgeError edge_error_of(const PoseEdge& edge, const Pose2& a, const Pose2& b) {
               edge.heading_deviation_rad};
 }
 
-double square(const EdgeError& error) {
+double squared_norm(const EdgeError& error) {
   return error.x * error.x + error.y * error.y + error.heading * error.heading;
 }
 
-/// Returns 1 for the nodes of `fixed` and the first one of each component without any.
+/// Returns 1 for each fixed node: those of `fixed`, and the first node of each component without a
+/// fixed one.
 std::vector<std::uint8_t> choose_fixed_nodes(std::size_t nodes, std::span<const PoseEdge> edges,
                                              std::span<const std::uint8_t> fixed) {
   std::vector<std::uint8_t> held(nodes, 0);
@@ -73,7 +74,7 @@ std::vector<std::uint8_t> choose_fixed_nodes(std::size_t nodes, std::span<const 
   return held;
 }
 
-/// The graph as a problem for `minimise`. Steps narrow the loss of doubtful edges (graduated
+/// The graph as a problem for `minimise`. Each step narrows the loss of doubtful edges (graduated
 /// non-convexity).
 class Graph {
  public:
@@ -93,7 +94,7 @@ class Graph {
   bool linearise(SparseEquations& equations) {
     equations.reset(static_cast<int>(nodes_.size() * unknowns));
     for (std::size_t i = 0; i < nodes_.size() * unknowns; ++i) {
-      // Holds components whose edges have almost no weight left.
+      // A small diagonal entry keeps nodes in place whose edges have almost no weight.
       const double held = fixed_[i / unknowns] != 0 ? 1.0 : 1e-9;
       equations.add(static_cast<int>(i), static_cast<int>(i), held);
     }
@@ -105,12 +106,12 @@ class Graph {
     return true;
   }
 
-  /// Returns true when all edges have their final weights and no pose moves any more.
+  /// Moves the nodes and updates the weights. True if all weights are final and no pose moved.
   bool move(const Eigen::VectorXd& change) {
     ++steps_;
     const double moved = move_nodes(change);
     if (std::isinf(scale_)) {
-      // Before weights change, positions need not be exact.
+      // Positions need not be exact before the first change of the weights.
       constexpr double nearly_settled_m = 0.05;
       if (moved > nearly_settled_m && steps_ < options_.max_iterations / 4) return false;
       scale_ = std::max(final_scale_, update_weights());
@@ -125,19 +126,20 @@ class Graph {
 
   [[nodiscard]] double half_cost() const {
     double sum = 0.0;
-    for (std::size_t i = 0; i < edges_.size(); ++i) sum += weights_[i] * square(edge_error(i));
+    for (std::size_t i = 0; i < edges_.size(); ++i)
+      sum += weights_[i] * squared_norm(edge_error(i));
     return 0.5 * sum;
   }
   [[nodiscard]] const std::vector<double>& weights() const { return weights_; }
 
  private:
-  /// Sets the weights of doubtful edges by their errors against the scale (squared deviations).
-  /// Returns the largest squared error of a doubtful edge.
+  /// Sets the weights of doubtful edges from the ratio of their squared errors to `scale_`. Returns
+  /// the largest squared error of a doubtful edge.
   double update_weights() {
     double largest = 0.0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       if (!edges_[i].doubtful) continue;
-      const double error = square(edge_error(i));
+      const double error = squared_norm(edge_error(i));
       largest = std::max(largest, error);
       const double root = scale_ / (scale_ + error);
       weights_[i] = std::isfinite(scale_) ? root * root : 1.0;
@@ -145,7 +147,7 @@ class Graph {
     return largest;
   }
 
-  /// Returns the largest change of a position or, in radians, of a heading.
+  /// Moves the nodes; returns the largest change of a coordinate (m) or a heading (rad).
   double move_nodes(const Eigen::VectorXd& change) {
     double largest = 0.0;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -161,14 +163,14 @@ class Graph {
   }
 
   [[nodiscard]] EdgeError edge_error(std::size_t i) const {
-    return edge_error_of(edges_[i], nodes_[edges_[i].a], nodes_[edges_[i].b]);
+    return compute_edge_error(edges_[i], nodes_[edges_[i].a], nodes_[edges_[i].b]);
   }
 
   void add_edge(std::size_t i, SparseEquations& equations) const {
     const PoseEdge& edge = edges_[i];
     const Pose2& a = nodes_[edge.a];
     const Pose2& b = nodes_[edge.b];
-    const EdgeError error = edge_error_of(edge, a, b);
+    const EdgeError error = compute_edge_error(edge, a, b);
     const double weight = weights_[i];
     const double p = 1.0 / edge.position_deviation_m;
     const double h = 1.0 / edge.heading_deviation_rad;
@@ -194,7 +196,7 @@ class Graph {
       for (std::size_t n = 0; n <= m; ++n) {
         double sum = 0.0;
         for (std::size_t r = 0; r < 3; ++r) sum += jacobian[r][m] * jacobian[r][n];
-        // Fixed poses keep the equation x = 0, so that the pattern stays the same.
+        // The equations of fixed poses stay x = 0, so that the sparsity pattern does not change.
         const bool stays = fixed_[index(m) / unknowns] != 0 || fixed_[index(n) / unknowns] != 0;
         equations.add(static_cast<int>(index(m)), static_cast<int>(index(n)),
                       stays ? 0.0 : weight * sum);
@@ -255,7 +257,7 @@ std::vector<std::size_t> connected_components(std::size_t nodes, std::span<const
 }
 
 double normalised_residual(const PoseEdge& edge, std::span<const Pose2> nodes) {
-  return std::sqrt(square(edge_error_of(edge, nodes[edge.a], nodes[edge.b])));
+  return std::sqrt(squared_norm(compute_edge_error(edge, nodes[edge.a], nodes[edge.b])));
 }
 
 }  // namespace panonav

@@ -17,18 +17,18 @@ struct PoseEdge {
   Pose2 a_from_b;                       ///< as measured
   double position_deviation_m = 0.1;    ///< standard deviation of x and of y, > 0
   double heading_deviation_rad = 0.05;  ///< above 0
-  /// The edge may be an outlier, as a loop closure may: its weight falls where others contradict
-  /// it.
+  /// True if the edge may be an outlier, such as a loop closure; its weight then falls if other
+  /// edges contradict it.
   bool doubtful = false;
   friend bool operator==(const PoseEdge&, const PoseEdge&) = default;
 };
 
-/// When the optimisation ends, and how outliers are weighed.
+/// Options for the end of the optimisation and for outliers.
 struct PoseGraphOptions {
   int max_iterations = 40;  ///< steps of the solver, >= 1
-  /// The optimisation has converged when no position changes by more.
+  /// Largest change of a position, in metres, at which the optimisation has converged.
   double settled_m = 1e-3;
-  /// Standard deviations at which a doubtful edge has half its weight.
+  /// Error in standard deviations at which the weight of a doubtful edge has fallen to a quarter.
   double doubt_deviations = 5.0;
 };
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor);
@@ -41,13 +41,13 @@ struct PoseGraphReport {
   std::vector<double> edge_weights;  ///< one per edge, 0 .. 1; 1 for edges that are not doubtful
 };
 
-/// Optimises the poses of `nodes`: Gauss-Newton on the sparse normal equations. Edges that may be
-/// outliers have a robust cost (Geman and McClure), which is approached from the quadratic one, so
-/// that drift does not reject the first closure. Nodes without edges, those whose entry in `fixed`
-/// is not 0, and the first node of a component without a fixed one stay. Deterministic. Throws
-/// OptionError; ContractError on an edge to an absent node or to itself, a value that is not
-/// finite, a deviation not above 0, or `fixed` of another size, unless empty. Cost: 10 ms an
-/// iteration for a path of 10,000 nodes.
+/// Optimises the poses of `nodes`: Gauss-Newton on the sparse normal equations. Doubtful edges have
+/// a robust cost (Geman and McClure), which starts as the quadratic cost and is narrowed gradually,
+/// so that drift does not reject the first closure. Nodes without edges, those whose entry in
+/// `fixed` is not 0, and the first node of each component without a fixed one do not move.
+/// Deterministic. Throws OptionError; ContractError on an edge to an absent node or to itself, a
+/// value that is not finite, a deviation not above 0, or `fixed` of another size, unless empty.
+/// Cost: 10 ms an iteration for a path of 10,000 nodes.
 PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
                                     const PoseGraphOptions& options = {},
                                     std::span<const std::uint8_t> fixed = {});

@@ -17,20 +17,20 @@ namespace {
 /// Standard deviation of a match in metres and radians: the default of `PoseEdge`.
 constexpr double match_position_deviation_m = 0.1;
 constexpr double match_heading_deviation_rad = 0.05;
-/// Standard deviations of the motion between two nodes of an optimised map, for each metre (m/m,
-/// rad/m) and for length 0: a quarter and a half of those of a single step (`MappingOptions`), as
-/// the steps and closures around have corrected it.
-constexpr double edge_deviation = 0.02;
+/// Standard deviations of the motion between two nodes of an optimised map: position and heading
+/// per metre (m/m, rad/m), and both at length 0 (m, rad). The first two are a quarter and a half of
+/// those of a single step (`MappingOptions`), as steps and closures around have corrected it.
+constexpr double edge_position_deviation = 0.02;
 constexpr double edge_turn_deviation = 0.01;
-constexpr double shape_position_deviation_m = 0.005;
-constexpr double shape_heading_deviation_rad = 0.003;
+constexpr double min_edge_position_deviation_m = 0.005;
+constexpr double min_edge_heading_deviation_rad = 0.003;
 
 double translation_m(const Pose2& motion) {
   return std::hypot(motion.x_m, motion.y_m);
 }
 
-std::vector<PassedNode> make_passed_nodes(const TopologicalMap& map, std::size_t component) {
-  std::vector<PassedNode> nodes;
+std::vector<PathNode> make_path_nodes(const TopologicalMap& map, std::size_t component) {
+  std::vector<PathNode> nodes;
   double path_m = 0.0;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     if (i > 0) path_m += distance(map.nodes[i - 1].pose.position(), map.nodes[i].pose.position());
@@ -42,10 +42,10 @@ std::vector<PassedNode> make_passed_nodes(const TopologicalMap& map, std::size_t
 std::vector<LoopClosure> find_matches(const VisualMemory& memory, const TopologicalMap& first,
                                       const TopologicalMap& second,
                                       const LoopClosureOptions& closure, double scale_m) {
-  // The views of the second session come one by one, as from a robot that drives.
+  // The finder gets the views of the second session one by one, as from a driving robot.
   VisualMemory views(memory.shape(), memory.full_scale(), memory.elevations());
-  std::vector<PassedNode> nodes = make_passed_nodes(first, 0);
-  const std::vector<PassedNode> others = make_passed_nodes(second, 1);
+  std::vector<PathNode> nodes = make_path_nodes(first, 0);
+  const std::vector<PathNode> others = make_path_nodes(second, 1);
   std::vector<Pose2> poses;
   const auto append = [&](ViewId view) {
     return views.append(memory.packed(view), memory.info(view));
@@ -56,7 +56,7 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
   }
   LoopClosureFinder finder(views, closure, {}, ClosureScope::other_components);
   std::vector<LoopClosure> matches;
-  std::vector<std::size_t> number;  // in the second map, of the nodes after those of the first
+  std::vector<std::size_t> number;  // index in `second` of each appended node
   for (std::size_t i = 0; i < second.nodes.size(); ++i) {
     const ViewId view = second.nodes[i].view;
     const auto same = std::ranges::lower_bound(first.nodes, view, {}, &TopologicalMap::Node::view);
@@ -78,9 +78,10 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
   return matches;
 }
 
-/// Returns the metric scale of visual displacements by the map's first edges; nullopt where none
-/// can be read. Cost: 0.3 ms an edge.
-std::optional<double> view_scale_m(const VisualMemory& memory, const TopologicalMap& map) {
+/// Estimates the metric scale of visual displacements from the first edges of a map; nullopt if no
+/// edge has a visual step. Cost: 0.3 ms per edge.
+std::optional<double> estimate_visual_scale_m(const VisualMemory& memory,
+                                              const TopologicalMap& map) {
   constexpr std::size_t max_edges = 200;  // the median of 200 ratios errs by a few percent
   const auto pose_of = [&](ViewId view) {
     return std::ranges::lower_bound(map.nodes, view, {}, &TopologicalMap::Node::view)->pose;
@@ -97,7 +98,7 @@ std::optional<double> view_scale_m(const VisualMemory& memory, const Topological
   return length_scale_m(lengths);
 }
 
-/// The matches of two sessions, each with the relative pose of these.
+/// The matches of two sessions, each with the relative pose of the maps that it proposes.
 class Matches {
  public:
   Matches(const TopologicalMap& first, const TopologicalMap& second,
@@ -109,7 +110,7 @@ class Matches {
         spacing_m_(closure.spacing_m),
         tolerance_m_(closure.max_length * scale_m),
         tolerance_rad_(2.0 * closure.heading_tolerance_rad),
-        path_(make_passed_nodes(second, 0)),
+        path_(make_path_nodes(second, 0)),
         matches_(std::move(matches)) {
     for (const LoopClosure& match : matches_) {
       frames_.push_back(first.nodes[match.earlier].pose * match.earlier_from_later *
@@ -130,8 +131,8 @@ class Matches {
   }
   [[nodiscard]] const LoopClosure& operator[](std::size_t i) const { return matches_[i]; }
 
-  /// Returns the largest set of matches that lead to one frame, and its number of places.
-  [[nodiscard]] Hypothesis find_hypothesis(const Set& among) const {
+  /// Returns the largest set of matches that agree on one relative pose, and its number of places.
+  [[nodiscard]] Hypothesis find_largest_consensus(const Set& among) const {
     Hypothesis best;
     for (const std::size_t i : among) {
       Set agreeing;
@@ -144,8 +145,8 @@ class Matches {
     return best;
   }
 
-  /// Counts the places where the maps overlap, and those with a match. Maps drift, so the frame is
-  /// that of the nearest match along the path.
+  /// Counts the places in the overlap of the maps, and those of them near a match. As maps drift,
+  /// each place is transformed by the relative pose of its nearest match along the path.
   void count_confirmed_places(const Set& set, SessionAlignment& alignment) const {
     std::optional<double> last_m;
     for (std::size_t i = 0; i < path_.size(); ++i) {
@@ -167,7 +168,7 @@ class Matches {
     }
   }
 
-  /// Returns the frame of the match that places all others nearest to where they place themselves.
+  /// Returns the relative pose of the match with the least sum of distances to all others (medoid).
   [[nodiscard]] Pose2 medoid_frame(const Set& set) const {
     const auto total_gap_m = [&](std::size_t i) {
       double sum = 0.0;
@@ -178,7 +179,7 @@ class Matches {
   }
 
  private:
-  /// Returns the distance between the positions of match j in the frames of both.
+  /// Returns the distance between the positions of match j by the relative poses of i and of j.
   [[nodiscard]] double gap_m(std::size_t i, std::size_t j) const {
     const Pose2& there = second_->nodes[matches_[j].later].pose;
     return distance((frames_[i] * there).position(), (frames_[j] * there).position());
@@ -190,7 +191,7 @@ class Matches {
            std::abs(angle_difference(frames_[i].heading_rad, frames_[j].heading_rad)) <
                tolerance_rad_;
   }
-  /// Counts matches nearer to each other than `spacing_m` along the path once.
+  /// Counts matched places; matches within `spacing_m` along the path are one place.
   [[nodiscard]] int count_places(const Set& set) const {
     int count = 0;
     double last_m = 0.0;
@@ -207,7 +208,7 @@ class Matches {
   const TopologicalMap* second_;
   SessionAlignmentOptions options_;
   double spacing_m_, tolerance_m_, tolerance_rad_;
-  std::vector<PassedNode> path_;
+  std::vector<PathNode> path_;
   std::vector<LoopClosure> matches_;
   std::vector<Pose2> frames_;
 };
@@ -237,17 +238,17 @@ std::optional<SessionAlignment> align_sessions(const VisualMemory& memory,
   validate(second);
   const LoopClosureOptions closure;
   const double scale_m =
-      std::max(view_scale_m(memory, first).value_or(VisualOdometryOptions{}.scale_m),
-               view_scale_m(memory, second).value_or(0.0));
+      std::max(estimate_visual_scale_m(memory, first).value_or(VisualOdometryOptions{}.scale_m),
+               estimate_visual_scale_m(memory, second).value_or(0.0));
   const Matches matches(first, second, options, closure, scale_m,
                         find_matches(memory, first, second, closure, scale_m));
-  const Matches::Hypothesis best = matches.find_hypothesis(matches.all());
+  const Matches::Hypothesis best = matches.find_largest_consensus(matches.all());
   if (best.places < options.min_places) return std::nullopt;
   Matches::Set others;
   std::ranges::set_difference(matches.all(), best.matches, std::back_inserter(others));
   SessionAlignment alignment;
   alignment.places = best.places;
-  alignment.other_places = matches.find_hypothesis(others).places;
+  alignment.other_places = matches.find_largest_consensus(others).places;
   alignment.refuted = others.size();
   if (alignment.other_places * options.distinctness > best.places) return std::nullopt;
   matches.count_confirmed_places(best.matches, alignment);
@@ -280,9 +281,10 @@ TopologicalMap join_sessions(const TopologicalMap& first, const TopologicalMap& 
     };
     for (const TopologicalMap::Edge& edge : map.edges) {
       const Pose2 motion = inverse(pose_of(edge.a)) * pose_of(edge.b);
-      edges.push_back({number(edge.a), number(edge.b), motion,
-                       edge_deviation * translation_m(motion) + shape_position_deviation_m,
-                       edge_turn_deviation * translation_m(motion) + shape_heading_deviation_rad});
+      edges.push_back(
+          {number(edge.a), number(edge.b), motion,
+           edge_position_deviation * translation_m(motion) + min_edge_position_deviation_m,
+           edge_turn_deviation * translation_m(motion) + min_edge_heading_deviation_rad});
       joined.edges.push_back(edge);
     }
   };

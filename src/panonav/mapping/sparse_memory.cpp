@@ -39,13 +39,13 @@ std::vector<ViewId> find_views_within_links(const VisualMemory& memory, ViewId v
 /// The kept view that represents each dropped one.
 using Representatives = std::unordered_map<ViewId, ViewId>;
 
-Representatives representatives_of(const SparseSelection& selection) {
+Representatives make_representatives(const SparseSelection& selection) {
   Representatives kept;
   for (const auto& redundant : selection.redundant) kept.emplace(redundant.view, redundant.kept);
   return kept;
 }
 
-/// Returns the view that represents another one: itself where it is kept.
+/// Returns the view that represents `view`; a kept view represents itself.
 ViewId find_representative(const Representatives& kept, ViewId view) {
   const auto found = kept.find(view);
   return found == kept.end() ? view : found->second;
@@ -117,7 +117,7 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
 }
 
 std::vector<Link> contract_links(std::span<const Link> links, const SparseSelection& selection) {
-  const Representatives kept = representatives_of(selection);
+  const Representatives kept = make_representatives(selection);
   std::set<std::pair<ViewId, ViewId>> pairs;
   std::vector<Link> left;
   for (const Link& link : links) {
@@ -131,7 +131,7 @@ std::vector<Link> contract_links(std::span<const Link> links, const SparseSelect
 
 TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& selection) {
   validate(map);
-  const Representatives kept = representatives_of(selection);
+  const Representatives kept = make_representatives(selection);
   TopologicalMap left;
   for (const TopologicalMap::Node& node : map.nodes) {
     if (find_representative(kept, node.view) == node.view) left.nodes.push_back(node);
@@ -147,7 +147,8 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
     moved.b = find_representative(kept, edge.b);
     const TopologicalMap::Node* const a = node_of(moved.a);
     const TopologicalMap::Node* const b = node_of(moved.b);
-    // A view outside of the map, or of another component, may stand for one in it.
+    // The representing view may be outside of the map or in another component; the edge is then
+    // dropped.
     if (moved.a == moved.b || a == nullptr || b == nullptr || a->component != b->component)
       continue;
     if (!pairs.insert(std::minmax(moved.a, moved.b)).second) continue;

@@ -32,10 +32,9 @@ struct TopologicalMap {
   friend bool operator==(const TopologicalMap&, const TopologicalMap&) = default;
 };
 
-/// Throws ContractError unless nodes ascend by view, their components have numbers below the
-/// number of nodes, edges join two different nodes of the map, all poses are finite and weights
-/// are 0 ..
-/// 1.
+/// Throws ContractError unless nodes ascend by view, component numbers are below the number of
+/// nodes, edges join two different nodes of the map, all poses are finite and all weights are in
+/// [0, 1].
 void validate(const TopologicalMap& map);
 
 /// Numbers the connected components from 0 without gaps, in their order.

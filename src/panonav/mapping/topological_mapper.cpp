@@ -18,26 +18,26 @@ namespace {
 /// Standard deviations of a step of length 0: the noise of the images.
 constexpr double min_position_deviation_m = 0.005;
 constexpr double min_heading_deviation_rad = 0.003;
-/// Standard deviation of the position by a closure, for each unit of its residual, in units of R:
-/// residuals shorten the displacement between views. And that without a residual.
+/// Standard deviation of the position by a closure: per unit of its residual, in units of R, as
+/// residuals shorten the displacement between views; and in metres without a residual.
 constexpr double closure_deviation = 1.0;
 constexpr double closure_position_deviation_m = 0.02;
-/// Standard deviations of the heading by a closure: in radians for each metre between the views,
-/// and for views at one place.
+/// Standard deviation of the heading by a closure: in rad per metre between the views, and in rad
+/// for views at one place.
 constexpr double closure_turn_deviation = 0.05;
 constexpr double closure_heading_deviation_rad = 0.01;
-/// Latest steps with wheels by which scale and error of the views are learnt, as both change from
+/// Number of latest steps from which scale and turn error of the views are learnt; both change from
 /// room to room. 10 to 40 give the same result (docs/decisions.md).
 constexpr std::size_t max_kept_steps = 15;
 /// Weight below which a closure is dropped: the rest of the map contradicts it by more than seven
 /// standard deviations.
-constexpr double refuted_weight = 0.1;
-/// Error of a closure in standard deviations from which on the whole map is optimised: normal
+constexpr double min_closure_weight = 0.1;
+/// Largest error of a closure, in standard deviations, without optimising the whole map: normal
 /// errors exceed it once in 370 times.
 constexpr double max_closure_deviations = 3.0;
-/// Growth of the map, one node for each of this number, after which it is optimised again as a
-/// whole.
-constexpr std::size_t nodes_per_new_node = 100;
+/// The whole map is optimised again only after it has grown by one node for each of this number of
+/// nodes, 1 %.
+constexpr std::size_t min_growth_divisor = 100;
 
 double length(const Pose2& step) {
   return std::hypot(step.x_m, step.y_m);
@@ -160,7 +160,8 @@ class TopologicalMapper::Implementation {
       return;
     }
     if (!step && !moved) {
-      // The path continues in the new frame, so that its views are no candidates for each other.
+      // The path length continues, so that the views before and after the break are no candidates
+      // for loop closures with each other.
       update.new_component = true;
       nodes_[here].component = nodes_[here - 1].component + 1;
       poses_.emplace_back();
@@ -232,13 +233,13 @@ class TopologicalMapper::Implementation {
     }
     if (needs_optimisation_ &&
         size() >=
-            optimised_size_ + std::max<std::size_t>(1, optimised_size_ / nodes_per_new_node)) {
+            optimised_size_ + std::max<std::size_t>(1, optimised_size_ / min_growth_divisor)) {
       optimise();
       update.optimised = true;
     }
   }
 
-  /// Optimises the nodes since the closure before; edges at the end of the list are theirs.
+  /// Optimises the nodes since the last closure, whose edges are at the end of the list.
   void optimise_latest() {
     const std::size_t first = last_closure_node_ + 1;
     last_closure_node_ = size() - 1;
@@ -283,7 +284,7 @@ class TopologicalMapper::Implementation {
     // Closures that the rest of the map refutes are dropped.
     std::size_t kept = 0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      if (edges_[i].doubtful && weights_[i] < refuted_weight) continue;
+      if (edges_[i].doubtful && weights_[i] < min_closure_weight) continue;
       edges_[kept] = edges_[i];
       weights_[kept++] = weights_[i];
     }
@@ -299,20 +300,20 @@ class TopologicalMapper::Implementation {
   VisualOdometry odometry_;
   PoseGraphOptions graph_;
   LoopClosureFinder finder_;
-  std::vector<PassedNode> nodes_;
+  std::vector<PathNode> nodes_;
   std::vector<Pose2> poses_;
   std::vector<PoseEdge> edges_;
   std::vector<double> weights_;
   std::vector<KnownLength> known_lengths_;
-  /// The turn of the wheels less that of the views, and the stated variances of both.
+  /// The turn by the wheels minus that by the views, and the assumed variances of both.
   struct TurnDifference {
     double difference_rad, wheel_variance, view_variance;
   };
   std::vector<TurnDifference> turns_;
   std::size_t optimised_size_ = 0;     // nodes when the map was last optimised
   std::size_t last_closure_node_ = 0;  // the latest node of the closures so far
-  bool changed_ = false;               // by closures since then
-  bool needs_optimisation_ = false;    // a closure contradicts more than the latest nodes
+  bool changed_ = false;               // closures were added since then
+  bool needs_optimisation_ = false;    // a closure contradicts the older map, too
 };
 
 TopologicalMapper::TopologicalMapper(const VisualMemory& memory, const MappingOptions& options,

@@ -14,42 +14,42 @@
 
 namespace panonav {
 
-/// Which views become nodes, and how nodes are joined.
+/// Options for the views that become nodes and for the connections between nodes.
 struct MappingOptions {
-  /// A view becomes a node when it differs from the last node by more (`image_difference`, 0 .. 1):
-  /// capture by threshold, as in F11's second set. 0 keeps every view.
+  /// Smallest difference from the last node (`image_difference`, 0 .. 1) at which a view becomes a
+  /// node: capture by threshold, as in the second set of F11. 0 keeps every view.
   double capture_difference = 0.0;
-  bool close_loops = true;  ///< search for places passed before
-  /// Assumed length of a step that neither views nor wheels give, straight ahead and with a
-  /// standard deviation of its own length: for recordings whose images are far apart. 0: a new
-  /// connected component begins.
+  bool close_loops = true;  ///< search for loop closures
+  /// Length in metres of the straight step that is assumed where neither views nor wheels give one;
+  /// its standard deviation is equal to it. For recordings whose images are far apart. 0: a new
+  /// connected component begins instead.
   double bridge_m = 0.0;
-  /// Steps come from the wheels where these are known: length and direction are theirs, and the
-  /// turn is the mean of theirs and that of the views, weighted by their variances. The error of
-  /// the views' turns is learnt from the last steps: the part of their difference that the wheels'
-  /// own error, that of `OdometryNoise`, does not explain.
+  /// Use the motion of the wheels where it is known: length and direction come from the wheels, and
+  /// the turn is the mean of wheels and views, weighted by their inverse variances. The variance of
+  /// the views' turns is learnt from the latest steps: the squared difference to the wheels' turns
+  /// less the variance of the wheels (`OdometryNoise`).
   bool wheels = true;
-  /// Standard deviation of the position after a step read from views, for each metre of it.
+  /// Standard deviation of the position after a step from views, in metres per metre of the step.
   double step_deviation = 0.08;
-  /// Standard deviation of the heading after a step (rad).
+  /// Standard deviation of the heading after a step from views, in rad per metre of the step.
   double turn_deviation = 0.02;
 };
 void visit_options(MappingOptions& options, OptionVisitor& visitor);
 
-/// Makes a map from one view after the other: a node for each, linked with the one before by visual
-/// odometry; loops are closed by `LoopClosureOptions`. A closure moves the nodes since the
-/// closure before so that they fit the older map. Where a contradiction remains and the map has
-/// grown by a hundredth since the last time, the whole is optimised as a pose graph. The cost of a
-/// view therefore stays small in large maps. Where neither views nor wheels give a step, a new
-/// connected component begins with a frame of its own, unless it is bridged; a closure joins it
-/// with the others.
+/// Builds a map from successive views: each becomes a node, connected to the previous node by
+/// visual odometry. A loop closure (`LoopClosureOptions`) moves only the nodes since the last
+/// closure, so that they fit the older map. If a contradiction remains and the map has grown by 1 %
+/// since its last full optimisation, the whole map is optimised as a pose graph; the cost per view
+/// thus stays small in large maps. Where neither views nor wheels give a step and none is assumed
+/// (`bridge_m`), a new connected component with its own frame begins, which a later closure can
+/// join with another one.
 class TopologicalMapper {
  public:
   /// The changes of the map by one view.
   struct Update {
     std::optional<VisualStep> step;     ///< from the node before
     bool new_component = false;         ///< no step connects the view with the node before
-    std::vector<LoopClosure> closures;  ///< that became certain; numbers of nodes
+    std::vector<LoopClosure> closures;  ///< closures that became certain, with indices of nodes
     bool optimised = false;             ///< the whole map was optimised
   };
 
@@ -58,7 +58,7 @@ class TopologicalMapper {
                              const VisualOdometryOptions& odometry = {},
                              const LoopClosureOptions& closure = {},
                              const PoseGraphOptions& graph = {});
-  /// The source of a move may only be destroyed or assigned to.
+  /// A moved-from mapper may only be destroyed or assigned to.
   TopologicalMapper(TopologicalMapper&&) noexcept;
   TopologicalMapper& operator=(TopologicalMapper&&) noexcept;
   ~TopologicalMapper();

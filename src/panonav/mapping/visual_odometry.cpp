@@ -14,8 +14,8 @@ namespace panonav {
 
 namespace {
 
-// Returns options for short steps: the least squares need no search, whose grid of displacements
-// would show in the lengths.
+// Returns options for short steps: least squares needs no displacement search there, whose grid
+// would bias the lengths.
 FourierHomingOptions make_vector_options(const VisualOdometryOptions& options) {
   return {.iterations = options.iterations, .displacement_search = false};
 }
@@ -44,12 +44,12 @@ std::optional<VisualStep> home_vector_step(const OdometryView& before, const Odo
   VisualStep step;
   Pose2 motion = inverse(Pose2{vector.xi, vector.eta, vector.heading_rad});
   if (options.nearer_side) {
-    // The robot moves away from home.
+    // The robot moves away from home, so the displacement is the negative home vector.
     const AzimuthFlow flow =
         refine_flow(before.coefficients, after.coefficients,
                     {.g0 = -vector.heading_rad, .a1 = -vector.eta, .b1 = vector.xi}, 1);
     const double turn = flow.turn_rad();
-    // Far from its start the flow has diverged.
+    // A flow that ends farther from its start has diverged.
     constexpr double max_change_rad = 0.2;
     if (std::abs(angle_difference(turn, motion.heading_rad)) < max_change_rad) {
       // The length stays that of the home vector, whose weights reject outliers.

@@ -7,20 +7,20 @@
 
 namespace panonav {
 
-/// Largest stamp of a view, in seconds either way: 31,700 years, so that the time of any epoch fits
-/// while a double keeps it to about a tenth of a millisecond. Chosen.
+/// Largest absolute stamp of a view in seconds, 31,700 years. Chosen so that the time since any
+/// epoch fits and a double still resolves about 0.1 ms.
 inline constexpr double max_stamp_s = 1e12;
 
-/// The same for messages.
+/// Allowed range of stamps as text, for error messages.
 inline constexpr std::string_view stamp_range = "-1000000000000 to 1000000000000 s";
 
 /// Largest length of the name of a view. Chosen: the longest path on Linux.
 inline constexpr std::size_t max_name_bytes = 4096;
 
-/// The one check of a view's name, pose and stamp, for whatever is written, loaded, taken over from
-/// a server or verified. Throws ContractError with the field: a name that is empty or longer than
-/// `max_name_bytes`, a position beyond `max_position_m`, a heading that is not finite, a stamp
-/// beyond `max_stamp_s`.
+/// Checks name, pose and stamp of a view; used for all views that are written, loaded, received
+/// from a server or verified. Throws ContractError that names the field, on a name that is empty or
+/// longer than `max_name_bytes`, a position beyond `max_position_m`, a heading that is not finite,
+/// a stamp beyond `max_stamp_s`.
 void validate(const ReferenceInfo& info);
 
 /// The same for a pose alone.

@@ -26,10 +26,10 @@ struct PosedView {
   ReferencePose pose;  ///< its position, and its heading if known
 };
 
-/// Finds the views of a memory at one moment by appearance or position: those of a
-/// memory that is held (`HeldViewIndex`), or of one that lies elsewhere (`IndexedMemory`). One
-/// thread uses it, for the questions of one query. An index of views that lie elsewhere throws
-/// FileError when they cannot be read.
+/// Finds the views of a memory, as it is at one moment, by appearance, name or position. The memory
+/// is in RAM (`HeldViewIndex`) or stored elsewhere (`IndexedMemory`); an index of a memory
+/// elsewhere throws FileError if its views cannot be read. One thread uses an index, for the
+/// searches of one query.
 class ViewIndex {
  public:
   virtual ~ViewIndex() = default;
@@ -38,9 +38,9 @@ class ViewIndex {
   [[nodiscard]] virtual SearchResult search(const PackedSignature& query,
                                             const SearchOptions& options,
                                             const SearchMask& mask) = 0;
-  /// Returns a memory of those views that exist, without links; they may be in any order.
+  /// Returns a memory of those of `views` that exist, without links. `views` may be in any order.
   [[nodiscard]] virtual VisualMemory load(std::span<const ViewId> views) = 0;
-  /// Returns the view of that name; empty when there is none.
+  /// Returns the view of that name; nullopt if there is none.
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
   /// Returns the views with positions within one of the rectangles, ascending, each once.
   [[nodiscard]] virtual std::vector<ViewId> views_within(
@@ -49,7 +49,7 @@ class ViewIndex {
   [[nodiscard]] virtual std::vector<PosedView> posed_views() = 0;
 };
 
-/// Searches a memory that is held, which must outlive it.
+/// Searches a memory in RAM, which must outlive the index.
 class HeldViewIndex final : public ViewIndex {
  public:
   /// Keeps a reference to the memory; copies nothing.
@@ -68,28 +68,28 @@ class HeldViewIndex final : public ViewIndex {
   const VisualMemory* memory_;
 };
 
-/// Counters of the exact searches in a memory that is not held.
+/// Counters of the exact searches in a memory that is not in RAM.
 struct SearchCounters {
-  std::uint64_t searches = 0;    ///< a picture needs one or two
+  std::uint64_t searches = 0;    ///< number of searches; an image needs one or two
   std::uint64_t views_read = 0;  ///< views that searches read in full
-  double seconds = 0.0;          ///< time that searches took, the server's part included
+  double seconds = 0.0;          ///< total time of the searches, including the server's part
 };
 
-/// A memory that is searched where it is stored: only an index of its views is held, which is
-/// smaller than they are. Several threads may use one object.
+/// A memory that is searched where it is stored: only an index of its views is in RAM, which is
+/// smaller than the views. Several threads may use one object.
 class IndexedMemory {
  public:
   virtual ~IndexedMemory() = default;
   [[nodiscard]] virtual std::size_t size() const = 0;           ///< Views that can be found.
   [[nodiscard]] virtual std::vector<ViewId> views() const = 0;  ///< Ascending. Cost: a pass.
-  [[nodiscard]] virtual std::uint64_t bytes() const = 0;        ///< That the index takes.
+  [[nodiscard]] virtual std::uint64_t bytes() const = 0;        ///< Size of the index.
   [[nodiscard]] virtual SearchCounters counters() const = 0;    ///< Since the index was made.
-  /// Returns a snapshot of the views; later changes do not show in it. *this must outlive it.
-  /// Throws FileError if the memory cannot be reached; the next call may reach it.
+  /// Returns a snapshot of the views, which later changes do not affect. *this must outlive the
+  /// snapshot. Throws FileError if the memory cannot be reached; a later call may succeed.
   [[nodiscard]] virtual std::unique_ptr<ViewIndex> index() const = 0;
-  /// Updates the index to the views that came and went since; searches continue meanwhile. Returns
-  /// whether anything changed. Throws FileError; then the index stays, and the next call compares
-  /// all.
+  /// Updates the index with the views that were added or removed since the last call; searches can
+  /// continue meanwhile. Returns true if anything changed. Throws FileError; then the index is
+  /// unchanged, and the next call compares all views.
   virtual bool refresh() = 0;
 };
 

@@ -6,18 +6,18 @@
 
 namespace panonav {
 
-/// A source of views for memories that are not held whole, such as a large file.
+/// A source of views of a memory that is not in RAM as a whole, such as a large file.
 class ViewSource {
  public:
   virtual ~ViewSource() = default;
   /// All views, ascending.
   [[nodiscard]] virtual std::span<const ViewId> views() const = 0;
-  /// A memory of these views under their ids, without links. The views must ascend. Throws
+  /// Returns a memory of these views with their ids, without links. `views` must ascend. Throws
   /// ContractError on an unknown view.
   [[nodiscard]] virtual VisualMemory load(std::span<const ViewId> views) const = 0;
 };
 
-/// A part of a memory that is held whole. The memory must outlive it.
+/// Loads parts of a memory in RAM, which must outlive the source.
 class MemoryViewSource final : public ViewSource {
  public:
   /// Keeps a reference to the memory; copies nothing.

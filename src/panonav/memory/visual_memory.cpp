@@ -70,8 +70,8 @@ struct VisualMemory::Implementation {
   void require_view(ViewId view) const { static_cast<void>(position(view)); }
   [[nodiscard]] Row row(ViewId view) const { return rows[position(view)]; }
 
-  /// Returns the searched views; rows that came since the last search are indexed first, all at
-  /// once.
+  /// Returns the views and the index for a search, after indexing all rows that were appended since
+  /// the last search.
   [[nodiscard]] SearchedViews searched() const {
     index_rows();
     return {shape, store, index, views, rows, view_of_row};
@@ -106,7 +106,8 @@ VisualMemory::VisualMemory(SignatureShape shape, float full_scale,
                            std::optional<ElevationBand> elevations) {
   require(shape.rows >= 1, "rows", shape.rows, ">= 1");
   require(shape.components >= 1, "components", shape.components, ">= 1");
-  // Sums of differences, and of sums over blocks with their rounding, then stay far below 2^30.
+  // Below this size all distances and their bounds stay far below 2^30, the bound of rows without a
+  // view.
   constexpr double max_bytes = 1 << 20;
   require(static_cast<double>(shape.rows) * shape.components < max_bytes, "rows x components",
           static_cast<double>(shape.rows) * shape.components, "< 2^20");
@@ -180,7 +181,7 @@ void VisualMemory::remove(ViewId view) {
   Implementation& memory = *implementation_;
   const std::size_t position = memory.position(view);
   const Row row = memory.rows[position];
-  memory.links.erase_all_of(view);
+  memory.links.erase_links_of(view);
   memory.names.erase(memory.records[row].name);
   memory.records[row] = {};
   memory.index_rows();

@@ -15,7 +15,7 @@
 
 namespace panonav {
 
-/// Pose of a reference view. Some recordings know positions but no headings.
+/// Pose of a reference view. The heading is optional, as some recordings contain positions only.
 struct ReferencePose {
   double x_m = 0.0;                   ///< in the frame of the memory's positions
   double y_m = 0.0;                   ///< in the frame of the memory's positions
@@ -37,13 +37,13 @@ struct Link {
   /// Reason why two views are linked.
   enum class Kind {
     sequence,   ///< taken one after the other
-    neighbour,  ///< beside each other in an arrangement by similarity
+    neighbour,  ///< adjacent in an arrangement by similarity
     closure     ///< the same place passed at another time
   };
 
   ViewId a;                    ///< one view
   ViewId b;                    ///< the other; links have no direction
-  Kind kind = Kind::sequence;  ///< of several kinds the last one
+  Kind kind = Kind::sequence;  ///< kind of the last link of both views
   friend bool operator==(const Link&, const Link&) = default;
 };
 
@@ -51,7 +51,7 @@ struct Link {
 struct Match {
   ViewId view;  ///< an id of the memory
   std::uint32_t dissimilarity =
-      0;  ///< integer L1 of packed magnitudes over the components asked for
+      0;  ///< integer L1 of packed magnitudes over the compared components
   friend bool operator==(const Match&, const Match&) = default;
 };
 
@@ -64,7 +64,7 @@ struct SearchOptions {
 /// Restricts a search. Empty spans restrict nothing.
 struct SearchMask {
   std::span<const ViewId> excluded_views;      ///< these are not found
-  std::span<const std::uint8_t> allowed_rows;  ///< one entry per row, 0: the row does not count
+  std::span<const std::uint8_t> allowed_rows;  ///< one entry per row; rows with 0 are ignored
 };
 
 /// Views that a search found, and its cost.
@@ -72,7 +72,7 @@ struct SearchResult {
   std::vector<Match> matches;       ///< ascending (dissimilarity, view)
   std::uint64_t bytes_read = 0;     ///< signature and index bytes that the search touched
   std::uint64_t bytes_in_full = 0;  ///< what a scan over all views would read
-  std::uint64_t views_in_full = 0;  ///< views whose whole sum was computed
+  std::uint64_t views_in_full = 0;  ///< number of views that were compared in full
 };
 
 /// The reference views that a robot remembers. Views keep their id for ever; ids grow in the order
@@ -80,8 +80,8 @@ struct SearchResult {
 /// threads at once is safe; changing is not.
 class VisualMemory {
  public:
-  /// One level of hierarchical localisation [M04 section 2.3]: the views that may still be the
-  /// place when `components` components have been compared.
+  /// One level of hierarchical localisation [M04 section 2.3]: the candidate views that remain
+  /// after `components` components have been compared.
   struct HierarchyLevel {
     int components = 0;  ///< compared at this level, m of [M04]
     /// Ascending (partial dissimilarity, view); nested in the level before.
@@ -94,7 +94,7 @@ class VisualMemory {
   /// `full_scale`: magnitude that is packed as 255. Throws ContractError.
   VisualMemory(SignatureShape shape, float full_scale, std::optional<ElevationBand> elevations);
   ~VisualMemory();
-  /// Leaves the other in a state in which it may only be destroyed or assigned to.
+  /// A moved-from memory may only be destroyed or assigned to.
   VisualMemory(VisualMemory&&) noexcept;
   VisualMemory& operator=(VisualMemory&&) noexcept;
   /// Copies all views and links.
@@ -109,12 +109,13 @@ class VisualMemory {
   /// True if there is no view.
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
 
-  /// Throws ContractError on another shape, a known name, and as `validate` of
-  /// reference_validation.hpp; the memory is then unchanged.
+  /// Appends a view and returns its new id. Throws ContractError on another shape, a name that
+  /// exists already, or info that `validate` (reference_validation.hpp) rejects; the memory is then
+  /// unchanged.
   ViewId append(const PackedSignature& signature, ReferenceInfo info);
   /// Packs with the memory's full scale, then appends.
   ViewId append(const FourierSignature& signature, ReferenceInfo info);
-  /// Appends under this id, which must be larger than all before, as readers of files do.
+  /// Appends a view with this id, which must be larger than all earlier ids; for readers of files.
   void append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info);
   /// Removes a view and its links. Throws ContractError if there is no such view.
   void remove(ViewId view);
@@ -125,22 +126,24 @@ class VisualMemory {
   [[nodiscard]] bool contains(ViewId view) const noexcept;
   /// Finds the view of that name; nullopt when there is none.
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
-  /// These throw ContractError when there is no such view.
+  /// Returns name, pose and stamp of a view. This and the next three functions throw ContractError
+  /// if there is no such view.
   [[nodiscard]] const ReferenceInfo& info(ViewId view) const;
-  /// Replaces the pose; nullopt: it is unknown. Throws also as `validate`.
+  /// Replaces the pose of a view; nullopt: unknown. Also throws ContractError if `validate` rejects
+  /// the pose.
   void set_pose(ViewId view, std::optional<ReferencePose> pose);
   [[nodiscard]] PackedSignature packed(ViewId view) const;  ///< A copy of the view's bytes.
-  /// The view with magnitudes and phases as real numbers, to the precision of the packed form.
+  /// Returns the unpacked signature of a view, with the precision of the packed form.
   [[nodiscard]] FourierSignature signature(ViewId view) const;
 
-  /// Throws ContractError unless both views exist and differ. A second link of the same two views
-  /// replaces the first.
+  /// Adds a link, which replaces an earlier link of the same two views. Throws ContractError unless
+  /// both views exist and differ.
   void link(const Link& link);
-  /// Drops the link of the two views, in whichever order; nothing happens where there is none.
+  /// Removes the link between two views, in either order, if there is one.
   void unlink(ViewId a, ViewId b);
   [[nodiscard]] std::span<const Link> links() const noexcept;  ///< All links, each once.
-  /// The views that a link joins with this one, ascending. Throws ContractError when there is no
-  /// such view.
+  /// Returns the views that are linked with this view, ascending. Throws ContractError if there is
+  /// no such view.
   [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
 
   /// Finds the nearest views by integer L1 over packed magnitudes: exactly those of a full scan,

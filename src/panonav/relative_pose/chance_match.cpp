@@ -17,8 +17,8 @@ namespace {
 
 /// Rows to which views are averaged: enough vertical structure for noise of its spectrum.
 constexpr int max_bands = 16;
-/// Views of noise: the standard deviation of their matches errs by 11 %.
-constexpr int noise_views = 40;
+/// Number of views of noise; the standard deviation of their matches then errs by 11 %.
+constexpr int noise_view_count = 40;
 
 HomingView average_to_bands(const HomingView& view) {
   const int bands = std::min(max_bands, view.rows());
@@ -117,15 +117,15 @@ double sum_correlation_both_ways(const HomingView& home, const HomingView& curre
 }  // namespace
 
 bool ChanceMatch::is_beyond_chance() const noexcept {
-  // 0.99 quantile of a further draw from the distribution of 40, whose mean and deviation come from
-  // them: Student's t of 39 degrees of freedom, times the root of 1 + 1 / 40.
+  // 0.99 quantile of one more match when mean and deviation are estimated from 40: Student's t with
+  // 39 degrees of freedom, times the square root of 1 + 1 / 40.
   constexpr double min_deviations = 2.426 * 1.0124;
   return deviation > 1e-6 && match - chance > min_deviations * deviation;
 }
 
 double ChanceMatch::direction_probability() const noexcept {
   if (deviation <= 1e-6) return 0.0;
-  constexpr double max_deviations = 10.0;  // up to which it was learnt
+  constexpr double max_deviations = 10.0;  // largest value in the training data
   const double deviations = std::min((match - chance) / deviation, max_deviations);
   return 1.0 / (1.0 + std::exp(2.301 - 1.074 * deviations));
 }
@@ -139,13 +139,13 @@ ChanceMatch compare_with_chance(const HomingView& home, const HomingView& curren
   const NoiseGenerator noise(here);
   constexpr std::uint64_t seed = 1;
   std::vector<double> matches;
-  for (std::uint64_t i = 0; i < noise_views; ++i) {
+  for (std::uint64_t i = 0; i < noise_view_count; ++i) {
     matches.push_back(sum_correlation_both_ways(goal, noise.sample_view(Random(seed, i)), options));
-    result.chance += matches.back() / noise_views;
+    result.chance += matches.back() / noise_view_count;
   }
   double square = 0.0;
   for (const double match : matches) square += (match - result.chance) * (match - result.chance);
-  result.deviation = std::sqrt(square / (noise_views - 1));
+  result.deviation = std::sqrt(square / (noise_view_count - 1));
   return result;
 }
 

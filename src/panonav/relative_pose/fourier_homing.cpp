@@ -31,7 +31,7 @@ class PairOfViews {
         rows_(static_cast<std::size_t>(home.rows())),
         max_frequency_(highest),
         highest_(highest),
-        // Iterations need one frequency more each [S06 eq. 23-26].
+        // Each iteration needs one more frequency [S06 eq. 23-26].
         known_(std::min(std::min(home.components(), current.components()) - 1,
                         highest + 1 + options.iterations)),
         c_(rows_, static_cast<std::size_t>(known_) + 1) {
@@ -53,14 +53,14 @@ class PairOfViews {
   [[nodiscard]] double compute_difference();
 
  private:
-  /// True if the change of the image from row to row counts.
+  /// True if derivatives of the image by elevation are used.
   [[nodiscard]] bool uses_rows() const noexcept {
     return (options_.vertical_motion || options_.tilt) && home_.elevations() && rows_ >= 3;
   }
   [[nodiscard]] bool has_start() const noexcept { return start_ && start_->displacement.ring > 0; }
 
   void search_displacement();
-  void set_highest(int iteration);
+  void set_highest_frequency(int iteration);
   void correlate();
   [[nodiscard]] bool has_structure() const;
   [[nodiscard]] std::span<const float> find_headings(int iteration);
@@ -86,7 +86,7 @@ class PairOfViews {
   HeadingWindow window_;
   std::size_t rows_;
   int max_frequency_;  // K
-  int highest_;        // the same in the present iteration
+  int highest_;        // highest compared frequency of the present iteration
   int known_;
   PairCoefficients c_;
   std::optional<DisplacementStart> start_;
@@ -108,8 +108,8 @@ class PairOfViews {
 HomeVector PairOfViews::find_vector() {
   if (options_.displacement_search) search_displacement();  // eq. 3, as in section 3
   for (int iteration = 0;; ++iteration) {
-    set_highest(iteration);  // footnote 6
-    correlate();             // eq. 33
+    set_highest_frequency(iteration);  // footnote 6
+    correlate();                       // eq. 33
     if (!has_structure()) return {};
     const auto headings = find_headings(iteration);  // eq. 33-43, footnote 10
     if (headings.empty()) return {};
@@ -120,14 +120,14 @@ HomeVector PairOfViews::find_vector() {
 }
 
 void PairOfViews::search_displacement() {
-  start_ = find_start(home_, current_, known_, window_);
+  start_ = find_displacement_start(home_, current_, known_, window_);
   const double direction = start_->displacement.direction_rad() + start_->ahead_rad;
   if (has_start()) displace_current(*start_);
   vector_.xi = start_->displacement.length() * std::cos(direction);
   vector_.eta = start_->displacement.length() * std::sin(direction);
 }
 
-void PairOfViews::set_highest(int iteration) {
+void PairOfViews::set_highest_frequency(int iteration) {
   if (!options_.rising) return;
   highest_ = std::max(1, max_frequency_ * (iteration + 1) / (options_.iterations + 1));
 }
@@ -159,7 +159,8 @@ void PairOfViews::correlate() {
 }
 
 bool PairOfViews::has_structure() const {
-  // Views are of the order of 1, so a transform of a constant in single precision stays below this.
+  // Largest rounding error of the coefficients of a constant view in single precision, as values
+  // are of the order of 1.
   constexpr double rounding = 1e-6;
   const double max_correlation = std::sqrt(home_energy_) * std::sqrt(current_energy_);
   return max_correlation > rounding * rounding * static_cast<double>(rows_);
@@ -186,7 +187,8 @@ void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
   double best_residual = 2.0;  // above all
   for (std::size_t i = 0; i < headings.size(); ++i) {
     const float turn = headings[i];
-    // A heading at which the views correlate less than half as well explains them no better.
+    // Skips headings at which the views correlate less than half as well, as these do not explain
+    // the views better.
     constexpr double min_share = 0.5;
     if (i > 0 && correlation_at(turn) < min_share * correlation_at(headings[0])) break;
     const PairSolution solution = solve_at(static_cast<double>(turn));
@@ -222,8 +224,8 @@ void PairOfViews::set_weights() {
     for (int k = 1; k <= highest_; ++k) component_weights_[static_cast<std::size_t>(k)] = 1.0;
     return;
   }
-  component_weights_ = weigh_components(c_, highest_, rows_);
-  if (rows_ > 1) row_weights_ = weigh_rows(c_, highest_, rows_, component_weights_);
+  component_weights_ = compute_component_weights(c_, highest_, rows_);
+  if (rows_ > 1) row_weights_ = compute_row_weights(c_, highest_, rows_, component_weights_);
 }
 
 // Sets the view whose derivatives are used: the mean of both views, or the current one [S06 eq.
@@ -373,7 +375,7 @@ double PairOfViews::compute_difference() {
   return std::clamp(normal_.energy / normal_.energy_of_views, 0.0, 2.0);
 }
 
-int used_frequency(const HomingView& home, const HomingView& current, int highest) {
+int choose_highest_frequency(const HomingView& home, const HomingView& current, int highest) {
   const int common = std::min(home.components(), current.components());
   const int max_highest = std::min(common - 2, TurnCorrelation::max_frequencies);
   return highest == 0 ? max_highest : highest;
@@ -441,14 +443,15 @@ HomeVector home_vector(const HomingView& home, const HomingView& current,
           "within", window->half_width_rad, "> 0 and <= pi");
   require(options.turn == FourierHomingOptions::TurnEstimate::global, "turn estimate",
           static_cast<double>(options.turn), "global");
-  return PairOfViews(home, current, options, used_frequency(home, current, options.highest),
-                     *window)
+  return PairOfViews(home, current, options,
+                     choose_highest_frequency(home, current, options.highest), *window)
       .find_vector();
 }
 
 HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,
                                  const FourierHomingOptions& options) {
-  return PairOfViews(home, current, options, used_frequency(home, current, options.highest))
+  return PairOfViews(home, current, options,
+                     choose_highest_frequency(home, current, options.highest))
       .find_vector();
 }
 
@@ -457,7 +460,7 @@ double image_difference(const HomingView& home, const HomingView& current, int h
   FourierHomingOptions options = published_homing_options(highest);
   options.gradient = FourierHomingOptions::Gradient::both;
   options.tilt = true;
-  return PairOfViews(home, current, options, used_frequency(home, current, highest))
+  return PairOfViews(home, current, options, choose_highest_frequency(home, current, highest))
       .compute_difference();
 }
 

@@ -8,19 +8,19 @@ namespace panonav {
 
 /// The displacement and turn between two views.
 struct HomeVector {
-  /// Displacement to home, forwards, in the frame of the robot that took the current view; in units
-  /// of the distance R at which all things are assumed to be.
+  /// Forward displacement to home in the frame of the robot at the current view, in units of R, the
+  /// assumed distance of all things.
   double xi = 0.0;
   double eta = 0.0;  ///< the same to the left
   /// Heading of the home view minus heading of the current view, in [-pi, pi).
   double heading_rad = 0.0;
-  /// Correlation of the views at the heading found first, -1 .. 1 [S06 eq. 33 over its largest
-  /// possible value].
+  /// Normalised correlation of the views at the first estimate of the heading, -1 .. 1 [S06 eq.
+  /// 33].
   double correlation = 0.0;
   /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1.
   double residual = 1.0;
-  /// Confidence 0 .. 1: the square of the vector's length over that square plus its variance, which
-  /// follows from the residual. Near 0 at home, where there is no direction.
+  /// Confidence of the vector, 0 .. 1: its squared length over the sum of squared length and
+  /// variance, which follows from the residual. Near 0 at home, where there is no direction.
   double confidence = 0.0;
   /// Effective number of frequencies: the sum of their weights.
   double frequencies = 0.0;
@@ -32,7 +32,8 @@ struct HomeVector {
 /// Largest value of `FourierHomingOptions::starting_estimates`.
 inline constexpr int max_starting_estimates = 6;
 
-/// The defaults are our own rule; `published_homing_options` is S06's.
+/// Options of Fourier homing. The defaults are our own rule; `published_homing_options` returns the
+/// rule of S06.
 struct FourierHomingOptions {
   /// Rule by which the heading between the views is estimated first.
   enum class TurnEstimate {
@@ -47,31 +48,32 @@ struct FourierHomingOptions {
   /// Weights of components and rows.
   enum class Weights {
     equal,  ///< as published: equal weights
-    /// Weights by the coherence of both views: components fade out where their phases are
-    /// unrelated, which happens at lower frequencies the farther the views are apart. A far view is
-    /// thus compared coarsely and a near one finely, without a known distance.
+    /// Weights by the coherence of both views: components whose phases are unrelated get less
+    /// weight. With the distance of the views this happens at ever lower frequencies, so that far
+    /// views are compared coarsely and near ones finely, without a known distance.
     coherence,
   };
 
-  int highest = 0;     ///< K, the highest frequency; 0: all but one that both views have
+  int highest = 0;     ///< K, the highest compared frequency; 0: all common ones but the last
   int iterations = 0;  ///< N_it of S06 section 2.3
-  /// The first iteration compares a few frequencies, each further one more, up to K [S06 footnote
-  /// 6].
+  /// Compare few frequencies in the first iteration and more in each further one, up to K [S06
+  /// footnote 6].
   bool rising = false;
   TurnEstimate turn = TurnEstimate::global;  ///< how the first heading is estimated
   Gradient gradient = Gradient::both;        ///< where the slope of the image is taken
   Weights weights = Weights::coherence;      ///< of components and rows
-  /// Headings from which the displacement is solved; the best explanation of the views counts [S06
-  /// footnote 10].
+  /// Number of headings for which the displacement is solved; the solution with the least residual
+  /// is used [S06 footnote 10].
   int starting_estimates = 2;
-  /// Tries displacements up to two thirds of R first, as hs_ei does, and starts the least squares
-  /// from the best one: views from far away are thus compared as they would look from there.
+  /// Test displacements up to two thirds of R first, as hs_ei does, and start the least squares
+  /// from the best one, with the current view transformed to its expected image there; needed for
+  /// far views.
   bool displacement_search = true;
-  /// Things off the horizon also move up and down in the image as the robot approaches. Used only
-  /// where elevations are known.
+  /// Model the vertical motion of things off the horizon in the image as the robot approaches; used
+  /// only if elevations are known.
   bool vertical_motion = true;
-  /// Solves also for the robot's tilt against the home view, a degree or two on uneven ground. Used
-  /// only where elevations are known.
+  /// Also solve for the tilt of the robot relative to the home view, one or two degrees on uneven
+  /// ground; used only if elevations are known.
   bool tilt = true;
   friend bool operator==(const FourierHomingOptions&, const FourierHomingOptions&) = default;
 };
@@ -83,23 +85,23 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 /// Computes the home vector by Fourier homing [S06 section 2.3, eq. 16-30; see docs/equations.md]:
 /// the heading first, then displacement and a correction of the heading in least squares over the
 /// components of all rows. Iterations move the current view by the result and solve again.
-/// Identical views give the zero vector with confidence 0; without structure all zeros and
-/// residual 1, as does a `window` in which no heading fits better than its neighbours. Throws
-/// OptionError; ContractError if the views differ in rows or share fewer than K + 2 components, and
-/// for a window unless 0 < half_width_rad <= pi and the turn estimate is global. Cost: O(rows K),
-/// below a microsecond for one row and K = 5.
+/// Identical views give the zero vector with confidence 0. Views without structure, or a `window`
+/// without a local maximum of the correlation, give all zeros and residual 1. Throws OptionError;
+/// ContractError if the views differ in rows or share fewer than K + 2 components, and for a window
+/// unless 0 < half_width_rad <= pi and the turn estimate is global. Cost: O(rows K), below a
+/// microsecond for one row and K = 5.
 [[nodiscard]] HomeVector home_vector(const HomingView& home, const HomingView& current,
                                      const FourierHomingOptions& options = {},
                                      const std::optional<HeadingWindow>& window = std::nullopt);
 
-/// Computes the same without checks of options and views, for loops.
+/// Computes the home vector without checks of options and views, for inner loops.
 [[nodiscard]] HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,
                                                const FourierHomingOptions& options);
 
 /// Computes the sum of squared differences of the first K components at the heading of their best
 /// correlation [S06 eq. 15, 28], relative to the energy of both views: 0 for the same place, about
-/// 1 for unrelated views. Where elevations are known, differences by a tilt of the robot by a few
-/// degrees do not count. Throws ContractError as `home_vector`.
+/// 1 for unrelated views. If elevations are known, differences that a tilt of the robot by a few
+/// degrees explains are ignored. Throws ContractError as `home_vector`.
 [[nodiscard]] double image_difference(const HomingView& home, const HomingView& current,
                                       int highest = 0);
 

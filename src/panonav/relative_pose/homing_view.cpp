@@ -35,7 +35,7 @@ struct Direction {
   float sine;
 };
 
-const std::array<Direction, 256>& make_byte_directions() {
+const std::array<Direction, 256>& byte_directions() {
   static const std::array<Direction, 256> table = [] {
     std::array<Direction, 256> filled{};
     PackedSignature packed{{1, 1}, {255}, {0}};
@@ -54,14 +54,14 @@ const std::array<Direction, 256>& make_byte_directions() {
 
 HomingView homing_view(const VisualMemory& memory, ViewId view) {
   const PackedSignature packed = memory.packed(view);
-  const auto& table = make_byte_directions();
+  const auto& table = byte_directions();
   const float unit = memory.full_scale() / 255.0F;
   const auto rows = static_cast<std::size_t>(packed.shape.rows);
   std::vector<float> cosines(packed.shape.size());
   std::vector<float> sines(packed.shape.size());
   for (std::size_t i = 0; i < cosines.size(); ++i) {
     const float magnitude = static_cast<float>(packed.magnitudes[i]) * unit;
-    // A magnitude of 0 has no phase.
+    // The phase of a magnitude of 0 is undefined.
     const Direction direction = table[packed.magnitudes[i] == 0 ? 0 : packed.phases[i]];
     cosines[i] = magnitude * direction.cosine;
     sines[i] = i < rows ? 0.0F : -magnitude * direction.sine;

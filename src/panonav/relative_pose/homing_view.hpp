@@ -27,7 +27,7 @@ class HomingView {
   [[nodiscard]] int rows() const noexcept { return rows_; }
   /// Frequencies k = 0 .. components - 1.
   [[nodiscard]] int components() const noexcept { return components_; }
-  /// nullopt: unknown, every row counts as on the horizon.
+  /// Elevations of the rows; nullopt: unknown, all rows are treated as on the horizon.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
     return elevations_;
   }
@@ -60,9 +60,9 @@ class HomingView {
 /// Converts all rows of a signature. Throws ContractError when it has fewer than two components.
 [[nodiscard]] HomingView homing_view(const FourierSignature& signature);
 
-/// Converts a view of a memory to the same bits, from its bytes by tables instead of by a sine and
-/// a cosine a coefficient. Throws ContractError when there is no such view. Cost: 1 microsecond for
-/// 40 rows and 15 components.
+/// Converts a view of a memory, with the same bits as from its signature, by a table of the packed
+/// phases instead of a sine and a cosine per coefficient. Throws ContractError when there is no
+/// such view. Cost: 1 microsecond for 40 rows and 15 components.
 [[nodiscard]] HomingView homing_view(const VisualMemory& memory, ViewId view);
 
 /// Returns S06's one-dimensional view: the mean of the rows whose middle lies within
@@ -72,8 +72,8 @@ class HomingView {
 [[nodiscard]] HomingView horizon_view(const FourierSignature& signature,
                                       double half_band_rad = 5.0 * std::numbers::pi / 180.0);
 
-/// Returns the first components of a view, as a snapshot stores them. Throws ContractError unless 2
-/// <= components <= those of the view.
+/// Returns the first `components` components of a view, such as a snapshot stores. Throws
+/// ContractError unless 2 <= components <= those of the view.
 [[nodiscard]] HomingView first_components(const HomingView& view, int components);
 
 /// Returns the view after the robot turned by `turn_rad` counter-clockwise.

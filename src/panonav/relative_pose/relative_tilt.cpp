@@ -15,15 +15,16 @@ namespace panonav {
 
 namespace {
 
-/// One stage of the estimation: coarse structure first, which the tilt moves by less than its size.
+/// One stage of the estimation. The first stage uses coarse structure, which is larger than its
+/// shift by the tilt.
 struct TiltStage {
   int frequencies;
-  double smoothed_rad;  // of the Gaussian over rows
+  double smoothing_rad;  // of the Gaussian over rows
 };
 constexpr std::array<TiltStage, 2> tilt_stages{{{6, radians(5.0)}, {12, radians(2.0)}}};
 constexpr int tilt_iterations = 3;  ///< Gauss-Newton steps at each stage
 constexpr int tilt_columns = 48;    ///< four for each period of the highest frequency
-/// Margin at either end that is partly out of sight in a levelled view.
+/// Margin at the top and bottom, of which a levelled view shows only parts.
 constexpr double tilt_margin_rad = radians(5.0);
 // Standard deviations of the prior.
 constexpr double tilt_deviation_rad = 0.06;     ///< two views tilted by some 3 degrees each
@@ -65,7 +66,7 @@ Panorama smooth_rows(const Panorama& panorama, double sigma_rows) {
 }
 
 /// The tilt at one stage as a problem for `minimise`. Unknowns: turn, displacement in two
-/// directions, pitch, roll; the first three are solved again at each step.
+/// directions, pitch, roll; the first three are not kept from step to step.
 class TiltProblem {
  public:
   using Equations = DenseEquations<5>;
@@ -78,7 +79,7 @@ class TiltProblem {
     equations.set_zero();
     const Panorama level = level_panorama(current_, tilt_);
     const double values = static_cast<double>((level.rows() - 2 * margin_) * level.columns());
-    const double noise = add_rows(level, equations) / values;
+    const double noise = add_residuals(level, equations) / values;
     if (!(noise > 0.0)) return false;
     const double certainty = noise / (tilt_deviation_rad * tilt_deviation_rad);
     equations.matrix(0, 0) += noise / (turn_deviation_rad * turn_deviation_rad);
@@ -92,7 +93,7 @@ class TiltProblem {
   }
 
   bool move(const Equations::Vector& change) {
-    constexpr double max_rad = 0.2;  // of robots that tilt by 6 degrees, twice
+    constexpr double max_rad = 0.2;  // two views tilted by 6 degrees each
     tilt_.pitch_rad = std::clamp(tilt_.pitch_rad + change[3], -max_rad, max_rad);
     tilt_.roll_rad = std::clamp(tilt_.roll_rad + change[4], -max_rad, max_rad);
     return false;
@@ -101,7 +102,7 @@ class TiltProblem {
  private:
   /// Adds the residuals of the home view against the levelled current one with their derivatives.
   /// Returns their energy.
-  double add_rows(const Panorama& level, Equations& equations) const {
+  double add_residuals(const Panorama& level, Equations& equations) const {
     const int columns = level.columns();
     const auto& band = *level.elevations();
     const double across = columns / (4.0 * std::numbers::pi);
@@ -132,7 +133,7 @@ class TiltProblem {
 
   const Panorama& home_;
   const Panorama& current_;
-  int margin_;  // rows at either end that do not count
+  int margin_;  // ignored rows at the top and the bottom
   Tilt& tilt_;
 };
 
@@ -151,7 +152,7 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
       std::clamp(static_cast<int>(std::ceil(tilt_margin_rad / row_rad)), 1, (home.rows() - 2) / 3);
   const HomingView aligned = rotate(home, -heading_rad);
   for (const TiltStage& stage : tilt_stages) {
-    const double sigma_rows = stage.smoothed_rad / row_rad;
+    const double sigma_rows = stage.smoothing_rad / row_rad;
     const Panorama smooth_home =
         smooth_rows(synthesise(aligned, stage.frequencies, tilt_columns), sigma_rows);
     const Panorama smooth_current =
@@ -164,7 +165,7 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
 }
 
 HomingView level_view(const HomingView& view, const Tilt& tilt) {
-  // Four columns a period and more, so that interpolation hardly damps the highest frequency.
+  // At least four columns per period, so that interpolation hardly damps the highest frequency.
   const int columns = 4 * view.components();
   return homing_view(compute_signature(
       level_panorama(synthesise(view, view.components(), columns), tilt), view.components()));

@@ -5,12 +5,12 @@
 
 namespace panonav {
 
-/// Estimates the tilt of the robot at the current view against that at home: the tilt with which
-/// `level_panorama` makes the current view most similar to the home view, while a turn and a
-/// displacement explain the rest (docs/equations.md). `heading_rad` is
-/// HomeVector::heading_rad of the two, right to some 10 degrees. No tilt where elevations are
-/// unknown or other than those of home, or where the views have fewer than 10 rows. Cost: 1 ms for
-/// 40 rows.
+/// Estimates the tilt of the robot at the current view relative to its tilt at home: the tilt with
+/// which `level_panorama` makes the current view most similar to the home view. A turn and a
+/// displacement are fitted at the same time (docs/equations.md). `heading_rad`:
+/// HomeVector::heading_rad of the two views, right to about 10 degrees. Returns no tilt if
+/// elevations are unknown or differ, or if the views have fewer than 10 rows. Cost: 1 ms for 40
+/// rows.
 [[nodiscard]] Tilt relative_tilt(const HomingView& home, const HomingView& current,
                                  double heading_rad);
 

@@ -21,7 +21,8 @@ CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_
 }
 
 // Returns the maximum next to a point of the grid (Newton's rule).
-float refine(const TurnCorrelation& correlation, float turn_rad, float half_step_rad) noexcept {
+float refine_peak(const TurnCorrelation& correlation, float turn_rad,
+                  float half_step_rad) noexcept {
   float turn = turn_rad;
   for (int i = 0; i < 3; ++i) {
     const auto point = evaluate(correlation, turn);
@@ -39,7 +40,7 @@ struct Circle {
   std::array<float, max_points> cosine, sine;
 };
 
-const Circle& circle() {
+const Circle& unit_circle() {
   static const Circle made = [] {
     Circle table{};
     for (int i = 0; i < max_points; ++i) {
@@ -98,7 +99,7 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
   std::size_t count = 16;
   while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
   const std::size_t stride = max_points / count;
-  const Circle& table = circle();
+  const Circle& table = unit_circle();
   std::array<float, max_points> cosine, sine, real, imaginary;
   for (std::size_t i = 0; i < count; ++i) {
     cosine[i] = table.cosine[i * stride];
@@ -120,7 +121,7 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
     float value;
     float turn_rad;
   };
-  // A maximum may be between two points: more are refined than returned.
+  // The highest maximum may be between two grid points, so more maxima are refined than returned.
   std::array<Peak, max_points / 2> peaks;
   std::size_t found = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -138,7 +139,7 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
                     peaks.begin() + static_cast<std::ptrdiff_t>(found), by_value);
   const float half_step_rad = std::numbers::pi_v<float> / static_cast<float>(count);
   for (std::size_t i = 0; i < refined; ++i) {
-    peaks[i].turn_rad = refine(correlation, peaks[i].turn_rad, half_step_rad);
+    peaks[i].turn_rad = refine_peak(correlation, peaks[i].turn_rad, half_step_rad);
     peaks[i].value = correlation.at(peaks[i].turn_rad);
   }
   std::stable_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(refined),

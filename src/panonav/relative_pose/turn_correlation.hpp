@@ -31,8 +31,9 @@ struct HeadingWindow {
 };
 
 /// Returns the heading of S06's sequential rule, as published [S06 eq. 40-43, sign of eq. 41
-/// corrected]: each component refines the estimate of those before. Where the first weight is below
-/// a tenth of the mean, a second estimate starts at the opposite heading. In radians, not wrapped.
+/// corrected]: each component refines the estimate of those before. If the weight of the first
+/// component is below a tenth of the mean, a second estimate starts at the opposite heading, and
+/// the one with the higher correlation is returned. In radians, not wrapped.
 [[nodiscard]] float sequential_heading(const TurnCorrelation& correlation) noexcept;
 
 /// Fills `turns` with the headings of the highest local maxima within the window, highest first,

@@ -36,7 +36,7 @@ std::optional<PhaseReading> read_phases(const HomingView& a, const HomingView& b
   reading.turn_rad = wrap_angle(-from_b.heading_rad + 0.5 * turns_differ);
   reading.turn_disagreement_rad = std::abs(turns_differ);
   reading.residual = 0.5 * (from_a.residual + from_b.residual);
-  // A vector with a lower confidence is more likely an error of reading than a motion.
+  // Below this confidence a vector is more likely noise than a displacement.
   reading.has_direction = from_a.confidence > 0.5 && from_b.confidence > 0.5;
   if (!reading.has_direction) return reading;
   reading.length = 0.5 * (from_a.length() + from_b.length());

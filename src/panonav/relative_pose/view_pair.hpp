@@ -18,24 +18,24 @@ struct PhaseReading {
   /// Angle between the directions that the two views show, in [0, pi]: small for neighbouring
   /// places, arbitrary for unrelated ones.
   double disagreement_rad = 0.0;
-  double turn_disagreement_rad = 0.0;  ///< the same of the headings
+  double turn_disagreement_rad = 0.0;  ///< difference of the two readings of the turn
   /// False for views of one place; directions and length are then 0.
   bool has_direction = false;
   /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1: the
   /// mean of both readings.
   double residual = 1.0;
 
-  /// Pose of b in the frame of a by both directions, with lengths of `unit` for each R.
+  /// Returns the pose of b in the frame of a, by the mean of both directions. `unit`: length of R.
   [[nodiscard]] Pose2 a_from_b(double unit = 1.0) const;
   /// The reading of the views in reverse order.
   [[nodiscard]] PhaseReading reversed() const;
 };
 
-/// Reads the home vectors from a to b and back. nullopt when a view has no structure. With `window`
-/// only headings of b minus those of a within it are considered, so that places that look similar
-/// after a quarter turn are not mistaken for each other; nullopt also when no heading in it fits.
-/// Throws ContractError when the views differ in shape or have fewer than three components. Cost:
-/// that of two home vectors.
+/// Reads the home vectors from a to b and back. nullopt when a view has no structure. With
+/// `window`, only turns from a to b within it are considered, so that places that look similar
+/// after a quarter turn are not mistaken for each other; nullopt also if no turn in the window
+/// fits. Throws ContractError when the views differ in shape or have fewer than three components.
+/// Cost: that of two home vectors.
 [[nodiscard]] std::optional<PhaseReading> read_phases(
     const HomingView& a, const HomingView& b,
     const std::optional<HeadingWindow>& window = std::nullopt);

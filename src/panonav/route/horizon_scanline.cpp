@@ -68,7 +68,8 @@ std::vector<float> horizon_scanline(const Panorama& panorama,
     const auto size = static_cast<long long>(row.size());
     return static_cast<double>(row[static_cast<std::size_t>(((c % size) + size) % size)]);
   };
-  // A pixel reaches half a step to either side of its middle, or half a pixel of the panorama.
+  // Each value is the mean of half a step, and at least half a pixel of the panorama, to either
+  // side of its middle.
   const double half = 0.5 * std::max(1.0, step);
   for (std::size_t c = 0; c < count; ++c) {
     const double low = static_cast<double>(c) * step - half + 0.5;
@@ -95,7 +96,7 @@ std::vector<float> smooth_line(std::span<const float> line, double sigma) {
     sum += (k == 0 ? 1.0F : 2.0F) * kernel[k];
   }
   for (float& weight : kernel) weight /= sum;
-  // Continued beyond both ends, so that the loops below do not wrap.
+  // Continues the line periodically beyond both ends, so that the loops below do not wrap.
   std::vector<float> closed(line.size() + 2 * reach);
   for (std::size_t i = 0; i < closed.size(); ++i) {
     closed[i] = line[(i + line.size() - reach % line.size()) % line.size()];

@@ -8,22 +8,21 @@
 
 namespace panonav {
 
-/// Part of a panorama that a scanline is cut from.
+/// Options for the part of a panorama from which a scanline is made.
 struct HorizonScanlineOptions {
   int columns = 360;  ///< of the line: a byte a degree [Y03 section 2.2]
-  /// Elevation up to which rows are averaged. Light in the plane of the horizon goes straight from
-  /// place to place, light above and below does not: keep it narrow.
+  /// Largest elevation, up or down, of averaged rows. It should be small, as only light in the
+  /// plane of the horizon travels from place to place along the path.
   double half_band_rad = 0.0131;
   friend bool operator==(const HorizonScanlineOptions&, const HorizonScanlineOptions&) = default;
 };
 void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor);
 
 /// Returns the horizon scanline: the view in the plane of the camera [Y03 section 2.2]: `columns`
-/// values from column 0, straight ahead, counter-clockwise. Rows within the band are averaged, or
-/// the two next to the horizon interpolated where the band holds none; without elevations all rows
-/// count as on the horizon. Columns are averaged where the panorama has more than the line,
-/// interpolated where it has fewer. Throws OptionError, and ContractError when the horizon lies
-/// outside the panorama.
+/// values from column 0, straight ahead, counter-clockwise. Rows within the band are averaged; if
+/// there are none, the two rows next to the horizon are interpolated. Without elevations all rows
+/// are averaged. Columns are averaged where the panorama has more than the line, interpolated where
+/// it has fewer. Throws OptionError, and ContractError when the horizon lies outside the panorama.
 [[nodiscard]] std::vector<float> horizon_scanline(const Panorama& panorama,
                                                   const HorizonScanlineOptions& options = {});
 

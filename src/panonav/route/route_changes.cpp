@@ -11,7 +11,8 @@ namespace panonav {
 
 namespace {
 
-/// Successive images in which a change must appear: noise of half a direction is rarer.
+/// Number of successive images in which a change must appear; noise rarely affects half of a
+/// direction in all of them.
 constexpr int min_images = 5;
 /// Residual in standard deviations of the noise from which on a column is unexplained: normal
 /// errors exceed it once in 370 times.
@@ -19,7 +20,7 @@ constexpr double max_deviations = 3.0;
 
 }  // namespace
 
-bool RouteChanges::is_at_new_line(Point2 position) {
+bool RouteChanges::update_nearest_line(Point2 position) {
   if (lines_.empty()) return true;
   const auto off_m = [&](const Pose2& line) { return distance(line.position(), position); };
   const auto nearest =
@@ -43,9 +44,9 @@ std::vector<RouteChanges::AzimuthRange> RouteChanges::add(const RouteFix& fix) {
     ++all[sector];
     unexplained[sector] += value > limit ? 1 : 0;
   }
-  // An object beside the route moves from sector to sector as the robot passes it.
+  // An object next to the route moves from sector to sector as the robot passes it.
   const auto before = images_;
-  const int increment = is_at_new_line(fix.pose.position()) ? 1 : 0;
+  const int increment = update_nearest_line(fix.pose.position()) ? 1 : 0;
   for (std::size_t s = 0; s < sectors; ++s) {
     const bool is_unexplained = all[s] > 0 && 2 * unexplained[s] >= all[s];
     const int so_far =

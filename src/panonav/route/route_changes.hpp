@@ -11,11 +11,11 @@
 namespace panonav {
 
 /// Finds changes of the scene since a route was recorded: directions that fits leave unexplained
-/// image after image, unlike noise. A direction (one of 72, 5 degrees wide) is unexplained where at
+/// image after image, unlike noise. A direction (one of 72, 5 degrees wide) is unexplained if at
 /// least half of its columns are off by more than three standard deviations of the noise. It is
-/// reported once it, or the direction next to it one image before, was unexplained in five
-/// successive images nearest to different lines of the route: positions between two lines are
-/// interpolated, and images from the same gap share its error.
+/// reported after five successive images in which it was unexplained; one image earlier an adjacent
+/// direction is enough. Only images nearest to a new line of the route are counted, as lines are
+/// interpolated in between, and images from the same gap share the error of interpolation.
 class RouteChanges {
  public:
   /// Azimuths in the robot's frame, counter-clockwise from the first to the second.
@@ -25,11 +25,12 @@ class RouteChanges {
     double to_rad = 0.0;
   };
 
-  RouteChanges() = default;  ///< Without lines each image counts.
-  /// `lines`: poses from which those of the route were taken.
+  RouteChanges() = default;  ///< Without lines every image is counted.
+  /// `lines`: poses from which the lines of the route were taken.
   explicit RouteChanges(std::span<const Pose2> lines) : lines_(lines.begin(), lines.end()) {}
 
-  /// Returns the changes by this image and those before it. Cost: O(columns + lines).
+  /// Adds the fix of the next image and returns the changes that are now confirmed. Cost: O(columns
+  /// + lines).
   std::vector<AzimuthRange> add(const RouteFix& fix);
   /// Starts counting again, after an image without a fix.
   void reset() noexcept {
@@ -39,7 +40,7 @@ class RouteChanges {
 
  private:
   static constexpr std::size_t sectors = 72;
-  [[nodiscard]] bool is_at_new_line(Point2 position);
+  [[nodiscard]] bool update_nearest_line(Point2 position);
 
   std::array<int, sectors>
       images_{};  // by direction in the world: number of successive unexplained ones

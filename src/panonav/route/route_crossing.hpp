@@ -27,8 +27,8 @@ struct Direction2 {
 
 /// Finds the crossing nearest to `viewpoint` for each of `directions`, which must be those of
 /// `equal_directions` [Y03 eq. 5, for paths of any shape]. Light in the plane of the path that
-/// reaches the viewpoint passed the crossing before or would reach it later; the nearest crossing
-/// has the least in between. `path`: poses of the lines from `first` on. Throws nothing. Cost:
+/// reaches the viewpoint has passed the crossing or would pass it later; the nearest crossing has
+/// the fewest objects in between. `path`: poses of the lines from `first` on. Throws nothing. Cost:
 /// O(path + directions).
 void find_crossings(std::span<const Pose2> path, std::size_t first, Point2 viewpoint,
                     std::span<const Direction2> directions, std::span<RouteCrossing> crossings);

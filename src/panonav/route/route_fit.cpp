@@ -23,18 +23,18 @@ namespace {
 /// Unknowns: x, y, heading, gain, offset.
 using Equations = DenseEquations<5>;
 
-/// Typical distance of things: smoothing by an angle equals smoothing by this times it along the
-/// path.
+/// Typical distance of things: smoothing by an angle corresponds to smoothing along the path by the
+/// angle times this distance.
 constexpr double typical_distance_m = 2.0;
 /// Fewest directions from which a pose, gain and offset are fitted.
 constexpr std::size_t min_directions = 16;
 /// Smallest noise: a grey level, as lines are bytes.
 constexpr double min_noise = 1.0 / 255.0;
 /// Standard deviation of a Gaussian over the median of its absolute values.
-constexpr double deviations_per_median = 1.4826;
-/// Damping of the steps: directions in which nothing changes stay.
+constexpr double sigma_over_mad = 1.4826;
+/// Damping of the steps, so that unknowns that do not affect the line do not change.
 constexpr double fit_damping = 1e-3;
-/// Longest step, as far as smoothing resolves.
+/// Longest step, beyond which smoothed lines are no longer linear.
 constexpr double max_step_m = 0.25;
 constexpr double max_step_rad = 0.2;
 
@@ -67,8 +67,8 @@ struct RouteLines::Linearised {
   double mean_measured_ = 0.0;
   double mean_expected_ = 0.0;
 
-  [[nodiscard]] bool fit_light(const std::vector<Term>& terms);
-  void set_noise(const std::vector<Term>& terms);
+  [[nodiscard]] bool fit_gain_and_offset(const std::vector<Term>& terms);
+  void estimate_noise(const std::vector<Term>& terms);
   void set_equations(const std::vector<Term>& terms, bool robust);
   [[nodiscard]] double residual(const Term& term) const {
     return static_cast<double>(term.expected) - gain * static_cast<double>(term.measured) - offset;
@@ -90,12 +90,12 @@ class RouteLines::FitProblem {
                                                        std::numbers::pi / route.columns_) {}
 
   /// Returns the equations at the present pose.
-  [[nodiscard]] std::optional<Linearised> linearised() {
+  [[nodiscard]] std::optional<Linearised> compute_equations() {
     if (!route_.collect_terms(level_, line_, pose_, window_, terms_)) return std::nullopt;
     return Linearised::make(terms_, route_.options_.robust);
   }
   bool linearise(Equations& equations) {
-    const auto made = linearised();
+    const auto made = compute_equations();
     if (made) equations = made->equations;
     return made.has_value();
   }
@@ -143,14 +143,14 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
   const double spacing_m = route.length_m() / static_cast<double>(route.size() - 1);
   for (int i = 0; i < options.levels; ++i) {
     Level level;
-    // Each a third as smooth as the one before, the last not at all.
+    // Each level is smoothed a third as much as the previous one, the last not at all.
     if (i + 1 < options.levels) {
       level.sigma = options.coarse_deg * columns_ / 360.0 / std::pow(3.0, i);
     }
     const double sigma_rad = level.sigma * 2.0 * std::numbers::pi / columns_;
     level.half_slope =
         static_cast<std::size_t>(std::lround(typical_distance_m * sigma_rad / (2.0 * spacing_m)));
-    // Two columns a standard deviation show all structure that is left.
+    // Two columns per standard deviation of the smoothing preserve all remaining structure.
     while (2.0 * static_cast<double>(2 * level.stride) <= level.sigma &&
            static_cast<std::size_t>(columns_) % (2 * level.stride) == 0) {
       level.stride *= 2;
@@ -223,7 +223,7 @@ bool RouteLines::collect_terms(const Level& level, std::span<const float> line, 
   return terms.size() >= min_directions;
 }
 
-bool RouteLines::Linearised::fit_light(const std::vector<Term>& terms) {
+bool RouteLines::Linearised::fit_gain_and_offset(const std::vector<Term>& terms) {
   const auto n = static_cast<double>(terms.size());
   double measured = 0.0;
   double expected = 0.0;
@@ -243,7 +243,7 @@ bool RouteLines::Linearised::fit_light(const std::vector<Term>& terms) {
   }
   constexpr double min_variance = 1e-8;
   if (measured_square < min_variance || expected_square < min_variance) return false;
-  // The light changes by a factor of a few at most, and never turns black into white.
+  // The gain of the light changes by a small factor at most, and is never negative.
   gain = std::clamp(product / measured_square, 0.2, 5.0);
   offset = expected - gain * measured;
   deviation = std::sqrt(expected_square);
@@ -252,12 +252,12 @@ bool RouteLines::Linearised::fit_light(const std::vector<Term>& terms) {
   return true;
 }
 
-void RouteLines::Linearised::set_noise(const std::vector<Term>& terms) {
+void RouteLines::Linearised::estimate_noise(const std::vector<Term>& terms) {
   std::vector<float> sizes;
   sizes.reserve(terms.size());
   for (const Term& term : terms) sizes.push_back(std::abs(static_cast<float>(residual(term))));
-  noise = std::max(min_noise, deviations_per_median *
-                                  static_cast<double>(upper_median_in_place(std::span(sizes))));
+  noise = std::max(min_noise,
+                   sigma_over_mad * static_cast<double>(upper_median_in_place(std::span(sizes))));
 }
 
 void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool robust) {
@@ -309,8 +309,8 @@ void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool 
 std::optional<RouteLines::Linearised> RouteLines::Linearised::make(const std::vector<Term>& terms,
                                                                    bool robust) {
   Linearised result;
-  if (!result.fit_light(terms)) return std::nullopt;
-  result.set_noise(terms);
+  if (!result.fit_gain_and_offset(terms)) return std::nullopt;
+  result.estimate_noise(terms);
   result.set_equations(terms, robust);
   return result;
 }
@@ -371,19 +371,20 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   const auto fit_last_level = [&](Pose2 start) {
     const Level& level = levels_.back();
     if (!minimise_at(level, start)) return;
-    const auto fitted = FitProblem(*this, level, line, *window, start).linearised();
+    const auto fitted = FitProblem(*this, level, line, *window, start).compute_equations();
     if (!fitted || (best && fitted->correlation <= best->correlation)) return;
     best = fitted;
     pose = start;
   };
-  // Smoothed lines lead from afar, but may lead away: near things and far ones behind them blend.
-  // From a good prediction the lines themselves converge. The better correlation counts.
+  // Smoothed lines converge from far away, but may end at a wrong pose, as near things blend with
+  // far ones behind them. Lines that are not smoothed converge from a good prediction. Both are
+  // tried, and the fit with the better correlation is used.
   fit_last_level(predicted);
   Pose2 coarse = predicted;
   const auto coarse_levels = std::span(levels_).first(levels_.size() - 1);
   if (!coarse_levels.empty() &&
       std::ranges::all_of(coarse_levels, [&](const Level& l) { return minimise_at(l, coarse); })) {
-    // Within these both would end at the same pose.
+    // Below these differences both fits would end at the same pose.
     constexpr double same_m = 0.01;
     constexpr double same_rad = 0.01;
     const bool is_same =

@@ -14,8 +14,8 @@ namespace panonav {
 
 /// Options of the fit of a scanline into a route panorama.
 struct RouteFitOptions {
-  double coarse_deg = 8.0;  ///< standard deviation of the smoothing where a fit starts, in azimuth
-  int levels = 3;           ///< from coarse to not smoothed
+  double coarse_deg = 8.0;  ///< standard deviation of the smoothing at the first level, in azimuth
+  int levels = 3;           ///< number of levels from coarse to not smoothed
   int max_steps = 8;        ///< Gauss-Newton steps at each level
   double reach_m = 6.0;     ///< lines farther from the prediction are not compared
   bool robust = true;       ///< changed parts of the scene have less weight
@@ -42,8 +42,8 @@ struct RouteFix {
   /// Robust standard deviation of the scanline from the expected line, 0 .. 1; at least a grey
   /// level.
   double noise = 0.0;
-  /// For each column: the residual that a shift by a degree does not explain, 0 .. 1, as edges in
-  /// depth are off by that much between lines; NaN where the path is not crossed.
+  /// Residual of each column, 0 .. 1, after allowing for a shift by one degree, as edges in depth
+  /// are off by that much between lines; NaN where the line of sight does not cross the path.
   std::vector<float> unexplained;
   Origin origin = Origin::prediction;  ///< set by `RouteTracker`, as the two below
   double along_m = 0.0;    ///< path length from the start to the point nearest to the robot
@@ -58,17 +58,18 @@ class RouteLines {
   /// route of fewer than two lines.
   explicit RouteLines(const RoutePanorama& route, const RouteFitOptions& options = {});
 
-  /// Finds the pose at which the route shows the line: least squares of all directions at once over
-  /// x, y and heading, gain and offset of the light, from coarse to fine, starting at `predicted`.
-  /// Needs no contour: the intensities themselves are fitted. nullopt where the prediction is out
-  /// of reach of the path or the line has no structure. A fit that starts far from the truth ends
-  /// somewhere else: its correlation shows it. Throws ContractError on a wrong length. Cost: some
-  /// ten steps of O(columns + lines in reach).
+  /// Finds the pose from which the route would look like the line, by least squares over all
+  /// directions. Unknowns are x, y and heading, gain and offset of the light; the fit is from
+  /// coarse to fine, starting at `predicted`. The intensities themselves are fitted, so that no
+  /// contour is needed. nullopt where the prediction is out of reach of the path or the line has no
+  /// structure. A fit that starts far from the truth ends at a wrong pose, which its low
+  /// correlation shows. Throws ContractError on a wrong length. Cost: some ten steps of O(columns +
+  /// lines in reach).
   [[nodiscard]] std::optional<RouteFix> fit(std::span<const float> line,
                                             const Pose2& predicted) const;
 
-  /// Returns the expected line at `pose` by the route panorama [Y03 section 3], in its frame; NaN
-  /// where no line of sight crosses the path.
+  /// Returns the line that the route panorama predicts at `pose` [Y03 section 3], in the frame of
+  /// that pose; NaN where no line of sight crosses the path.
   [[nodiscard]] std::vector<float> synthesise(const Pose2& pose) const;
 
   /// A candidate pose of a line.
@@ -76,10 +77,10 @@ class RouteLines {
     Pose2 pose;                ///< in the route's frame
     double correlation = 0.0;  ///< at the coarsest level
   };
-  /// Correlates a line at the coarsest level with the expected line at `position`, in the heading
-  /// where the correlation is highest. nullopt where the line of sight crosses the path in fewer
-  /// than half of all directions. Throws ContractError unless `coarse_line` comes from
-  /// `to_coarse_line`. Cost: O(lines in reach + columns) and some thousand multiplications.
+  /// Finds the heading at `position` where a line correlates best with the expected line, at the
+  /// coarsest level. nullopt if the lines of sight cross the path in fewer than half of all
+  /// directions. Throws ContractError unless `coarse_line` comes from `to_coarse_line`. Cost:
+  /// O(lines in reach + columns) and some thousand multiplications.
   [[nodiscard]] std::optional<Candidate> find_candidate(std::span<const float> coarse_line,
                                                         Point2 position) const;
   /// Converts a line for `find_candidate`.
@@ -96,7 +97,7 @@ class RouteLines {
   struct Level {
     double sigma = 0.0;                  // of the smoothing, in columns
     std::size_t half_slope = 0;          // lines to either side between which the slope is taken
-    std::size_t stride = 1;              // columns between those that count: smooth lines need few
+    std::size_t stride = 1;              // step between compared columns: smooth lines need few
     std::vector<Direction2> directions;  // of these
     std::vector<float> values;           // line by line, in the world's frame
   };
@@ -120,7 +121,8 @@ class RouteLines {
   [[nodiscard]] static std::vector<float> shift_tolerant_residuals(const std::vector<Term>& terms,
                                                                    std::size_t columns, double gain,
                                                                    double offset, int shift);
-  /// The fix at a pose with its equations; nullopt where these determine no covariance.
+  /// Returns the fix at a pose, with the covariance from its equations; nullopt if these are
+  /// singular.
   [[nodiscard]] std::optional<RouteFix> make_fix(std::span<const float> line, const Pose2& pose,
                                                  const Linearised& fitted,
                                                  const Window& window) const;

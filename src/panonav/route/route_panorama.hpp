@@ -29,7 +29,7 @@ class RoutePanorama {
   /// Appends a line of bytes in the same way.
   bool append(const Pose2& pose, std::span<const std::uint8_t> line);
 
-  /// Bytes of a line: azimuths of a full turn.
+  /// Number of bytes of a line, over the azimuths of a full turn.
   [[nodiscard]] int columns() const noexcept { return columns_; }
   [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }  ///< Number of lines.
   /// True if there is no line.

@@ -7,7 +7,7 @@ namespace panonav {
 
 namespace {
 
-// Projects a position onto one part of a path; along that part.
+// Projects a position onto one segment of a path; `along_m` is counted from the segment's start.
 RoutePosition project_onto_segment(Point2 from, Point2 to, Point2 position) {
   const double ex = to.x_m - from.x_m;
   const double ey = to.y_m - from.y_m;
@@ -42,7 +42,7 @@ RoutePosition project_onto_route(std::span<const Pose2> path, Point2 position) {
 std::vector<RoutePosition> find_passes(std::span<const Pose2> path, Point2 position,
                                        double reach_m) {
   std::vector<RoutePosition> passes;
-  bool near = false;  // of the part before this one
+  bool near = false;  // the previous segment is in reach
   double passed_m = 0.0;
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     const Point2 from = path[i].position();

@@ -52,7 +52,7 @@ Correlation find_best_rotation(std::span<const float> expected, std::span<const 
     if (vx > 1e-9 && vy > 1e-9) values[rotation] = (xy - x * y / n) / std::sqrt(vx * vy);
   }
   const auto at = static_cast<std::size_t>(std::ranges::max_element(values) - values.begin());
-  // The top of the parabola through the maximum and its neighbours.
+  // Interpolates the maximum by a parabola through the highest value and its neighbours.
   const double left = values[(at + size - 1) % size];
   const double right = values[(at + 1) % size];
   const double bend = left - 2.0 * values[at] + right;

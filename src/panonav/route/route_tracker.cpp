@@ -62,11 +62,12 @@ double RouteTracker::learn_min_correlation(const RoutePanorama& route,
   if (right.size() < 3 || wrong.size() < 3) return default_correlation;
   const double low = std::max(0.0, order_statistic(std::move(wrong), 0.95));
   const double high = order_statistic(std::move(right), 0.05);
-  // A line from beside the path or of a changed scene fits worse than one from the path.
+  // Puts the limit nearer to the wrong fits, as a line taken off the path or in a changed scene
+  // fits worse than one from the path.
   return low + std::max(0.0, high - low) / 3.0;
 }
 
-RouteFix RouteTracker::with_route_position(RouteFix fix, RouteFix::Origin origin) const {
+RouteFix RouteTracker::add_route_position(RouteFix fix, RouteFix::Origin origin) const {
   const RoutePosition position = project_onto_route(lines_.poses(), fix.pose.position());
   fix.origin = origin;
   fix.along_m = position.along_m;
@@ -119,7 +120,7 @@ std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> 
   std::vector<Point2> tried;
   for (const auto& candidate : found) {
     if (tried.size() >= static_cast<std::size_t>(options_.max_candidates)) break;
-    // Leaves out nearby positions, which a fit finds by itself.
+    // Skips positions near a tested one, from which a fit would converge to the same pose.
     const bool near = std::ranges::any_of(tried, [&](Point2 other) {
       return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m;
     });
@@ -134,7 +135,7 @@ std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> 
 std::optional<RouteFix> RouteTracker::search(std::span<const float> line) const {
   auto best = find_best_on_route(line);
   if (!best || best->correlation < min_correlation_) return std::nullopt;
-  return with_route_position(*std::move(best), RouteFix::Origin::search);
+  return add_route_position(*std::move(best), RouteFix::Origin::search);
 }
 
 std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const Pose2& step) {
@@ -155,11 +156,11 @@ std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const P
     };
     auto fix = lines_.fit(line, predicted);
     if (is_acceptable(fix)) {
-      found = with_route_position(*std::move(fix), RouteFix::Origin::prediction);
+      found = add_route_position(*std::move(fix), RouteFix::Origin::prediction);
     } else {
       fix = recover(line, predicted);
       if (is_acceptable(fix))
-        found = with_route_position(*std::move(fix), RouteFix::Origin::recovery);
+        found = add_route_position(*std::move(fix), RouteFix::Origin::recovery);
     }
     // Odometry errs by centimetres from one line to the next.
     if (found && is_followed_ && off_m(*found) > options_.surprise_m &&

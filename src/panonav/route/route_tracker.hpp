@@ -9,13 +9,13 @@
 
 namespace panonav {
 
-/// Where a tracker searches for the robot, and when it accepts a fit.
+/// Options for the search for the robot and for the acceptance of fits.
 struct RouteTrackerOptions {
-  double search_step_m = 0.2;      ///< between the positions along the path that a search tries
-  double search_lateral_m = 0.25;  ///< between those to either side of it
-  int search_sides = 2;            ///< positions to either side
-  int max_candidates = 6;          ///< positions that a search fits
-  double recovery_m = 0.5;         ///< largest error of a prediction
+  double search_step_m = 0.2;      ///< distance between tested positions along the path
+  double search_lateral_m = 0.25;  ///< distance between tested positions to either side
+  int search_sides = 2;            ///< number of tested positions to either side
+  int max_candidates = 6;          ///< number of best positions from which a search fits
+  double recovery_m = 0.5;         ///< largest error of a predicted position
   /// Distance from the odometry's prediction beyond which a fix of a followed robot must be
   /// confirmed by the next line.
   double surprise_m = 0.15;
@@ -25,23 +25,23 @@ struct RouteTrackerOptions {
 };
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 
-/// Follows a robot along a route panorama: odometry predicts, the line corrects. Without a
-/// prediction, or where it fails, the whole route is searched. Deterministic; a copy continues as
-/// the original.
+/// Follows a robot along a route panorama: odometry predicts the pose, and each line corrects it.
+/// Without a prediction, or if it fails, the whole route is searched. Deterministic; a copy
+/// continues like the original.
 class RouteTracker {
  public:
-  /// Learns from the route which correlation a fit must have: right fits are those of lines into
-  /// the route made of every second other line, wrong ones those of mirrored lines, which show a
-  /// place that does not exist; the limit lies a third of the distance from the latter's 95 %
-  /// quantile to the former's 5 % quantile. Throws OptionError, and ContractError on a route of
-  /// fewer than two lines. Cost: 40 searches.
+  /// Learns the smallest correlation of an accepted fit from the route. Half of the lines make a
+  /// test route. Right fits are those of the other lines into it; wrong fits are those of mirrored
+  /// lines, which show a place that does not exist. The limit is above the 95 % quantile of the
+  /// wrong correlations by a third of the distance to the 5 % quantile of the right ones. Throws
+  /// OptionError, and ContractError on a route of fewer than two lines. Cost: 40 searches.
   explicit RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options = {},
                         const RouteFitOptions& fit = {});
 
-  /// Locates the robot by a line; `step`: its motion since the last line, in the frame it had then
-  /// [Y03 section 4.1]. nullopt: the line does not match this route, or at an unexpected place,
-  /// which is accepted once two successive lines agree on it; the odometry is then integrated.
-  /// Throws ContractError on a wrong length.
+  /// Locates the robot by a line. `step`: its motion since the last line, in the frame of the robot
+  /// at that line [Y03 section 4.1]. nullopt if the line does not match the route, or if it matches
+  /// at an unexpected place, which is accepted once two successive lines agree on it; the pose is
+  /// then predicted by odometry alone. Throws ContractError on a wrong length.
   std::optional<RouteFix> track(std::span<const float> line, const Pose2& step);
 
   /// Locates the robot by the line alone. Cost: some 10 microseconds for each position tried.
@@ -72,7 +72,7 @@ class RouteTracker {
   [[nodiscard]] std::optional<RouteFix> find_best_on_route(std::span<const float> line) const;
   [[nodiscard]] std::optional<RouteFix> recover(std::span<const float> line,
                                                 const Pose2& predicted) const;
-  [[nodiscard]] RouteFix with_route_position(RouteFix fix, RouteFix::Origin origin) const;
+  [[nodiscard]] RouteFix add_route_position(RouteFix fix, RouteFix::Origin origin) const;
 
   RouteTrackerOptions options_;
   RouteLines lines_;

@@ -173,7 +173,7 @@ SearchResult ViewSketches::search(const PackedSignature& query, const SearchOpti
   require(options.top >= 1, "top", options.top, ">= 1");
   require_signature(query, shape());
   require_mask(mask, shape());
-  const int components = checked_components(options.components, shape());
+  const int components = resolve_components(options.components, shape());
   const std::size_t top = std::min(static_cast<std::size_t>(options.top), size());
   const std::uint64_t in_full = std::uint64_t{size()} * static_cast<std::uint64_t>(components) *
                                 static_cast<std::uint64_t>(shape().rows);

@@ -15,7 +15,7 @@ namespace panonav {
 
 namespace {
 
-/// Azimuths at which views are compared: two for each period of 32 frequencies.
+/// Number of azimuths at which views are compared: two per period of frequency 32.
 constexpr int columns = 64;
 /// Number of rows to which those of taller views are averaged.
 constexpr int max_bands = 40;
@@ -99,7 +99,7 @@ SampledBands sample_bands(const Bands& view, const std::array<double, columns>& 
   return sampled;
 }
 
-// Returns the change over elevation, upwards, by the difference of the adjacent bands.
+// Returns the derivative of each band by elevation, from the difference of its adjacent bands.
 Pixels compute_elevation_gradients(const Pixels& values, double band_height_rad) {
   Pixels slopes = Pixels::Zero(values.rows(), values.cols());
   const auto step = static_cast<float>(2.0 * band_height_rad);
@@ -109,7 +109,7 @@ Pixels compute_elevation_gradients(const Pixels& values, double band_height_rad)
   return slopes;
 }
 
-/// Two views whose pixels a flow relates, as `minimise` sees them.
+/// The fit of a flow to two views as a problem for `minimise`.
 class FlowProblem {
  public:
   using Equations = DenseEquations<unknowns>;

@@ -16,21 +16,21 @@ struct AzimuthFlow {
   double b2 = 0.0;
   double residual = 1.0;  ///< share of the energy of both views left unexplained
 
-  /// Direction of travel in the frame of the later view, and its length over the mean distance of
-  /// things (the mean of the inverse distances).
+  /// Direction of travel in the frame of the later view, and length of travel in units of the
+  /// distance of things (mean of inverse distances).
   [[nodiscard]] double direction_rad() const noexcept;
   [[nodiscard]] double length() const noexcept;
   /// Heading of the later view minus heading of the earlier one. Things that are nearer on one side
-  /// of the path shift more there, which looks like a rotation; with inverse distances
-  /// rho0 + rho1 cos(phi - phi1) the second harmonic shows its size: it has the amplitude
-  /// v rho1 / 2 and the phase of the nearer side.
+  /// of the path shift more there, which looks like a rotation. The second harmonic shows the size
+  /// of this error: for inverse distances rho0 + rho1 cos(phi - phi1) and a travel of v it has the
+  /// amplitude v rho1 / 2 and the phase of the nearer side.
   [[nodiscard]] double turn_rad() const noexcept;
 };
 
-/// Refines `start` (with a2 = b2 = 0 a turn and a displacement) by Gauss-Newton over the pixels
-/// of the first components of both views, 64 columns and at most 40 rows; rows off the
-/// horizon also move up and down, where elevations are known. Both views must have the same rows.
-/// Cost: about 60 microseconds an iteration for 80 x 15.
+/// Refines `start`, usually a turn and a displacement with a2 = b2 = 0, by Gauss-Newton over the
+/// pixels of the first components of both views: 64 columns and at most 40 rows. If elevations are
+/// known, the vertical motion of rows off the horizon is modelled, too. Both views must have the
+/// same rows. Cost: about 60 microseconds an iteration for 80 x 15.
 [[nodiscard]] AzimuthFlow refine_flow(const HomingView& before, const HomingView& after,
                                       const AzimuthFlow& start, int iterations);
 

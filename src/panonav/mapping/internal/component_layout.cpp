@@ -14,17 +14,18 @@ namespace panonav {
 
 namespace {
 
-/// Growth after which a component is averaged: all averages cost as much as five of the whole.
+/// Growth factor after which a component is averaged again; all averages together cost as much as
+/// five of the whole.
 constexpr double min_growth = 1.25;
-/// Reweighted solutions at each average, chosen on the worlds of `lattice_growth.hpp`.
+/// Number of reweighted solutions in each average; 3 was chosen on simulated worlds.
 constexpr int average_rounds = 3;
-/// Smaller differences count as squares, not as absolute values: 2 degrees, the resolution of
-/// phases, and a tenth of the link.
-constexpr double small_angle_rad = 0.03;
-constexpr double small_gap = 0.1;
+/// Residuals below these are squared in the cost, larger ones are not: 2 degrees, the resolution of
+/// phases, and a tenth of the link's length.
+constexpr double huber_angle_rad = 0.03;
+constexpr double huber_gap_share = 0.1;
 
-/// Minimises absolute differences over links between the views of one component, by reweighting.
-/// The first view stays.
+/// Minimises the absolute residuals of the links inside one component by iteratively reweighted
+/// least squares. The first view does not move.
 class ComponentAverage {
  public:
   ComponentAverage(const std::vector<std::size_t>& views, std::vector<std::size_t> inside,
@@ -43,7 +44,7 @@ class ComponentAverage {
                               poses_[link.b].heading_rad - poses_[link.a].heading_rad);
     };
     const auto weight = [&](std::size_t k) {
-      return links_[k].probability / std::max(small_angle_rad, std::abs(missing(k)));
+      return links_[k].probability / std::max(huber_angle_rad, std::abs(missing(k)));
     };
     for (int round = 0; round < average_rounds; ++round) {
       const auto change = solve(missing, weight);
@@ -65,7 +66,7 @@ class ComponentAverage {
       const LatticeLink& link = links_[k];
       const Point2 gap = missing(k);
       return link.probability /
-             (link.length * std::max(small_gap * link.length, std::hypot(gap.x_m, gap.y_m)));
+             (link.length * std::max(huber_gap_share * link.length, std::hypot(gap.x_m, gap.y_m)));
     };
     for (int round = 0; round < average_rounds; ++round) {
       const auto dx = solve([&](std::size_t k) { return missing(k).x_m; }, weight);
@@ -80,7 +81,8 @@ class ComponentAverage {
   }
 
  private:
-  /// Solves for the unknowns; `missing`: from the layout to link k, `weight`: of its square.
+  /// Solves for the changes of the unknowns. `missing(k)`: residual of link k; `weight(k)`: weight
+  /// of its square.
   template <class Missing, class Weight>
   std::optional<Eigen::VectorXd> solve(const Missing& missing, const Weight& weight) {
     const int unknowns = static_cast<int>(unknown_.size()) - 1;
@@ -115,22 +117,23 @@ class ComponentAverage {
 }  // namespace
 
 ComponentLayout::ComponentLayout(std::size_t nodes, std::vector<LatticeLink> links,
-                                 const LatticeStart& start)
+                                 const LatticeLayout& start)
     : links_(std::move(links)),
       poses_(start.poses.empty() ? std::vector<Pose2>(nodes) : start.poses),
       component_(nodes),
       members_(nodes),
       links_of_(links_by_node(nodes, links_)),
       between_(nodes),
-      averaged_at_(nodes, 1) {
+      size_at_last_average_(nodes, 1) {
   std::vector<double> lengths;
   for (const LatticeLink& link : links_) {
     if (link.probability > 0.5 && link.length > 0.0) lengths.push_back(link.length);
   }
   typical_ = lengths.empty() ? 1.0 : upper_median(lengths);
-  // Images of one place have no direction and no length.
+  // Links between images of one place have no direction and no length; they get a length of
+  // adjacent views.
   for (LatticeLink& link : links_) {
-    if (link.length == 0.0) link.length = adjacent_lengths * typical_;
+    if (link.length == 0.0) link.length = adjacent_distance_in_links * typical_;
   }
   std::map<std::size_t, std::size_t> first;  // view of each component
   for (std::size_t i = 0; i < nodes; ++i) {
@@ -139,7 +142,7 @@ ComponentLayout::ComponentLayout(std::size_t nodes, std::vector<LatticeLink> lin
     members_[component_[i]].push_back(i);
   }
   for (std::size_t i = 0; i < nodes; ++i) {
-    averaged_at_[i] = std::max<std::size_t>(1, members_[i].size());
+    size_at_last_average_[i] = std::max<std::size_t>(1, members_[i].size());
   }
   for (std::size_t k = 0; k < links_.size(); ++k) {
     const auto [p, q] = std::pair(component_[links_[k].a], component_[links_[k].b]);
@@ -187,7 +190,8 @@ std::vector<std::size_t> ComponentLayout::join(std::size_t p, std::size_t q,
     changed.push_back(other);
   }
   between_[q].clear();
-  if (static_cast<double>(members_[p].size()) > min_growth * static_cast<double>(averaged_at_[p])) {
+  if (static_cast<double>(members_[p].size()) >
+      min_growth * static_cast<double>(size_at_last_average_[p])) {
     average(p);
     changed.clear();
     for (const auto& [other, links] : between_[p]) changed.push_back(other);
@@ -203,7 +207,7 @@ void ComponentLayout::attach(std::size_t p, std::size_t view, const Pose2& p_fro
 
 void ComponentLayout::average(std::size_t p) {
   const auto& views = members_[p];
-  averaged_at_[p] = views.size();
+  size_at_last_average_[p] = views.size();
   std::vector<std::size_t> inside;
   for (const std::size_t view : views) {
     for (const std::size_t k : links_of_[view]) {

@@ -14,8 +14,8 @@ namespace panonav {
 /// links inside and between the components. A component has the number of one of its views.
 class ComponentLayout {
  public:
-  /// Starts with the components of `start`, or with single views where it is empty.
-  ComponentLayout(std::size_t nodes, std::vector<LatticeLink> links, const LatticeStart& start);
+  /// Starts with the components of `start`, or with single views if `start` is empty.
+  ComponentLayout(std::size_t nodes, std::vector<LatticeLink> links, const LatticeLayout& start);
 
   /// A link between two components p and q.
   struct Ends {
@@ -31,7 +31,7 @@ class ComponentLayout {
   [[nodiscard]] const std::vector<std::size_t>& links_of(std::size_t view) const {
     return links_of_[view];
   }
-  /// Numbers of the links of component p to each other one.
+  /// Numbers of the links from component p to each other component.
   [[nodiscard]] const std::map<std::size_t, std::vector<std::size_t>>& neighbours(
       std::size_t p) const {
     return between_[p];
@@ -50,12 +50,13 @@ class ComponentLayout {
   /// True if a link inside a component agrees with the layout.
   [[nodiscard]] bool agrees_inside(const LatticeLink& link) const;
 
-  /// Adds component q with its links to p. Averages p where it has grown much since the last time.
-  /// Returns the components whose links to p have changed.
+  /// Merges component q and its links into p. Averages p if it has grown by a quarter since its
+  /// last average. Returns the components whose links to p have changed.
   std::vector<std::size_t> join(std::size_t p, std::size_t q, const Pose2& p_from_q);
   /// Adds a single view to p; drops its other links.
   void attach(std::size_t p, std::size_t view, const Pose2& p_from_view);
-  /// Averages headings, then positions, over the links inside a component that agree with it.
+  /// Fits the headings, then the positions of a component to those of its inner links that agree
+  /// with the layout.
   void average(std::size_t p);
 
  private:
@@ -67,7 +68,8 @@ class ComponentLayout {
   std::vector<std::vector<std::size_t>> members_;
   std::vector<std::vector<std::size_t>> links_of_;
   std::vector<std::map<std::size_t, std::vector<std::size_t>>> between_;
-  std::vector<std::size_t> averaged_at_;  // number of views
+  std::vector<std::size_t>
+      size_at_last_average_;  // number of views of each component at its last average
   int iterations_ = 0;
   double typical_ = 1.0;
 };

@@ -23,9 +23,10 @@ constexpr int coarse_columns = 64;
 constexpr int fine_columns = 256;
 constexpr int iterations = 4;  ///< Gauss-Newton steps from a start within a quarter camera height
 constexpr int min_bands = 4;   ///< fewest bands that are compared
-/// Highest elevation of the ground: above it the ground is far and walls begin.
+/// Highest elevation that is used as ground: above it the ground is far away and walls begin.
 constexpr double highest_elevation_rad = -10.0 * std::numbers::pi / 180.0;
-/// Height of a band: the ground of neighbouring ones differs by less than it moves.
+/// Height of a band in elevation, so small that the distances of the ground in adjacent bands
+/// differ by less than the ground moves.
 constexpr double band_height_rad = 1.75 * std::numbers::pi / 180.0;
 
 /// Rows below the horizon, averaged to bands.
@@ -52,7 +53,8 @@ std::optional<GroundBands> find_ground_bands(const HomingView& view) {
   return made;
 }
 
-// Samples bands x columns. The mean of a row belongs to it: the ground moves from row to row.
+// Returns the values of bands x columns, with the mean of each row, as the ground moves from row to
+// row.
 Pixels sample_ground(const HomingView& view, const GroundBands& ground, int count) {
   const int highest = std::min(view.components(), coarse_columns / 2) - 1;
   Pixels cosines = Pixels::Zero(ground.bands, highest);
@@ -105,7 +107,7 @@ class Ground {
     return static_cast<std::size_t>(bands_.bands) * coarse_columns;
   }
 
-  // Equations of the pixels whose point both views show.
+  // Collects the equations of the pixels whose ground point both views show.
   void linearise(const Pose2& motion, std::vector<Equation>& equations) const {
     equations.clear();
     for (int c = 0; c < coarse_columns; ++c) {
@@ -152,7 +154,7 @@ class Ground {
   Pixels earlier_;
 };
 
-/// The motion over the ground as `minimise` sees it.
+/// The estimate of the motion over the ground as a problem for `minimise`.
 class GroundProblem {
  public:
   using Equations = DenseEquations<2>;
@@ -163,10 +165,11 @@ class GroundProblem {
   bool linearise(Equations& normal) {
     ground_.linearise(motion_, equations_);
     if (equations_.size() < ground_.pixels() / 4) return false;
-    sizes_.clear();
-    for (const Equation& equation : equations_) sizes_.push_back(std::abs(equation.difference));
-    middle_ = upper_median_in_place(std::span(sizes_));
-    const double scale = 1.4826 * middle_ + 1e-9;
+    absolute_differences_.clear();
+    for (const Equation& equation : equations_)
+      absolute_differences_.push_back(std::abs(equation.difference));
+    median_difference_ = upper_median_in_place(std::span(absolute_differences_));
+    const double scale = 1.4826 * median_difference_ + 1e-9;
     normal.set_zero();
     double left = 0.0;
     double weights = 0.0;
@@ -181,7 +184,7 @@ class GroundProblem {
     const double trace = normal.matrix.trace();
     if (!(trace > 0.0)) return false;
     normal.matrix.diagonal().array() += 1e-9 * trace;
-    // The shortest wave of 15 components covers four columns, which are not independent.
+    // Four adjacent columns are not independent, as the shortest wave of 15 components covers them.
     variance_ = 4.0 * left / weights;
     return true;
   }
@@ -199,16 +202,16 @@ class GroundProblem {
                                       ? Eigen::Vector2d(motion_.x_m / length, motion_.y_m / length)
                                       : Eigen::Vector2d(1.0, 0.0);
     const double spread = along.dot(normal.matrix.inverse() * along);
-    return {motion_.x_m, motion_.y_m, std::sqrt(variance_ * spread), middle_};
+    return {motion_.x_m, motion_.y_m, std::sqrt(variance_ * spread), median_difference_};
   }
 
  private:
   const Ground& ground_;
   Pose2 motion_;
   std::vector<Equation> equations_;
-  std::vector<double> sizes_;
-  double middle_ = 0.0;    // of the differences' sizes
-  double variance_ = 0.0;  // of a difference
+  std::vector<double> absolute_differences_;
+  double median_difference_ = 0.0;  // median absolute difference
+  double variance_ = 0.0;           // of a difference
 };
 
 std::optional<GroundDisplacement> solve(const Ground& ground, const Pose2& start) {

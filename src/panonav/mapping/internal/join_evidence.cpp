@@ -12,19 +12,20 @@ namespace panonav {
 
 namespace {
 
-// Values without another source were chosen as `lattice_growth.hpp` says.
+// Values without another source were chosen on simulated worlds.
 
 /// Probability that a wrong link agrees with the relative pose of others: once in five times, as
-/// rooms and shelves stand parallel to each other. q in docs/equations.md.
+/// rooms and shelves are parallel to each other. q in docs/equations.md.
 constexpr double p_chance = 0.2;
-/// Probability that the views of the longer one of two right links of a view are more similar; 0.5
-/// when one is wrong.
+/// Probability that, of two right links of a view, the longer one joins the more similar views; it
+/// is 0.5 if one link is wrong.
 constexpr double p_discordant = 0.15;
-/// Smallest ratio of lengths of links that are compared so: beyond the error of lengths.
+/// Smallest ratio of the lengths of two links whose similarities are compared; it exceeds the error
+/// of lengths.
 constexpr double min_longer_ratio = 1.2;
 /// Probability that adjacent views agree on their relative pose. a in docs/equations.md.
 constexpr double p_adjacent_agree = 0.7;
-/// Links, the most certain ones, that propose a relative pose each.
+/// Number of links, the most certain ones, that each propose a relative pose.
 constexpr std::size_t max_hypotheses = 8;
 
 /// The links between two components, the most certain ones first.
@@ -59,8 +60,8 @@ class LinksBetween {
   [[nodiscard]] const LatticeLink& link(std::size_t k) const { return layout_.links()[k]; }
   [[nodiscard]] const Pose2& pose(std::size_t view) const { return layout_.poses()[view]; }
 
-  /// Returns the relative pose by link k, or the mean of those that agree with it where the
-  /// evidence for it is larger.
+  /// Returns the relative pose by link k, or the mean pose of the links that agree with it if the
+  /// evidence for the mean is larger.
   [[nodiscard]] JoinHypothesis propose(std::size_t k) const {
     const auto ends = layout_.ends_of(k, p_);
     const Pose2 read = pose(ends.in_p) * ends.step * inverse(pose(ends.in_q));
@@ -79,7 +80,8 @@ class LinksBetween {
     const Pose2 there = b.p_from_q * at;
     return std::abs(angle_difference(here.heading_rad, there.heading_rad)) >
                2.0 * turn_tolerance_rad ||
-           distance(here.position(), there.position()) > near_lengths * layout_.typical_length();
+           distance(here.position(), there.position()) >
+               near_distance_in_links * layout_.typical_length();
   }
 
   /// Returns the log-likelihood ratio of the similarity of a link's views against that of the links
@@ -100,13 +102,13 @@ class LinksBetween {
     }
     if (longer == 0.0) return 0.0;
     const double share = more_alike / longer;
-    // The sums of each of the two views.
+    // The factor 2 adds one term for each of the two views.
     return 2.0 * (share * std::log(p_discordant / 0.5) +
                   (1.0 - share) * std::log((1.0 - p_discordant) / 0.5));
   }
 
-  /// Returns the log-odds of a relative pose by link `first`. Links that share a view share their
-  /// errors: the n-th one of a view counts for 1/n.
+  /// Returns the log-odds of the relative pose that link `first` proposes. Links of one view share
+  /// their errors, so the n-th link of a view is weighted by 1/n.
   [[nodiscard]] double evidence_for(const Pose2& p_from_q, std::size_t first) const {
     std::map<std::size_t, int> used;
     const auto of_first = layout_.ends_of(first, p_);
@@ -129,7 +131,8 @@ class LinksBetween {
     return evidence;
   }
 
-  /// Returns the mean relative pose of the links that agree with one.
+  /// Returns the mean relative pose of the links that agree with `p_from_q`; `p_from_q` itself if
+  /// these are fewer than two.
   [[nodiscard]] Pose2 average_agreeing(const Pose2& p_from_q) const {
     std::vector<std::tuple<double, Point2, Pose2>> agreeing;  // weight, in q, read in p
     double weights = 0.0;
@@ -157,8 +160,9 @@ class LinksBetween {
     return mean;
   }
 
-  /// Returns how many views of either component become adjacent to one of the other without any
-  /// link that agrees: no wall fits between them. Counts only near where the two meet.
+  /// Counts the views of both components that become adjacent to a view of the other one although
+  /// none of their links agrees: no wall fits between them. Only views near the place where both
+  /// meet are counted.
   [[nodiscard]] double count_contradictions(const Pose2& p_from_q) const {
     const double typical = layout_.typical_length();
     std::vector<Point2> meeting;
@@ -172,12 +176,13 @@ class LinksBetween {
     std::set<std::size_t> without_link;
     for (const std::size_t b : layout_.members(q_)) {
       const Point2 at = (p_from_q * pose(b)).position();
-      if (std::ranges::none_of(
-              meeting, [&](Point2 m) { return distance(m, at) < near_lengths * typical; })) {
+      if (std::ranges::none_of(meeting, [&](Point2 m) {
+            return distance(m, at) < near_distance_in_links * typical;
+          })) {
         continue;
       }
       for (const std::size_t a : layout_.members(p_)) {
-        if (distance(at, pose(a).position()) >= adjacent_lengths * typical) continue;
+        if (distance(at, pose(a).position()) >= adjacent_distance_in_links * typical) continue;
         if (!agreeing.contains(a)) without_link.insert(a);
         if (!agreeing.contains(b)) without_link.insert(b);
       }

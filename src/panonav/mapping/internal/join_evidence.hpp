@@ -8,11 +8,11 @@
 
 namespace panonav {
 
-/// Views nearer than this, in typical links, are adjacent and should look similar.
-inline constexpr double adjacent_lengths = 0.8;
-/// Distance in typical links from where two components meet up to which their layouts count:
-/// farther off they may have drifted.
-inline constexpr double near_lengths = 3.0;
+/// Views nearer than this, in typical link lengths, are adjacent and should look similar.
+inline constexpr double adjacent_distance_in_links = 0.8;
+/// Distance, in typical link lengths, from the place where two components meet within which their
+/// layouts are compared; farther away they may have drifted.
+inline constexpr double near_distance_in_links = 3.0;
 
 /// A relative pose of two components, and its log-odds against chance.
 struct JoinHypothesis {
@@ -20,9 +20,10 @@ struct JoinHypothesis {
   Pose2 p_from_q;
 };
 
-/// Returns the relative pose of components p and q for which their links are most evidence, less
-/// that for the best other one (docs/equations.md). There must be links. Cost: hypotheses times
-/// links, and the pairs of views of both where the evidence is above 0.
+/// Returns the relative pose of components p and q with the largest evidence by their links; the
+/// evidence for the best other pose is subtracted (docs/equations.md). The components must have
+/// links to each other. Cost: hypotheses times links and, if the evidence is above 0, the pairs of
+/// views of both.
 [[nodiscard]] JoinHypothesis find_best_hypothesis(const ComponentLayout& layout, std::size_t p,
                                                   std::size_t q);
 

@@ -10,17 +10,17 @@ namespace panonav {
 
 namespace {
 
-/// Smallest error of lengths by phases, as a share: phases are packed in steps of 0.025 rad.
+/// Smallest relative error of lengths from phases, as phases are packed in steps of 0.025 rad.
 constexpr double min_phase_length_error = 0.02;
-/// Pairs drawn for the level of far views, of which a quarter counts: its mean errs by 1/20 of the
-/// spread.
+/// Number of random pairs for the dissimilarity of far views. The farther quarter is averaged,
+/// whose mean errs by 1/20 of the spread.
 constexpr std::size_t far_pairs = 2000;
 
 double layout_distance(std::span<const Pose2> poses, std::size_t a, std::size_t b) {
   return distance(poses[a].position(), poses[b].position());
 }
 
-/// Returns the slopes of springs between each view and its nearest one, at distance 1.
+/// Returns for each view the slope at which its most similar view would be at distance 1.
 std::vector<double> slopes_to_nearest(std::span<const Lattice::Spring> measured,
                                       std::size_t nodes) {
   std::vector<double> nearest(nodes, INFINITY);
@@ -35,10 +35,10 @@ std::vector<double> slopes_to_nearest(std::span<const Lattice::Spring> measured,
   return slopes;
 }
 
-/// Returns the dissimilarity of far views: the mean over the farther quarter of pairs drawn.
-/// nullopt where no views are far from each other: at most twice `near`.
+/// Returns the mean dissimilarity of far views, the farther quarter of random pairs; nullopt if
+/// their mean distance is at most twice `near`.
 std::optional<double> estimate_far_dissimilarity(const SpringViews& views,
-                                                 const LatticeStart& layout, double near) {
+                                                 const LatticeLayout& layout, double near) {
   const std::size_t nodes = layout.poses.size();
   Random random(1);
   std::vector<DissimilarityCurve::Sample> drawn;
@@ -73,7 +73,7 @@ DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
   for (const auto& spring : measured) {
     if (!spring.phases || !spring.phases->has_direction || !has_agreeing_views(spring)) continue;
     if (const NodeMotion* moved = motions.find({spring.a, spring.b})) {
-      units.push_back(travel(*moved) / spring.phases->length);
+      units.push_back(step_length(*moved) / spring.phases->length);
     }
     if (spring.dissimilarity > 0.0) slopes.push_back(spring.phases->length / spring.dissimilarity);
   }
@@ -82,8 +82,8 @@ DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
   if (!motions.empty()) slopes.clear();
   for (const NodeMotion& motion : motions.all()) {
     const double dissimilarity = views.dissimilarity(std::minmax(motion.a, motion.b));
-    if (dissimilarity > 0.0 && travel(motion) > 0.0)
-      slopes.push_back(travel(motion) / dissimilarity);
+    if (dissimilarity > 0.0 && step_length(motion) > 0.0)
+      slopes.push_back(step_length(motion) / dissimilarity);
   }
   if (slopes.empty()) slopes = slopes_to_nearest(measured, views.size());
   return DissimilarityCurve(slopes.empty() ? 1.0 : upper_median(slopes));
@@ -91,7 +91,7 @@ DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
 
 std::optional<DissimilarityCurve> fit_curve(std::span<const Lattice::Spring> measured,
                                             std::span<const Lattice::Spring> springs,
-                                            const SpringViews& views, const LatticeStart& layout) {
+                                            const SpringViews& views, const LatticeLayout& layout) {
   std::vector<DissimilarityCurve::Sample> pairs;
   for (const auto& spring : springs.empty() ? measured : springs) {
     if (!springs.empty() && spring.weight < min_curve_weight) continue;
@@ -122,7 +122,7 @@ void fit_phase_unit(std::span<const Lattice::Spring> springs, std::span<const Po
   if (!(unit > 0.0)) return;
   for (double& ratio : ratios) ratio = std::abs(ratio / unit - 1.0);
   errors.phase_unit = unit;
-  errors.phase_length = std::max(min_phase_length_error, normal_over_median * upper_median(ratios));
+  errors.phase_length = std::max(min_phase_length_error, sigma_over_mad * upper_median(ratios));
 }
 
 }  // namespace panonav

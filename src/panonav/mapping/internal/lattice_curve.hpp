@@ -7,25 +7,26 @@
 
 namespace panonav {
 
-/// Smallest weight of springs that count for the curve from dissimilarity to distance.
+/// Smallest weight of springs that are used to fit the curve from dissimilarity to distance.
 inline constexpr double min_curve_weight = 0.25;
 
-/// Makes the curve before the first layout, proportional to the dissimilarity [M04 section 3.2]: in
-/// metres where there is motion, else in the unit of the phases, else so that the median view has
-/// its nearest one at 1. Sets the unit of the phases where motions show it.
+/// Makes the curve for the first layout: distance proportional to dissimilarity [M04 section 3.2].
+/// Distances are in metres with motions, else in the unit of the phases, else in units of the
+/// median distance between a view and its nearest one. Sets `errors.phase_unit` if motions show it.
 [[nodiscard]] DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
                                                   const NodeMotions& motions,
                                                   const SpringViews& views,
                                                   Lattice::Errors& errors);
 
-/// Fits the curve to a layout: over its springs, or, without any, over all measured pairs. nullopt
-/// where there are none.
+/// Fits the curve to the springs of a layout or, without springs, to all measured pairs; nullopt if
+/// there are none.
 [[nodiscard]] std::optional<DissimilarityCurve> fit_curve(std::span<const Lattice::Spring> measured,
                                                           std::span<const Lattice::Spring> springs,
                                                           const SpringViews& views,
-                                                          const LatticeStart& layout);
+                                                          const LatticeLayout& layout);
 
-/// Fits the unit of phases in a layout, and the error of single lengths.
+/// Estimates the unit of lengths from phases in a layout and the relative error of such lengths,
+/// and sets both in `errors`.
 void fit_phase_unit(std::span<const Lattice::Spring> springs, std::span<const Pose2> poses,
                     Lattice::Errors& errors);
 

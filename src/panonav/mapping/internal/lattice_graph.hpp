@@ -19,7 +19,7 @@ class LatticeGraph {
   /// Throws ContractError on a node that is not below `nodes` or a length below 0.
   LatticeGraph(std::size_t nodes, std::span<const GraphEdge> edges);
 
-  /// An edge as seen from one of its nodes.
+  /// An edge in the list of one of its nodes.
   struct Neighbour {
     std::size_t node;  ///< at the other end of the edge
     std::size_t edge;  ///< its index among those of the constructor
@@ -27,7 +27,7 @@ class LatticeGraph {
   };
   /// Number of nodes.
   [[nodiscard]] std::size_t size() const noexcept { return begins_.size() - 1; }
-  /// The edges of a node, which the caller guarantees to exist.
+  /// The edges of a node. The caller guarantees that the node exists.
   [[nodiscard]] std::span<const Neighbour> neighbours(std::size_t node) const {
     return std::span(neighbours_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
   }
@@ -40,8 +40,8 @@ class LatticeGraph {
   /// none (Dijkstra).
   [[nodiscard]] std::vector<double> shortest_path_lengths(std::size_t from) const;
 
-  /// Calls visit(a, to_b, to_c, ac) for all nodes a, b and c that edges join to each other: `to_b`
-  /// leads from a, `to_c` from b, and `ac` is the number of the edge between a and c. Only
+  /// Calls visit(a, to_b, to_c, ac) for each triangle of nodes a, b and c: `to_b` is the edge from
+  /// a to b, `to_c` that from b to c, and `ac` the number of the edge between a and c. Only
   /// triangles for which use_edge(a, to_b) is true are visited.
   template <class UseEdge, class Visit>
   void visit_triangles(const UseEdge& use_edge, const Visit& visit) const {

@@ -16,23 +16,26 @@ namespace panonav {
 
 namespace {
 
-/// Odds for a join, times the views of the smaller component: 95 % (docs/decisions.md).
+/// Smallest odds for a join per view of the smaller component: 19 to 1, that is 95 %
+/// (docs/decisions.md).
 constexpr double min_join_odds = 19.0;
 /// Smallest odds to attach a single remaining view, which can misplace nothing but itself.
 constexpr double min_odds_of_single_views = 1.0;
-/// Averages of each component in the end; more change positions by less than phases resolve.
-constexpr int last_averages = 3;
-/// Pairs of views proposed for each two components that may be adjacent: they cost 50 readings.
+/// Number of final averages of each component; further ones change positions by less than the
+/// resolution of phases.
+constexpr int final_average_rounds = 3;
+/// Largest number of pairs of views that are proposed for two components that may be adjacent; each
+/// costs one phase reading.
 constexpr std::size_t max_proposals = 50;
-/// Largest errors of directions and lengths in the final layout, whose lengths differ from those of
-/// the phases as near things from far ones.
+/// Largest errors of directions and lengths in the final layout. They are wide, as lengths from
+/// phases are in units of the distance of the things around, which varies.
 constexpr double direction_tolerance_rad = 3.0 * turn_tolerance_rad;
 constexpr double length_tolerance_factor = 3.0;
 
 class Grower {
  public:
   Grower(std::size_t nodes, std::span<const Lattice::Spring> springs, double unit,
-         const LatticeStart& start, const LatticeWatch& watch)
+         const LatticeLayout& start, const LatticeStepCallback& watch)
       : watch_(watch), layout_(nodes, make_links(nodes, springs, unit), start) {}
 
   GrownLayout grow() {
@@ -41,10 +44,11 @@ class Grower {
     attach_single_views();
     GrownLayout result{.proposals = propose_pairs()};
     for (std::size_t p = 0; p < layout_.size(); ++p) {
-      for (int i = 0; i < last_averages && layout_.members(p).size() > 1; ++i) layout_.average(p);
+      for (int i = 0; i < final_average_rounds && layout_.members(p).size() > 1; ++i)
+        layout_.average(p);
     }
-    weigh_links(result);
-    number_components(result.start);
+    set_weights_and_energy(result);
+    fill_layout(result.start);
     result.iterations = layout_.iterations();
     return result;
   }
@@ -83,7 +87,7 @@ class Grower {
     while (!open_.empty()) {
       const Join next = open_.top();
       open_.pop();
-      // Later joins and averages may have changed it.
+      // Later joins and averages may have changed the evidence.
       if (!layout_.neighbours(next.p).contains(next.q)) continue;
       const auto found = find_join(next.p, next.q);
       if (!found) continue;
@@ -141,7 +145,7 @@ class Grower {
       const Point2 at = (p_from_q * layout_.poses()[b]).position();
       for (const std::size_t a : layout_.members(p)) {
         const double apart = distance(at, layout_.poses()[a].position());
-        if (apart < near_lengths * layout_.typical_length()) {
+        if (apart < near_distance_in_links * layout_.typical_length()) {
           near.emplace_back(apart, std::minmax(a, b));
         }
       }
@@ -150,7 +154,7 @@ class Grower {
     return near;
   }
 
-  void weigh_links(GrownLayout& result) const {
+  void set_weights_and_energy(GrownLayout& result) const {
     const auto poses = layout_.poses();
     for (const LatticeLink& link : layout_.links()) {
       if (!layout_.is_inside(link)) continue;
@@ -163,7 +167,7 @@ class Grower {
     }
   }
 
-  void number_components(LatticeStart& start) const {
+  void fill_layout(LatticeLayout& start) const {
     std::vector<GraphEdge> edges;
     for (std::size_t p = 0; p < layout_.size(); ++p) {
       for (const std::size_t view : layout_.members(p)) {
@@ -176,7 +180,7 @@ class Grower {
     for (const GraphEdge& edge : edges) start.handedness_known[start.components[edge.a]] = 1;
   }
 
-  const LatticeWatch& watch_;
+  const LatticeStepCallback& watch_;
   ComponentLayout layout_;
   std::priority_queue<Join> open_;
 };
@@ -200,7 +204,8 @@ bool fits_layout(const Lattice::Spring& spring, double unit, const Pose2& a, con
 }
 
 GrownLayout grow_components(std::size_t nodes, std::span<const Lattice::Spring> springs,
-                            double unit, const LatticeStart& start, const LatticeWatch& watch) {
+                            double unit, const LatticeLayout& start,
+                            const LatticeStepCallback& watch) {
   return Grower(nodes, springs, unit, start, watch).grow();
 }
 

@@ -12,9 +12,9 @@
 namespace panonav {
 
 struct GrownLayout {
-  LatticeStart start;
-  /// For each spring whose views are in one component, its agreement with the layout: 1 if the
-  /// layout has the views as the phases do, 0.25 at the limit.
+  LatticeLayout start;
+  /// Agreement of each spring inside a component with the layout: 1 if the poses are as its phases
+  /// measured them, 0.25 at the limit of agreement.
   std::map<std::pair<std::size_t, std::size_t>, double> weights;
   /// Pairs of views, with repetitions, to measure before the components grow again.
   std::vector<std::pair<std::size_t, std::size_t>> proposals;
@@ -35,8 +35,8 @@ struct GrownLayout {
 /// springs.
 [[nodiscard]] GrownLayout grow_components(std::size_t nodes,
                                           std::span<const Lattice::Spring> springs, double unit,
-                                          const LatticeStart& start = {},
-                                          const LatticeWatch& watch = {});
+                                          const LatticeLayout& start = {},
+                                          const LatticeStepCallback& watch = {});
 
 /// True if the poses of two views in the final layout agree with the phases of their spring: turn
 /// within 15 degrees, direction within 45, length within a factor of three.

@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-// Values without another source were chosen on the worlds of `lattice_growth.hpp`.
+// Values without another source were chosen on simulated worlds.
 
 /// Rank below which links form the triangles that support others: half of a view's 12 springs.
 constexpr std::size_t low_rank = 6;
@@ -24,18 +24,20 @@ constexpr double max_triangle_gap = 0.5;
 constexpr double min_probability = 0.01;
 constexpr double max_probability_by_rank = 0.985;
 constexpr double max_probability = 0.999;
-/// Number of links of the lowest ranks that represent right ones: a constant, and for each view.
+/// Number of links of the lowest ranks from which the closing share of right links is estimated: a
+/// constant, and an addition for each view.
 constexpr double min_reference_links = 20.0;
 constexpr double reference_links_per_node = 0.1;
-/// Bounds of the share of right links whose triangles close, and of wrong ones.
+/// Bounds of the share of links whose triangles close: of right links, and of wrong ones by chance.
 constexpr double min_closing_share = 0.3;
 constexpr double max_closing_share = 0.98;
 constexpr double min_chance_share = 0.02;
 constexpr double max_chance_share = 0.5;
-/// Share of the difference of a spacing from the median that counts as a difference of the unit. In
-/// `garden` 0 leaves a shape difference of 0.042, 0.5 of 0.027, 1 of 0.033.
+/// Share of the difference of a spacing from the median that is attributed to the unit of phases.
+/// In the world `garden` 0 leaves a shape difference of 0.042, 0.5 of 0.027, 1 of 0.033.
 constexpr double spacing_share = 0.5;
-/// Links of known length needed for the spacing around a view, which is the second shortest.
+/// Smallest number of links of known length from which the spacing around a view, the second
+/// shortest length, is read.
 constexpr std::size_t min_spacing_links = 3;
 
 /// Returns for each link the larger one of its ranks by residual at its two views.
@@ -49,7 +51,7 @@ std::vector<std::size_t> mutual_ranks(std::size_t nodes, std::span<const Lattice
   return ranks;
 }
 
-/// Returns for each link 1 where it closes a triangle with two links of low rank.
+/// Returns 1 for each link that closes a triangle with two links of low rank, else 0.
 std::vector<unsigned char> find_supported(std::size_t nodes, std::span<const LatticeLink> links,
                                           std::span<const std::size_t> ranks) {
   std::vector<GraphEdge> edges;
@@ -90,9 +92,9 @@ std::vector<RankPool> count_ranks(std::span<const std::size_t> ranks,
   return counts;
 }
 
-/// Returns the share of right links that are supported, by the links of the lowest ranks: right
-/// ones need not have a triangle either.
-double closing_share_of_right(std::span<const RankPool> counts, std::size_t nodes) {
+/// Returns the share of right links that close a triangle, estimated from the links of the lowest
+/// ranks. It is below 1, as a right link may have no triangle.
+double estimate_closing_share(std::span<const RankPool> counts, std::size_t nodes) {
   const double min_count =
       min_reference_links + reference_links_per_node * static_cast<double>(nodes);
   RankPool lowest{0.0, 0.0};
@@ -119,13 +121,14 @@ std::vector<RankPool> pool_ranks(std::span<const RankPool> counts, double refere
   return pools;
 }
 
-/// Sets the probability of each link by its rank, then by whether it closes a triangle (Bayes),
-/// which happens by chance as often as at the least certain rank. Two views have no triangles.
+/// Sets the probability of each link by its rank and updates it (Bayes) if the link closes a
+/// triangle or not. Wrong links close a triangle by chance as often as those of the least certain
+/// rank. With two views there are no triangles.
 void learn_probabilities(std::size_t nodes, std::vector<LatticeLink>& links) {
   const auto ranks = mutual_ranks(nodes, links);
   const auto supported = find_supported(nodes, links, ranks);
   const auto counts = count_ranks(ranks, supported);
-  const double reference = closing_share_of_right(counts, nodes);
+  const double reference = estimate_closing_share(counts, nodes);
   const auto pools = pool_ranks(counts, reference);
   std::vector<double> probability;
   for (const RankPool& pool : pools) {
@@ -146,9 +149,9 @@ void learn_probabilities(std::size_t nodes, std::vector<LatticeLink>& links) {
   }
 }
 
-/// Rescales links to the spacing of the views around. The unit of phases is the distance of the
-/// things around, which is large in halls and small in corridors; but spacings may differ, too. So
-/// half of the difference of a spacing (in that unit) from the median counts as one of the unit.
+/// Rescales links by the local spacing of views. The unit of phases is the distance of the things
+/// around, which is large in halls and small in corridors; but spacings may differ, too. So half of
+/// the difference of a spacing (in that unit) from the median is attributed to the unit.
 void rescale_to_spacings(std::size_t nodes, std::vector<LatticeLink>& links) {
   const auto of = links_by_node(nodes, links);
   std::vector<double> spacings(nodes, 0.0);

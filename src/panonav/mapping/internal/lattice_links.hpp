@@ -12,11 +12,12 @@ namespace panonav {
 /// Largest difference between a turn by phases and in the layout: three times the error of phases
 /// between adjacent places.
 inline constexpr double turn_tolerance_rad = 15.0 * std::numbers::pi / 180.0;
-/// Largest error of a position of agreeing links, as a share of the link's length; chosen on the
-/// worlds of `lattice_growth.hpp`.
+/// Largest position error of an agreeing link, as a share of its length; chosen on simulated
+/// worlds.
 inline constexpr double position_tolerance = 0.6;
 
-/// A spring whose two views agree, as a relative pose that may be wrong.
+/// Relative pose of two views by a spring on which both agree, with the probability that it is
+/// right.
 struct LatticeLink {
   std::size_t a, b;
   Pose2 step;  ///< a_from_b
@@ -27,8 +28,9 @@ struct LatticeLink {
 /// True if two headings differ by at most the tolerance, and two positions by `max_distance`.
 [[nodiscard]] bool is_near(const Pose2& a, const Pose2& b, double max_distance);
 
-/// Makes links of the springs whose views agree, with probabilities learnt from their ranks and
-/// triangles, and with lengths in the spacing of the views around. Lengths of 0 stay.
+/// Makes links of the springs whose views agree. Probabilities are learnt from ranks of similarity
+/// and closing triangles; lengths are rescaled by the local spacing of views, and lengths of 0 stay
+/// 0.
 [[nodiscard]] std::vector<LatticeLink> make_links(std::size_t nodes,
                                                   std::span<const Lattice::Spring> springs,
                                                   double unit);

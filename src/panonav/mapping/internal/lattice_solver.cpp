@@ -15,13 +15,14 @@ namespace panonav {
 
 namespace {
 
-/// Width of the losses in deviations, beyond which springs are rejected: normal errors exceed it
-/// once in 370 times.
+/// Final width of the robust losses in standard deviations; springs beyond it are rejected. Normal
+/// errors exceed it once in 370 times.
 constexpr double final_width = 3.0;
 /// Largest number of steps at each width.
 constexpr int max_steps_per_width = 20;
-// Smallest relative decrease of the energy for another step: below it positions move by less than
-// 1e-4 of a spring. At all but the last width the next one corrects the rest.
+// Smallest relative decrease of the energy after which another step is made: below it positions
+// move by less than 1e-4 of a spring. Before the last width a larger value suffices, as the steps
+// at the next width continue.
 constexpr double min_final_decrease = 1e-7;
 constexpr double min_decrease_while_narrowing = 1e-3;
 
@@ -30,8 +31,8 @@ using Row = std::array<double, 6>;
 
 /// The measurements of a spring, in groups that are right or wrong together.
 enum Group : std::size_t { phases, length, length_by_phases, groups };
-/// Median of the squared strain of a group with right deviations (chi-squared of two rows and of
-/// one).
+/// Expected median of the squared strain of each group if the deviations are right (chi-squared
+/// with two degrees of freedom, and with one).
 constexpr std::array<double, groups> median_square{1.386, 0.455, 0.455};
 
 /// The strain of one spring in deviations, and its derivatives.
@@ -86,8 +87,8 @@ Strain compute_strain(const SpringTerm& spring, const Pose2& a, const Pose2& b) 
         world_rad += 0.5 * wrap_angle(back_rad - world_rad);
         share_a = 0.5;
       }
-      // Nodes that nearly coincide would rotate about each other without end: the slope is that at
-      // a minimum distance.
+      // The slope is computed at a minimum distance; otherwise nodes that nearly coincide would
+      // rotate about each other endlessly.
       const double lever = std::max(distance, 0.1 * spring.length);
       strain.add(phases, wrap_angle(std::atan2(dy, dx) - world_rad),
                  {uy / lever, -ux / lever, -share_a, -uy / lever, ux / lever, share_a - 1.0},
@@ -109,7 +110,7 @@ void check(std::span<const SpringTerm> springs, std::span<const Pose2> poses,
     const double sum = pose.x_m + pose.y_m + pose.heading_rad;
     require(std::isfinite(sum), "pose of a node", sum, "finite");
   }
-  const auto positive = [](double value, const char* name) {
+  const auto require_positive = [](double value, const char* name) {
     require(std::isfinite(value) && value > 0.0, name, value, "finite and > 0");
   };
   for (const SpringTerm& spring : springs) {
@@ -117,22 +118,23 @@ void check(std::span<const SpringTerm> springs, std::span<const Pose2> poses,
             "node of a spring", static_cast<double>(spring.b), "another node");
     require(std::isfinite(spring.length) && spring.length >= 0.0, "length of a spring",
             spring.length, "finite and >= 0");
-    positive(spring.length_deviation, "deviation of a length");
+    require_positive(spring.length_deviation, "deviation of a length");
     if (spring.direction) {
       const double sum = spring.direction->from_a_rad + spring.direction->from_b_rad.value_or(0.0);
       require(std::isfinite(sum), "direction of a spring", sum, "finite");
-      positive(spring.direction->deviation_rad, "deviation of a direction");
+      require_positive(spring.direction->deviation_rad, "deviation of a direction");
     }
     if (spring.along_direction) {
       require(
           std::isfinite(spring.along_direction->length) && spring.along_direction->length >= 0.0,
           "length along a direction", spring.along_direction->length, "finite and >= 0");
-      positive(spring.along_direction->deviation, "deviation of a length along a direction");
+      require_positive(spring.along_direction->deviation,
+                       "deviation of a length along a direction");
     }
     if (spring.turn) {
       require(std::isfinite(spring.turn->turn_rad), "turn of a spring", spring.turn->turn_rad,
               "finite");
-      positive(spring.turn->deviation_rad, "deviation of a turn");
+      require_positive(spring.turn->deviation_rad, "deviation of a turn");
     }
   }
 }
@@ -159,20 +161,20 @@ class SpringEnergy {
     widths_.fill(final_width);
     for (const SpringTerm& spring : springs_) {
       if (spring.is_certain) continue;
-      const auto squares = squares_of(spring);
+      const auto squares = squared_strains(spring);
       for (std::size_t g = 0; g < groups; ++g) {
         widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(squares[g].value_or(0.0)));
       }
     }
   }
 
-  /// Halves the widths, down to three deviations, or more where the median strain shows that these
-  /// are too small. False when all are there.
+  /// Halves the widths, down to three deviations, or to more if the median strain shows that the
+  /// deviations are too small. Returns false if no width has changed.
   bool narrow_losses() {
     std::array<std::vector<double>, groups> squares;
     for (const SpringTerm& spring : springs_) {
       if (spring.is_certain) continue;
-      const auto all = squares_of(spring);
+      const auto all = squared_strains(spring);
       for (std::size_t g = 0; g < groups; ++g) {
         if (all[g]) squares[g].push_back(*all[g]);
       }
@@ -195,7 +197,7 @@ class SpringEnergy {
   [[nodiscard]] std::vector<double> weights() const {
     std::vector<double> result(springs_.size(), 1.0);
     for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const auto squares = squares_of(springs_[s]);
+      const auto squares = squared_strains(springs_[s]);
       const Group group = squares[phases] ? phases : length;
       result[s] = weight(s, group, squares[group].value_or(0.0));
     }
@@ -217,7 +219,7 @@ class SpringEnergy {
   [[nodiscard]] double cost() const {
     double sum = 0.0;
     for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const auto squares = squares_of(springs_[s]);
+      const auto squares = squared_strains(springs_[s]);
       for (const Group group : {phases, length, length_by_phases}) {
         if (!squares[group]) continue;
         const double width = widths_[group] * widths_[group];
@@ -249,24 +251,24 @@ class SpringEnergy {
   }
 
  private:
-  [[nodiscard]] std::array<std::optional<double>, groups> squares_of(
+  [[nodiscard]] std::array<std::optional<double>, groups> squared_strains(
       const SpringTerm& spring) const {
     return compute_strain(spring, poses_[spring.a], poses_[spring.b]).squares();
   }
 
-  /// Returns the weight of a group of a spring's strains. Where the views show direction and turn,
-  /// lengths count as far as these do, and are never rejected by themselves: else a node could
-  /// leave along a direction.
+  /// Returns the weight of a group of a spring's strains. If a spring has phases, their weight also
+  /// limits that of its lengths, which are never rejected alone: otherwise a node could drift away
+  /// along a direction.
   [[nodiscard]] double weight(std::size_t s, Group group, double square) const {
     if (springs_[s].is_certain) return 1.0;
     const double share = square / (widths_[group] * widths_[group]);
     if (group == phases || !length_weights_[s]) return geman_mcclure_weight(share);
     return *length_weights_[s] / std::sqrt(1.0 + share);
   }
-  /// Updates the weights with which the lengths of springs with phases count.
+  /// Updates the weights of the phases, which multiply the weights of lengths of the same spring.
   void update_length_weights() {
     for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const auto square = squares_of(springs_[s])[phases];
+      const auto square = squared_strains(springs_[s])[phases];
       length_weights_[s] = square ? std::optional(weight(s, phases, *square)) : std::nullopt;
     }
   }
@@ -302,7 +304,7 @@ class SpringEnergy {
   std::span<const SpringTerm> springs_;
   std::span<Pose2> poses_;
   std::vector<Pose2> start_;  // before the present step
-  std::vector<int> unknown_;  // first unknown of each pose, -1: it stays
+  std::vector<int> unknown_;  // index of the first unknown of each pose; -1: fixed
   int unknowns_ = 0;
   std::vector<std::optional<double>> length_weights_;  // of springs with phases
   std::array<double, groups> widths_{final_width, final_width, final_width};

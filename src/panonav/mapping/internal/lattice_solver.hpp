@@ -22,7 +22,7 @@ struct SpringTurn {
   double deviation_rad = 0.1;  ///< > 0
 };
 
-/// A length of a spring from another source than the rest length.
+/// A second measurement of a spring's length, next to the rest length.
 struct SpringLength {
   double length = 1.0;     ///< >= 0
   double deviation = 0.1;  ///< > 0
@@ -36,28 +36,28 @@ struct SpringTerm {
   double length = 1.0;            ///< rest length, >= 0
   double length_deviation = 0.1;  ///< > 0
   std::optional<SpringDirection> direction;
-  std::optional<SpringLength> along_direction;  ///< counts with a direction only
+  std::optional<SpringLength> along_direction;  ///< length from phases; nullopt: not known
   std::optional<SpringTurn> turn;
   bool is_certain = false;  ///< never rejected, however far it is stretched
 };
 
 /// The result of `solve_lattice`.
 struct LatticeSolution {
-  /// Robust weight of each spring, by its direction and turn where it has them, else by its length,
-  /// 1 .. 0: near 0 it was rejected, as it contradicts the others.
+  /// Robust weight of each spring, 0 .. 1, by its direction and turn or, without these, by its
+  /// length. Near 0 the spring was rejected, as it contradicts the others.
   std::vector<double> weights;
   double energy = 0.0;  ///< sum over springs of weight times squared strain in deviations
   int iterations = 0;
 };
 
-/// Moves the poses to the minimal energy of the springs [M04 section 3.2], by sparse non-linear
-/// least squares with damping. Springs that contradict the rest are rejected gradually: Geman-
+/// Moves the poses so that the energy of the springs is minimal [M04 section 3.2], by damped sparse
+/// non-linear least squares. Springs that contradict the rest are rejected gradually: Geman-
 /// McClure loss whose width shrinks to three deviations (graduated non-convexity), so that the
-/// result depends little on the start. Direction and turn are rejected together, lengths each by
-/// itself. `moving`: one entry per pose, 0 fixes the pose; empty: all move. A component without a
-/// fixed pose stays about where it was. `on_step`: called after each step that moved the poses.
-/// Throws ContractError on indices or numbers out of range. Deterministic. Cost per iteration: one
-/// sparse factorisation.
+/// result depends little on the start. Direction and turn are rejected together; lengths are
+/// rejected with them, or alone if there is neither. `moving`: one entry per pose, 0 fixes the
+/// pose; empty: all move. A component without a fixed pose hardly moves as a whole. `on_step`:
+/// called after each step that moved the poses. Throws ContractError on indices or numbers out of
+/// range. Deterministic. Cost per iteration: one sparse factorisation.
 LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,
                               std::span<const unsigned char> moving = {},
                               const std::function<void()>& on_step = {});

@@ -16,21 +16,22 @@ namespace panonav {
 
 namespace {
 
-/// Largest disagreement of two views: unrelated ones agree so well in direction and turn by chance
+/// Largest disagreement of two views on direction or turn. Unrelated views agree on both by chance
 /// once in 16 times.
 constexpr double max_disagreement_rad = 0.25 * std::numbers::pi;
-/// Largest sum of three turns that cancel: those by phases err by some 5 degrees each.
-constexpr double turn_closing_rad = 10.0 * std::numbers::pi / 180.0;
-/// Largest gap of three displacements around a triangle, as a share of the longest: lengths err by
-/// a quarter.
-constexpr double displacement_closing = 0.5;
+/// Largest sum of the turns around a closing triangle, as turns from phases err by about 5 degrees
+/// each.
+constexpr double turn_closure_tolerance_rad = 10.0 * std::numbers::pi / 180.0;
+/// Largest gap after the displacements around a closing triangle, as a share of the longest one:
+/// lengths err by a quarter.
+constexpr double displacement_closure_tolerance = 0.5;
 /// Relative error of a length before the curve is known: that of lengths by phases.
 constexpr double default_length_error = 0.25;
-/// Smallest deviation of an angle, 0.2 degrees: rounding of packed phases, whose steps of 0.025 rad
-/// leave 0.4 degrees each, averaged over the components.
+/// Smallest standard deviation of an angle, 0.2 degrees. Packed phases have steps of 0.025 rad,
+/// whose rounding error of 0.4 degrees is averaged over the components.
 constexpr double min_angle_deviation_rad = 0.0035;
 
-/// Returns displacement and turn of the spring from one of its ends.
+/// Returns the motion along the spring from its node `from` to its other node.
 Pose2 step_from(std::size_t from, const Lattice::Spring& spring) {
   const PhaseReading phases = read_phases_from(from, spring);
   return {spring.length * std::cos(phases.direction_a_rad),
@@ -53,8 +54,8 @@ SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& optio
   }
 }
 
-std::vector<NodePair> SpringViews::find_most_similar(const LatticeOptions& options,
-                                                     Executor& executor) const {
+std::vector<NodePair> SpringViews::find_most_similar_pairs(const LatticeOptions& options,
+                                                           Executor& executor) const {
   const auto views = memory_->views();
   std::vector<std::vector<NodePair>> found(views.size());
   executor.for_chunks(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
@@ -103,7 +104,8 @@ void learn_errors(std::span<const Lattice::Spring> springs, const DissimilarityC
     disagreements.push_back(spring.phases->disagreement_rad);
     turn_disagreements.push_back(spring.phases->turn_disagreement_rad);
   }
-  // The median spring errs by E, the others by their stiffness [M04 eq. 5].
+  // The median spring has the error E; the errors of the others follow from their stiffness [M04
+  // eq. 5].
   const double middle = lengths.empty() ? 1.0 : upper_median(lengths);
   double error = curve.error(middle);
   if (!(error > 0.0)) error = default_length_error * (middle > 0.0 ? middle : 1.0);
@@ -111,7 +113,7 @@ void learn_errors(std::span<const Lattice::Spring> springs, const DissimilarityC
   // Two readings of deviation s differ by sqrt(2) s; their mean errs by s / sqrt(2).
   const auto deviation = [](const std::vector<double>& differences) {
     if (differences.empty()) return min_angle_deviation_rad;
-    return std::max(min_angle_deviation_rad, 0.5 * normal_over_median * upper_median(differences));
+    return std::max(min_angle_deviation_rad, 0.5 * sigma_over_mad * upper_median(differences));
   };
   errors.direction_rad = deviation(disagreements);
   errors.turn_rad = deviation(turn_disagreements);
@@ -161,8 +163,9 @@ std::vector<double> closing_triangle_shares(std::size_t nodes,
             const Pose2 straight = step_from(a, springs[ac]);
             const bool closes =
                 std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <=
-                    turn_closing_rad &&
-                distance(by_b.position(), straight.position()) <= displacement_closing * longest;
+                    turn_closure_tolerance_rad &&
+                distance(by_b.position(), straight.position()) <=
+                    displacement_closure_tolerance * longest;
             for (const std::size_t number : numbers) {
               all[number] += 1.0;
               closing[number] += closes ? 1.0 : 0.0;
@@ -174,8 +177,8 @@ std::vector<double> closing_triangle_shares(std::size_t nodes,
   return closing;
 }
 
-void drop_unconfirmed(std::size_t nodes, double min_closing,
-                      std::vector<Lattice::Spring>& springs) {
+void drop_unconfirmed_springs(std::size_t nodes, double min_closing,
+                              std::vector<Lattice::Spring>& springs) {
   const auto closes = closing_triangle_shares(nodes, springs);
   std::vector<GraphEdge> confirmed;
   std::vector<unsigned char> has_support(nodes);

@@ -11,30 +11,32 @@
 
 namespace panonav {
 
-/// Standard deviation of normal errors over the median of their absolute values.
-inline constexpr double normal_over_median = 1.4826;
+/// Ratio of the standard deviation of normal errors to the median of their absolute values.
+inline constexpr double sigma_over_mad = 1.4826;
 
 /// Two nodes, the smaller one first.
 using NodePair = std::pair<std::size_t, std::size_t>;
 
-/// Returns the phases of a spring that has them, as its node `from` sees the other one.
+/// Returns the phase reading of a spring from its node `from` to its other node. The spring must
+/// have phases.
 [[nodiscard]] inline PhaseReading read_phases_from(std::size_t from,
                                                    const Lattice::Spring& spring) {
   return from == spring.a ? *spring.phases : spring.phases->reversed();
 }
 
-/// The views of a memory in the forms that springs need, in the memory's order.
+/// All views of a memory, in its order, with the packed signatures and Fourier coefficients from
+/// which springs are measured.
 class SpringViews {
  public:
   SpringViews(const VisualMemory& memory, const LatticeOptions& options);
 
   [[nodiscard]] std::size_t size() const noexcept { return packed_.size(); }
   /// Returns the pairs of each view and its `neighbours` most similar ones, ascending, each once.
-  [[nodiscard]] std::vector<NodePair> find_most_similar(const LatticeOptions& options,
-                                                        Executor& executor) const;
+  [[nodiscard]] std::vector<NodePair> find_most_similar_pairs(const LatticeOptions& options,
+                                                              Executor& executor) const;
   [[nodiscard]] double dissimilarity(NodePair pair) const;
-  /// Measures the dissimilarity and, with the option, the phases; no length yet. `window`: headings
-  /// of the second node minus those of the first that are considered.
+  /// Measures the dissimilarity of a pair and, with the option `phases`, the phases; does not set
+  /// the length. `window`: allowed headings of the second node minus those of the first.
   [[nodiscard]] Lattice::Spring measure(
       NodePair pair, const std::optional<HeadingWindow>& window = std::nullopt) const;
 
@@ -45,27 +47,28 @@ class SpringViews {
   std::vector<HomingView> homing_;  // empty without phases
 };
 
-/// True if the two views of the spring agree on their relative pose, or without phases.
+/// True if both views of the spring agree on their relative pose, or if it has no phases.
 [[nodiscard]] bool has_agreeing_views(const Lattice::Spring& spring);
 
-/// Learns the deviations from the disagreement of the springs' views and the curve's error; those
-/// of phase lengths do not change.
+/// Estimates the standard deviations of angles from the disagreement between the two views of each
+/// spring, and that of lengths from the curve; does not change that of phase lengths.
 void learn_errors(std::span<const Lattice::Spring> springs, const DissimilarityCurve& curve,
                   Lattice::Errors& errors);
 
-/// Makes the equation of a spring. `phase_lengths`: the lengths by phases count, too.
+/// Makes the equation of a spring. `phase_lengths`: lengths from phases are used, too.
 [[nodiscard]] SpringTerm make_spring_term(const Lattice::Spring& spring,
                                           const Lattice::Errors& errors, bool phase_lengths);
 
-/// Returns for each spring the share of the triangles with two others that close, in turn and in
-/// displacement by their rest lengths, 0 .. 1; 0 where there are none, and without phases. Cost:
-/// springs * springs of a node.
+/// Returns for each spring the share, 0 .. 1, of its triangles with two other springs that close in
+/// turn and in displacement by the rest lengths; 0 without triangles or phases. Cost: springs *
+/// springs of a node.
 [[nodiscard]] std::vector<double> closing_triangle_shares(std::size_t nodes,
                                                           std::span<const Lattice::Spring> springs);
 
-/// Drops springs of whose triangles no more than the share `min_closing` close. A view without any
-/// other keeps those to the one component to which most of its springs lead, so that it never joins
-/// two; or those to other such views.
-void drop_unconfirmed(std::size_t nodes, double min_closing, std::vector<Lattice::Spring>& springs);
+/// Drops each spring if at most the share `min_closing` of its triangles close. A view that would
+/// lose all springs keeps those to the component to which most of its springs lead, so that it
+/// never joins two components, or else those to other such views.
+void drop_unconfirmed_springs(std::size_t nodes, double min_closing,
+                              std::vector<Lattice::Spring>& springs);
 
 }  // namespace panonav

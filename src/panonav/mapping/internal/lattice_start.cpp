@@ -28,8 +28,8 @@ std::vector<std::vector<std::size_t>> members_of(const std::vector<std::size_t>&
   return members;
 }
 
-/// Sets headings along the springs whose views agree best: a spanning tree of least disagreement.
-/// The first view of each component has heading 0.
+/// Sets headings along a spanning tree of the springs whose views disagree least. The first view of
+/// each component has heading 0.
 void set_headings(const LatticeGraph& graph, std::span<const Lattice::Spring> springs,
                   std::vector<Pose2>& poses) {
   using Open = std::tuple<double, std::size_t, std::size_t>;  // disagreement, spring, node
@@ -95,7 +95,7 @@ bool align_to_directions(const std::vector<std::size_t>& members,
     const double length = distance(a.position(), b.position());
     if (!(length > 0.0)) continue;
     const double world_rad = a.heading_rad + spring.phases->direction_a_rad;
-    // Both signs, so that both sets are centred on 0.
+    // Each direction is added with both signs, so that both sets are centred on 0.
     for (const double sign : {1.0, -1.0}) {
       layout.push_back({sign * (b.x_m - a.x_m) / length, sign * (b.y_m - a.y_m) / length});
       measured.push_back({sign * std::cos(world_rad), sign * std::sin(world_rad)});
@@ -113,12 +113,12 @@ bool align_to_directions(const std::vector<std::size_t>& members,
 
 }  // namespace
 
-LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const Lattice::Spring> springs,
-                                int landmarks) {
+LatticeLayout lay_out_by_springs(std::size_t nodes, std::span<const Lattice::Spring> springs,
+                                 int landmarks) {
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
   const LatticeGraph graph(nodes, edges);
-  LatticeStart start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
+  LatticeLayout start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
   set_headings(graph, springs, start.poses);
   std::vector<std::size_t> local(nodes);
   for (const auto& members : members_of(start.components)) {
@@ -153,8 +153,8 @@ bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion) {
   return direction <= max_deviations * motion.direction_deviation_rad;
 }
 
-LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
-                               std::span<const Lattice::Spring> springs) {
+LatticeLayout lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
+                                std::span<const Lattice::Spring> springs) {
   std::map<std::pair<std::size_t, std::size_t>, const Lattice::Spring*> spring_between;
   for (const Lattice::Spring& spring : springs) {
     if (spring.phases) spring_between[{spring.a, spring.b}] = &spring;
@@ -162,7 +162,7 @@ LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> mo
   std::vector<GraphEdge> edges;
   for (const auto& motion : motions) edges.push_back({motion.a, motion.b, 1.0});
   const LatticeGraph graph(nodes, edges);
-  LatticeStart start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
+  LatticeLayout start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
   std::vector<unsigned char> done(nodes);
   start.handedness_known.assign(members_of(start.components).size(), 0);
   for (std::size_t first = 0; first < nodes; ++first) {

@@ -11,16 +11,17 @@ namespace panonav {
 
 namespace {
 
-/// Views searched for each place, as several of one place are found.
+/// Number of matches searched per candidate place, as the search finds several views of one place.
 constexpr int views_per_candidate = 4;
-/// Share of the shortest loop within which candidates along the path are one place.
+/// Candidates that are closer along the path than this share of the shortest loop are one place.
 constexpr double place_share_of_loop = 0.25;
-/// Share of the drift per metre that remains where closures have been found since.
-constexpr double drift_share_within_closed = 0.2;
+/// Share of the drift per metre on the part of a loop before the last closure, as closures have
+/// corrected that part.
+constexpr double closed_drift_share = 0.2;
 /// Error of odometry over a metre or two, as a share of the path.
 constexpr double local_drift = 0.1;
 
-double gap(const Pose2& a, const Pose2& b) {
+double position_distance(const Pose2& a, const Pose2& b) {
   return distance(a.position(), b.position());
 }
 
@@ -61,11 +62,11 @@ LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosu
   odometry_.max_residual = options.max_residual;
 }
 
-std::vector<ViewId> LoopClosureFinder::find_excluded(std::span<const PassedNode> nodes,
-                                                     std::size_t node) const {
+std::vector<ViewId> LoopClosureFinder::find_excluded_views(std::span<const PathNode> nodes,
+                                                           std::size_t node) const {
   std::vector<ViewId> views;
   if (scope_ == ClosureScope::other_components) {
-    for (const PassedNode& other : nodes) {
+    for (const PathNode& other : nodes) {
       if (other.component == nodes[node].component) views.push_back(other.view);
     }
     return views;
@@ -83,16 +84,16 @@ std::vector<ViewId> LoopClosureFinder::find_excluded(std::span<const PassedNode>
   return views;
 }
 
-std::optional<std::size_t> LoopClosureFinder::node_of(std::span<const PassedNode> nodes,
-                                                      ViewId view) const {
-  const auto found = std::ranges::lower_bound(nodes, view, {}, &PassedNode::view);
+std::optional<std::size_t> LoopClosureFinder::find_node(std::span<const PathNode> nodes,
+                                                        ViewId view) const {
+  const auto found = std::ranges::lower_bound(nodes, view, {}, &PathNode::view);
   if (found == nodes.end() || found->view != view) return std::nullopt;
   return static_cast<std::size_t>(found - nodes.begin());
 }
 
-std::optional<LoopClosure> LoopClosureFinder::compare(std::size_t earlier, std::size_t later,
-                                                      const OdometryView& earlier_view,
-                                                      const OdometryView& later_view) const {
+std::optional<LoopClosure> LoopClosureFinder::verify_closure(std::size_t earlier, std::size_t later,
+                                                             const OdometryView& earlier_view,
+                                                             const OdometryView& later_view) const {
   const auto there = visual_step(earlier_view, later_view, odometry_);
   if (!there || there->length_in_views > options_.max_length) return std::nullopt;
   const auto back = visual_step(later_view, earlier_view, odometry_);
@@ -111,20 +112,20 @@ std::optional<LoopClosure> LoopClosureFinder::compare(std::size_t earlier, std::
   return LoopClosure{earlier, later, there->before_from_after, there->residual};
 }
 
-std::optional<LoopClosure> LoopClosureFinder::find_best_closure(std::span<const PassedNode> nodes,
+std::optional<LoopClosure> LoopClosureFinder::find_best_closure(std::span<const PathNode> nodes,
                                                                 std::span<const Pose2> poses,
                                                                 const OdometryView& view) const {
   const std::size_t here = nodes.size() - 1;
-  const auto excluded = find_excluded(nodes, here);
+  const auto excluded = find_excluded_views(nodes, here);
   const auto found = memory_->search(memory_->packed(nodes[here].view),
                                      {.top = options_.candidates * views_per_candidate},
                                      {.excluded_views = excluded});
   std::vector<std::size_t> compared;
   std::vector<LoopClosure> closures;
   for (const Match& match : found.matches) {
-    const auto candidate = node_of(nodes, match.view);
+    const auto candidate = find_node(nodes, match.view);
     if (!candidate) continue;
-    // The first of neighbours along the path, the most similar one, represents the place.
+    // Only the first, most similar one of neighbours along the path is compared.
     const bool known = std::ranges::any_of(compared, [&](std::size_t i) {
       return std::abs(nodes[i].path_m - nodes[*candidate].path_m) <
              place_share_of_loop * options_.min_loop_m;
@@ -133,53 +134,53 @@ std::optional<LoopClosure> LoopClosureFinder::find_best_closure(std::span<const 
     if (static_cast<int>(compared.size()) == options_.candidates) break;
     compared.push_back(*candidate);
     const auto closure =
-        compare(*candidate, here, OdometryView(memory_->signature(match.view)), view);
+        verify_closure(*candidate, here, OdometryView(memory_->signature(match.view)), view);
     if (closure) closures.push_back(*closure);
   }
   if (closures.empty()) return std::nullopt;
   const LoopClosure& best = *std::ranges::min_element(closures, {}, &LoopClosure::residual);
   const Pose2 place = poses[best.earlier] * best.earlier_from_later;
   const bool ambiguous = std::ranges::any_of(closures, [&](const LoopClosure& other) {
-    // Another passage through the same place is no contradiction.
+    // Another passage through the same place does not make the closure ambiguous.
     return other.residual < options_.distinctness * best.residual &&
-           gap(place, poses[other.earlier] * other.earlier_from_later) >
+           position_distance(place, poses[other.earlier] * other.earlier_from_later) >
                options_.max_length * odometry_.scale_m;
   });
   if (ambiguous) return std::nullopt;
   return best;
 }
 
-bool LoopClosureFinder::is_reciprocal(std::span<const PassedNode> nodes,
-                                      std::span<const Pose2> poses,
+bool LoopClosureFinder::is_reciprocal(std::span<const PathNode> nodes, std::span<const Pose2> poses,
                                       const LoopClosure& closure) const {
-  const auto excluded = find_excluded(nodes, closure.earlier);
+  const auto excluded = find_excluded_views(nodes, closure.earlier);
   const auto found =
       memory_->search(memory_->packed(nodes[closure.earlier].view),
                       {.top = options_.reciprocal_rank}, {.excluded_views = excluded});
   return std::ranges::any_of(found.matches, [&](const Match& match) {
-    const auto node = node_of(nodes, match.view);
+    const auto node = find_node(nodes, match.view);
     if (!node) return false;
     return nodes[closure.later].path_m - nodes[*node].path_m < options_.min_loop_m ||
            (nodes[*node].component == nodes[closure.earlier].component &&
-            gap(poses[*node], poses[closure.earlier]) < options_.max_length * odometry_.scale_m);
+            position_distance(poses[*node], poses[closure.earlier]) <
+                options_.max_length * odometry_.scale_m);
   });
 }
 
-bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
-                                    const LoopClosure& closure) const {
+bool LoopClosureFinder::is_within_drift(std::span<const PathNode> nodes,
+                                        std::span<const Pose2> poses,
+                                        const LoopClosure& closure) const {
   // Components have no common frame, so drift does not limit closures between them.
   if (nodes[closure.earlier].component != nodes[closure.later].component) return true;
   const double here_m = nodes[closure.later].path_m;
   const double loop_m = here_m - nodes[closure.earlier].path_m;
   const double since_m = std::min(loop_m, here_m - last_closure_path_m_);
   const double allowed_m =
-      odometry_.scale_m +
-      options_.max_drift * (since_m + drift_share_within_closed * (loop_m - since_m));
-  // A heading error that grows evenly to an angle is a drift by half of it for each metre.
+      odometry_.scale_m + options_.max_drift * (since_m + closed_drift_share * (loop_m - since_m));
+  // A heading error that grows linearly to an angle causes a drift of half the angle per metre.
   const double allowed_rad = options_.heading_tolerance_rad + 2.0 * options_.max_drift;
   const Pose2 closed = poses[closure.earlier] * closure.earlier_from_later;
   const Pose2& reached = poses[closure.later];
-  return gap(closed, reached) < allowed_m &&
+  return position_distance(closed, reached) < allowed_m &&
          std::abs(angle_difference(closed.heading_rad, reached.heading_rad)) < allowed_rad;
 }
 
@@ -198,18 +199,19 @@ bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,
          std::abs(difference.heading_rad) < options_.heading_tolerance_rad;
 }
 
-std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nodes,
+std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PathNode> nodes,
                                                  std::span<const Pose2> poses,
                                                  const OdometryView& view, double scale_m) {
   require(nodes.size() == poses.size() && !nodes.empty(), "poses",
           static_cast<double>(poses.size()), "as many as nodes, and at least one");
   odometry_.scale_m = scale_m;
   const std::size_t here = nodes.size() - 1;
-  // Single views of a sequence may fail a check.
+  // Pending closures are kept for twice the length of a sequence, as single views may fail a check.
   const auto oldest = static_cast<std::size_t>(2 * options_.sequence);
   while (!pending_.empty() && here - pending_.front().closure.later > oldest) pending_.pop_front();
   const auto closure = find_best_closure(nodes, poses, view);
-  if (!closure || !is_in_reach(nodes, poses, *closure) || !is_reciprocal(nodes, poses, *closure)) {
+  if (!closure || !is_within_drift(nodes, poses, *closure) ||
+      !is_reciprocal(nodes, poses, *closure)) {
     return {};
   }
   const bool continues = std::ranges::any_of(pending_, &Pending::reported);
@@ -222,7 +224,7 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nod
   if (static_cast<int>(agreeing.size()) < options_.sequence) return certain;
   const double here_m = nodes[here].path_m;
   if (continues && here_m - last_closure_path_m_ < options_.spacing_m) return certain;
-  // At the begin of a passage every view of the sequence counts; later only the latest.
+  // At the start of a passage all closures of the sequence are reported, later only the latest.
   for (Pending* pending : agreeing) {
     if (continues && pending != agreeing.back()) continue;
     certain.push_back(pending->closure);

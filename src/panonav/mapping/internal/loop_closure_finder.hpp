@@ -13,7 +13,7 @@
 namespace panonav {
 
 /// A node of the map in the search for closures.
-struct PassedNode {
+struct PathNode {
   ViewId view;                ///< an id of the memory
   double path_m = 0.0;        ///< path length of the robot from its first view
   std::size_t component = 0;  ///< its connected component, in whose frame its pose is
@@ -28,7 +28,8 @@ enum class ClosureScope {
 /// Finds loop closures while the robot drives. Candidates come from the memory's search. Home
 /// vectors in both directions must agree with the compass and be each other's inverse; the search
 /// from the candidate must find the present view; no other place may explain the view as well; the
-/// drift of the odometry must allow it; and a sequence of views must agree.
+/// closure must be within the drift of the odometry; and the closures of successive views must
+/// agree.
 class LoopClosureFinder {
  public:
   /// `memory` must outlive the finder. Throws OptionError.
@@ -36,33 +37,34 @@ class LoopClosureFinder {
                     const VisualOdometryOptions& odometry,
                     ClosureScope scope = ClosureScope::everywhere);
 
-  /// Returns the closures that have become certain with the last of `nodes`, whose view is new in
-  /// the memory: none, or those of the whole sequence. `poses`: of the map so far, by which places
-  /// are distinguished and the sequence is checked. `scale_m` as of the odometry. Throws
-  /// ContractError on different numbers of nodes and poses. Cost: two searches of the memory and,
-  /// where there are candidates, 0.3 ms for each.
-  [[nodiscard]] std::vector<LoopClosure> find(std::span<const PassedNode> nodes,
+  /// Returns the closures that have become certain with the last of `nodes`, whose view is the
+  /// latest of the memory: none, all of the sequence at the start of a passage, or later only the
+  /// latest. `poses`: poses of the nodes in the map so far, which distinguish places and check the
+  /// sequence. `scale_m`: metric scale of visual displacements. Throws ContractError on different
+  /// numbers of nodes and poses. Cost: two searches of the memory and, where there are candidates,
+  /// 0.3 ms for each.
+  [[nodiscard]] std::vector<LoopClosure> find(std::span<const PathNode> nodes,
                                               std::span<const Pose2> poses,
                                               const OdometryView& view, double scale_m);
 
  private:
-  [[nodiscard]] std::optional<LoopClosure> find_best_closure(std::span<const PassedNode> nodes,
+  [[nodiscard]] std::optional<LoopClosure> find_best_closure(std::span<const PathNode> nodes,
                                                              std::span<const Pose2> poses,
                                                              const OdometryView& view) const;
-  [[nodiscard]] std::optional<LoopClosure> compare(std::size_t earlier, std::size_t later,
-                                                   const OdometryView& earlier_view,
-                                                   const OdometryView& later_view) const;
-  [[nodiscard]] bool is_reciprocal(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
+  [[nodiscard]] std::optional<LoopClosure> verify_closure(std::size_t earlier, std::size_t later,
+                                                          const OdometryView& earlier_view,
+                                                          const OdometryView& later_view) const;
+  [[nodiscard]] bool is_reciprocal(std::span<const PathNode> nodes, std::span<const Pose2> poses,
                                    const LoopClosure& closure) const;
-  [[nodiscard]] bool is_in_reach(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
-                                 const LoopClosure& closure) const;
+  [[nodiscard]] bool is_within_drift(std::span<const PathNode> nodes, std::span<const Pose2> poses,
+                                     const LoopClosure& closure) const;
   [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
                            std::span<const Pose2> poses) const;
   /// Returns the views that are no candidates for a closure with the node.
-  [[nodiscard]] std::vector<ViewId> find_excluded(std::span<const PassedNode> nodes,
-                                                  std::size_t node) const;
-  [[nodiscard]] std::optional<std::size_t> node_of(std::span<const PassedNode> nodes,
-                                                   ViewId view) const;
+  [[nodiscard]] std::vector<ViewId> find_excluded_views(std::span<const PathNode> nodes,
+                                                        std::size_t node) const;
+  [[nodiscard]] std::optional<std::size_t> find_node(std::span<const PathNode> nodes,
+                                                     ViewId view) const;
 
   const VisualMemory* memory_;
   LoopClosureOptions options_;

@@ -44,7 +44,7 @@ std::vector<Point2> multidimensional_scaling(std::span<const std::size_t> landma
     const Eigen::Index column = known - 1 - axis;
     if (column < 0) break;
     const double value = solver.eigenvalues()(column);
-    // Values below the rounding of the largest one are no extent.
+    // Eigenvalues below the rounding error of the largest one are treated as 0.
     if (!(value > 1e-12 * std::max(solver.eigenvalues()(known - 1), 1e-300))) break;
     Eigen::VectorXd direction = solver.eigenvectors().col(column) / std::sqrt(value);
     Eigen::Index largest = 0;

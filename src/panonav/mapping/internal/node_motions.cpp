@@ -11,8 +11,8 @@ namespace panonav {
 
 namespace {
 
-/// Standard deviations of a motion's rotation within which phases are searched: normal errors
-/// exceed them once in 370 times.
+/// Number of standard deviations of a motion's rotation within which phases are searched: normal
+/// errors exceed it once in 370 times.
 constexpr double max_heading_deviations = 3.0;
 
 void check(const CoarseMotion& motion, const VisualMemory& memory) {
@@ -72,7 +72,7 @@ std::vector<SpringTerm> NodeMotions::spring_terms() const {
     const CoarseMotion& motion = moved.motion;
     SpringTerm term{.a = moved.a,
                     .b = moved.b,
-                    .length = travel(moved),
+                    .length = step_length(moved),
                     .length_deviation = motion.distance_deviation_m,
                     .turn = SpringTurn{motion.step.heading_rad, motion.turn_deviation_rad},
                     .is_certain = true};
@@ -92,14 +92,14 @@ std::optional<double> NodeMotions::layout_scale(std::span<const Pose2> poses) co
     const double deviation_m = motion.motion.distance_deviation_m;
     const double certainty = 1.0 / (deviation_m * deviation_m);
     const double length = distance(poses[motion.a].position(), poses[motion.b].position());
-    moved += certainty * length * travel(motion);
+    moved += certainty * length * step_length(motion);
     laid += certainty * length * length;
   }
   if (!(moved > 0.0)) return std::nullopt;
   return moved / laid;
 }
 
-double travel(const NodeMotion& motion) {
+double step_length(const NodeMotion& motion) {
   return std::hypot(motion.motion.step.x_m, motion.motion.step.y_m);
 }
 

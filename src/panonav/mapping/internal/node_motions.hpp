@@ -23,13 +23,13 @@ class NodeMotions {
   [[nodiscard]] const NodeMotion* find(NodePair pair) const;
   /// True if the motions connect all of `nodes` nodes.
   [[nodiscard]] bool are_all_connected(std::size_t nodes) const;
-  /// The headings of the second node in the frame of the first that the motion between them allows;
-  /// nullopt without a motion.
+  /// Returns the headings of the second node in the frame of the first that the motion between both
+  /// allows; nullopt without a motion.
   [[nodiscard]] std::optional<HeadingWindow> heading_between(NodePair pair) const;
   /// Returns each motion as a spring that is never rejected.
   [[nodiscard]] std::vector<SpringTerm> spring_terms() const;
-  /// Returns the factor by which the layout must grow to give the motions their lengths, by least
-  /// squares; nullopt where all have length 0.
+  /// Returns the scale factor with which the layout fits the lengths of the motions best (least
+  /// squares); nullopt if all motions have length 0.
   [[nodiscard]] std::optional<double> layout_scale(std::span<const Pose2> poses) const;
 
  private:
@@ -38,6 +38,6 @@ class NodeMotions {
 };
 
 /// Length of a motion's step.
-[[nodiscard]] double travel(const NodeMotion& motion);
+[[nodiscard]] double step_length(const NodeMotion& motion);
 
 }  // namespace panonav

@@ -6,7 +6,7 @@
 
 namespace panonav {
 
-/// Allocates on 64-byte borders: whole cache lines, and the widest vector registers.
+/// Allocates at 64-byte boundaries, the size of a cache line and of the widest vector registers.
 template <class T>
 struct CacheLineAllocator {
   using value_type = T;

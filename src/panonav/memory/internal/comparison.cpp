@@ -24,7 +24,7 @@ void require_signature(const PackedSignature& signature, SignatureShape shape) {
           static_cast<double>(signature.phases.size()), std::to_string(shape.size()));
 }
 
-int checked_components(int components, SignatureShape shape) {
+int resolve_components(int components, SignatureShape shape) {
   require(components >= 0 && components <= shape.components, "components", components,
           "0 .. " + std::to_string(shape.components));
   return components == 0 ? shape.components : components;
@@ -40,7 +40,7 @@ Comparison::Comparison(const SearchedViews& searched, const PackedSignature& que
                        const SearchMask& mask, const kernels::DistanceKernels& kernels)
     : store_(searched.store),
       kernels_(kernels),
-      components_(checked_components(components, searched.shape)),
+      components_(resolve_components(components, searched.shape)),
       component_bytes_(static_cast<std::size_t>(searched.shape.rows)) {
   require_signature(query, searched.shape);
   require_mask(mask, searched.shape);

@@ -11,16 +11,19 @@
 
 namespace panonav {
 
-/// Throws ContractError unless the signature has this shape and holds that many bytes.
+/// Throws ContractError unless the signature has this shape and the number of bytes that the shape
+/// requires.
 void require_signature(const PackedSignature& signature, SignatureShape shape);
 
-/// `components`, or all for 0. Throws ContractError when out of range.
-[[nodiscard]] int checked_components(int components, SignatureShape shape);
+/// Returns `components`, or the number of all components for 0. Throws ContractError if out of
+/// range.
+[[nodiscard]] int resolve_components(int components, SignatureShape shape);
 
 /// Throws ContractError unless the mask has one entry for each row, or none.
 void require_mask(const SearchMask& mask, SignatureShape shape);
 
-/// Compares a query with full signatures: the first `components` components of the rows that count.
+/// Compares a query with stored signatures over the first `components` components of the allowed
+/// rows.
 class Comparison {
  public:
   /// Throws ContractError.
@@ -30,7 +33,7 @@ class Comparison {
   [[nodiscard]] std::uint32_t distance(ViewStore::Row row) const {
     return partial_distance(row, 0, components_);
   }
-  /// Over components begin .. end - 1.
+  /// Returns the distance over components begin .. end - 1.
   [[nodiscard]] std::uint32_t partial_distance(ViewStore::Row row, int begin, int end) const {
     const std::size_t first = begin * component_bytes_;
     const std::size_t count = (end - begin) * component_bytes_;
@@ -48,7 +51,7 @@ class Comparison {
   [[nodiscard]] int components() const noexcept { return components_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return components_ * component_bytes_; }
   [[nodiscard]] std::size_t component_bytes() const noexcept { return component_bytes_; }
-  /// Rows of the views that must not be found, ascending.
+  /// Rows of the excluded views, ascending.
   [[nodiscard]] const std::vector<ViewStore::Row>& excluded_rows() const noexcept {
     return excluded_rows_;
   }
@@ -61,7 +64,7 @@ class Comparison {
   const kernels::DistanceKernels& kernels_;
   int components_;
   std::size_t component_bytes_;
-  AlignedVector<std::uint8_t> query_, mask_;  // the mask is empty when all rows count
+  AlignedVector<std::uint8_t> query_, mask_;  // the mask is empty if all rows are compared
   std::vector<ViewStore::Row> excluded_rows_;
 };
 
@@ -87,9 +90,9 @@ class NearestMatches {
     std::ranges::push_heap(heap_, is_nearer);
     if (heap_.size() == top_) limit_ = std::min(limit_, heap_.front().dissimilarity);
   }
-  /// Views whose distance is larger cannot be among the nearest; views at this distance can.
+  /// Largest distance at which a view can still be among the nearest.
   [[nodiscard]] std::uint32_t limit() const noexcept { return limit_; }
-  /// True if no view at `bound` or further away can be among the nearest.
+  /// True if `view` cannot be among the nearest when its distance is `bound` or more.
   [[nodiscard]] bool can_exclude(std::uint32_t bound, ViewId view) const noexcept {
     return bound > limit_ || (heap_.size() == top_ && bound == heap_.front().dissimilarity &&
                               heap_.front().view < view);

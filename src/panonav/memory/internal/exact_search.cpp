@@ -79,8 +79,9 @@ class Search {
     fine_(first, places, bounds);
   }
 
-  /// Returns a distance within which `top` views are, from the views with the smallest bounds. A
-  /// good one is worth reading some bytes: it decides how many views the bounds exclude.
+  /// Returns a distance within which at least `top` views are, by comparing the views with the
+  /// smallest bounds in full. A small distance is worth the bytes read, as it decides how many
+  /// views the bounds exclude.
   std::uint32_t find_first_limit() {
     std::vector<Bounded> best_blocks(smallest_.size());
     for (std::size_t i = 0; i < best_blocks.size(); ++i) {
@@ -143,10 +144,11 @@ class Search {
           }
         }
         benefit.count(passed, waiting.size() - before);
-        if (waiting.size() >= max_waiting || !benefit.is_worthwhile()) compare(waiting, nearest);
+        if (waiting.size() >= max_waiting || !benefit.is_worthwhile())
+          compare_waiting_rows(waiting, nearest);
       } else {
         for (std::size_t i = 0; i < passed; ++i) {
-          // The processor itself looks ahead from row to row.
+          // Prefetches only after a gap, as the processor itself prefetches successive rows.
           if (i + 1 < passed && found[i + 1] != found[i] + 1) {
             comparison_.prefetch(static_cast<Row>(begin + found[i + 1]));
           }
@@ -156,11 +158,11 @@ class Search {
         }
       }
     }
-    compare(waiting, nearest);
+    compare_waiting_rows(waiting, nearest);
   }
 
-  /// Compares in full, the best bound first, as long as the bounds allow.
-  void compare(std::vector<Bounded>& waiting, NearestMatches& nearest) {
+  /// Compares the waiting rows in full, smallest bound first, until a bound exceeds the limit.
+  void compare_waiting_rows(std::vector<Bounded>& waiting, NearestMatches& nearest) {
     std::ranges::sort(waiting);
     for (std::size_t i = 0; i < waiting.size(); ++i) {
       const auto [bound, row] = waiting[i];
@@ -197,7 +199,7 @@ SearchResult exact_search(const SearchedViews& searched, const PackedSignature& 
   const std::size_t top = std::min(static_cast<std::size_t>(options.top), views);
   if (top == 0) return result;
 
-  // Bounds help when few of the views are wanted.
+  // Bounds save time only if few of the views are requested.
   constexpr std::size_t min_views_per_match = 8;
   if (searched.index.layout().has_sketches() && views / min_views_per_match >= top) {
     const SketchIndex::Query sketch =

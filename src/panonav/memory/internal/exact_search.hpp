@@ -11,23 +11,23 @@
 
 namespace panonav {
 
-/// The views and index of one memory that a search runs over.
+/// The views and the index of the memory that is searched.
 struct SearchedViews {
   SignatureShape shape;
   const ViewStore& store;
   const SketchIndex& index;
   std::span<const ViewId> views;         ///< ascending
   std::span<const ViewStore::Row> rows;  ///< of `views`
-  std::span<const ViewId> view_of_row;   ///< by row; rows without a view hold anything
+  std::span<const ViewId> view_of_row;   ///< by row; undefined for rows without a view
 };
 
-/// The body of VisualMemory::search. docs/search.md says why it is exact. `instructions` decides
-/// the speed alone.
+/// Implements VisualMemory::search; docs/search.md explains why it is exact. `instructions` affects
+/// only the speed.
 [[nodiscard]] SearchResult exact_search(const SearchedViews& searched, const PackedSignature& query,
                                         const SearchOptions& options, const SearchMask& mask,
                                         kernels::Instructions instructions);
 
-/// The body of VisualMemory::hierarchy.
+/// Implements VisualMemory::hierarchy.
 [[nodiscard]] std::vector<VisualMemory::HierarchyLevel> hierarchical_search(
     const SearchedViews& searched, const PackedSignature& query, double tolerance, int components,
     const std::function<bool(const VisualMemory::HierarchyLevel&)>& stop, const SearchMask& mask,

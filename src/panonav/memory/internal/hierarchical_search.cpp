@@ -31,10 +31,10 @@ class Hierarchy {
   std::vector<VisualMemory::HierarchyLevel> run(
       const std::function<bool(const VisualMemory::HierarchyLevel&)>& stop) {
     std::vector<VisualMemory::HierarchyLevel> levels;
-    start();
+    collect_initial_candidates();
     for (int m = 1; m <= comparison_.components() && !candidates_.empty(); ++m) {
       compare_component(m);
-      levels.push_back(level(m));
+      levels.push_back(make_level(m));
       if (stop && stop(levels.back())) break;
     }
     return levels;
@@ -43,7 +43,8 @@ class Hierarchy {
  private:
   [[nodiscard]] double limit() const { return (1.0 + tolerance_) * best_full_; }
 
-  /// `partial` is the candidate's sum over the first `compared` components.
+  /// Completes the distance of a candidate, whose `partial` is the sum over the first `compared`
+  /// components, and updates the best full distance.
   void compare_in_full(const Candidate& candidate, int compared) {
     const std::uint32_t rest =
         comparison_.partial_distance(candidate.row, compared, comparison_.components());
@@ -51,9 +52,9 @@ class Hierarchy {
     best_full_ = std::min(best_full_, static_cast<double>(candidate.partial) + rest);
   }
 
-  /// All views that the bounds of the first component leave, within a limit from the view whose
-  /// bounds over all components are best.
-  void start() {
+  /// Collects the views whose lower bound over the first component is within the limit. The limit
+  /// comes from the view with the smallest bound over all components, which is compared in full.
+  void collect_initial_candidates() {
     const SketchIndex& index = searched_.index;
     const auto keep_all_views = [this] {
       for (const Row row : searched_.rows) {
@@ -102,7 +103,7 @@ class Hierarchy {
                   [this](const Candidate& candidate) { return candidate.partial > limit(); });
   }
 
-  [[nodiscard]] VisualMemory::HierarchyLevel level(int m) const {
+  [[nodiscard]] VisualMemory::HierarchyLevel make_level(int m) const {
     VisualMemory::HierarchyLevel result;
     result.components = m;
     result.limit = limit();

@@ -31,7 +31,7 @@ void LinkSet::erase(ViewId a, ViewId b) {
   if (position < links_.size()) erase_at(position);
 }
 
-void LinkSet::erase_all_of(ViewId view) {
+void LinkSet::erase_links_of(ViewId view) {
   for (auto found = positions_.find(view); found != positions_.end();
        found = positions_.find(view)) {
     erase_at(found->second.back());
@@ -39,24 +39,24 @@ void LinkSet::erase_all_of(ViewId view) {
 }
 
 void LinkSet::erase_at(std::size_t position) {
-  forget(links_[position].a, position);
-  forget(links_[position].b, position);
+  remove_position(links_[position].a, position);
+  remove_position(links_[position].b, position);
   const std::size_t last = links_.size() - 1;
   if (position != last) {
-    renumber(links_[last].a, last, position);
-    renumber(links_[last].b, last, position);
+    replace_position(links_[last].a, last, position);
+    replace_position(links_[last].b, last, position);
     links_[position] = links_[last];
   }
   links_.pop_back();
 }
 
-void LinkSet::forget(ViewId view, std::size_t position) {
+void LinkSet::remove_position(ViewId view, std::size_t position) {
   const auto found = positions_.find(view);
   std::erase(found->second, position);
   if (found->second.empty()) positions_.erase(found);
 }
 
-void LinkSet::renumber(ViewId view, std::size_t from, std::size_t to) {
+void LinkSet::replace_position(ViewId view, std::size_t from, std::size_t to) {
   std::ranges::replace(positions_.at(view), from, to);
 }
 

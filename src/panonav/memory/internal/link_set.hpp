@@ -15,7 +15,7 @@ class LinkSet {
   void insert(const Link& link);
   /// Removes the link between the two, if there is one.
   void erase(ViewId a, ViewId b);
-  void erase_all_of(ViewId view);
+  void erase_links_of(ViewId view);
 
   [[nodiscard]] std::span<const Link> links() const noexcept { return links_; }
   /// Ascending.
@@ -24,11 +24,11 @@ class LinkSet {
  private:
   [[nodiscard]] std::size_t find(ViewId a, ViewId b) const;
   void erase_at(std::size_t position);
-  void forget(ViewId view, std::size_t position);
-  void renumber(ViewId view, std::size_t from, std::size_t to);
+  void remove_position(ViewId view, std::size_t position);
+  void replace_position(ViewId view, std::size_t from, std::size_t to);
 
   std::vector<Link> links_;
-  std::unordered_map<ViewId, std::vector<std::size_t>> positions_;  // in links_, of each view
+  std::unordered_map<ViewId, std::vector<std::size_t>> positions_;  // of each view's links
 };
 
 }  // namespace panonav

@@ -9,9 +9,9 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t group_bytes = 8;          // that an instruction sums at once
-constexpr std::size_t min_views_to_learn = 64;  // views, from which scales are learnt
-// Of a row without a view: raises its bound above every limit.
+constexpr std::size_t group_bytes = 8;          // summed by one instruction
+constexpr std::size_t min_views_to_learn = 64;  // smallest number of views
+// Slack of a row without a view, which raises its bound above every limit.
 constexpr std::int32_t no_slack = -static_cast<std::int32_t>(SketchIndex::no_view);
 
 std::size_t group_count(std::size_t dimensions) {
@@ -23,8 +23,7 @@ std::int32_t sum_bytes(const std::uint8_t* bytes, int count) {
   std::int32_t sum = 0;
   int i = 0;
   for (; i + 8 <= count; i += 8) {
-    // Eight bytes at once, added up in pairs; the product gathers the four pairs in the highest 16
-    // bits.
+    // Adds eight bytes at once in pairs; the product gathers the four pairs in the highest 16 bits.
     std::uint64_t eight = 0;
     std::memcpy(&eight, bytes + i, 8);
     constexpr std::uint64_t even = 0x00FF00FF00FF00FFU;
@@ -35,8 +34,8 @@ std::int32_t sum_bytes(const std::uint8_t* bytes, int count) {
   return sum;
 }
 
-/// Returns the codes nearest to the sums of one group, and the remainder. Bounds are valid for any
-/// code, so rounding of the float product does no harm.
+/// Writes the codes nearest to the sums of one group and returns the total rounding error. Bounds
+/// are valid for any code, so rounding of the float product does no harm.
 std::int32_t encode_group(const std::int32_t* sums, const std::int32_t* offsets,
                           std::uint64_t group_step, float inverse_step, std::uint8_t* codes) {
   const auto step = static_cast<std::int32_t>(group_step);
@@ -66,8 +65,9 @@ void set_scale(SketchScale& scale, std::vector<std::int32_t> lowest,
   }
 }
 
-/// A query in the codes of one segment. `values` has room for all groups.
-/// Where all views lie within the scale, what the query lies outside of it is part of the distance.
+/// Encodes a query with the scale of one segment. `values` must have room for all groups. If all
+/// views are within the scale (`covers`), the part of the query outside of it is added to every
+/// distance.
 void encode_query(const SketchScale& scale, bool covers, std::span<const std::int32_t> sums,
                   std::span<const std::uint8_t> mask, std::size_t groups, std::uint8_t* values,
                   kernels::DistanceKernels::SketchQuery& encoded) {
@@ -81,7 +81,7 @@ void encode_query(const SketchScale& scale, bool covers, std::span<const std::in
     for (std::size_t i = 0; i < group_bytes; ++i) {
       const std::size_t d = group * group_bytes + i;
       counts[i] = mask[d] != 0 ? 1 : 0;
-      // Dimensions that do not count become code 0 without loss.
+      // Dimensions that are not compared get code 0 without a rounding error.
       offsets[i] = counts[i] * scale.offsets[d];
       inside[i] = counts[i] * sums[d];
       if (covers) {
@@ -111,7 +111,7 @@ SketchLayout::SketchLayout(SignatureShape shape_) : shape(shape_) {
   if (shape.rows >= 3) coarse_blocks = shape.rows >= 6 ? 2 : 1;
   if (shape.rows >= 20) {
     fine_blocks = BlockSums::blocks_per_component;
-    // Views differ more in their low components, because the spectra of pictures fall.
+    // Views differ more in their low components, as the spectra of images fall with frequency.
     low_components = (shape.components + 2) / 3;
   }
   const auto components = static_cast<std::size_t>(shape.components);
@@ -146,7 +146,8 @@ void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) c
 }
 
 SketchIndex::Segment SketchIndex::make_segment() const {
-  // Until enough views are there to learn from, a scale that holds every possible sum.
+  // Starts with a scale that covers every possible sum, until there are enough views to learn a
+  // narrower one.
   BlockSums highest;
   layout_.sum_blocks(std::vector<std::uint8_t>(layout_.shape.size(), 255).data(), highest);
   Segment segment;
@@ -261,7 +262,7 @@ void SketchIndex::insert(const ViewStore& store, std::span<const Row> rows) {
     }
     for (const Row row : here) {
       Segment& segment = get_or_create_segment(row);
-      segment.coarse.slacks[row % rows_per_segment] = 0;  // there, to be encoded
+      segment.coarse.slacks[row % rows_per_segment] = 0;  // present; encoded by `learn_scales`
       ++segment.used;
     }
     learn_scales(segments_[number], number * rows_per_segment, store);

@@ -43,12 +43,13 @@ struct SketchLayout {
   [[nodiscard]] int first_row(int block, int blocks) const noexcept {
     return static_cast<int>(static_cast<std::int64_t>(block) * shape.rows / blocks);
   }
-  /// `magnitudes` component-major; writes into `sums`, whose vectors it sizes.
+  /// Computes the block sums of a view. `magnitudes`: component-major. Resizes the vectors of
+  /// `sums`.
   void sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) const;
 
   SignatureShape shape;
   int coarse_blocks = 0;   ///< blocks a component: 2, 1 or 0 (views too small to be sketched)
-  int low_components = 0;  ///< the first of them have twice as many coarse blocks
+  int low_components = 0;  ///< number of first components with twice as many coarse blocks
   int fine_blocks = 0;     ///< 8 or 0
   std::size_t coarse_groups = 0;
   std::size_t fine_groups = 0;  ///< a multiple of 8
@@ -66,10 +67,10 @@ struct SketchScale {
   std::vector<float> inverse_steps;
 };
 
-/// Block sums of all views of a store as bytes, in segments of 4096 rows with a scale each. Rows of
-/// a segment are encoded when they arrive; the scale is learnt again whenever a segment has grown
-/// fourfold, or when too many views fell outside, so that appending costs a constant number of
-/// encodings a view.
+/// Block sums of all views of a store as bytes, in segments of 4096 rows with a scale each. Rows
+/// are encoded when they are added. The scale of a segment is learnt from its first 64 views, and
+/// again when too many views are outside of it, so that appending costs a constant number of
+/// encodings per view.
 class SketchIndex {
  public:
   using Row = ViewStore::Row;
@@ -82,26 +83,28 @@ class SketchIndex {
 
   [[nodiscard]] const SketchLayout& layout() const noexcept { return layout_; }
 
-  /// Row `row` of the store holds a new view. Rows beyond the last come one by one.
+  /// Adds the new view in row `row` of the store. Rows beyond the last one must be added in order.
   void insert(const ViewStore& store, Row row);
   /// Inserts many rows at once: each segment's scale is learnt once, from all of its rows.
   void insert(const ViewStore& store, std::span<const Row> rows);
   void erase(Row row);
 
-  /// The part of a query that no segment changes: its block sums, and which of them count.
+  /// The part of a query that is the same for all segments: its block sums and the masks of the
+  /// compared ones.
   struct Query {
     BlockSums sums;
     std::vector<std::uint8_t> coarse_mask;  ///< per dimension 255 or 0, padded to groups
     std::vector<std::uint8_t> fine_mask;
-    std::size_t coarse_groups = 0;  ///< those with a dimension that counts lie below
+    std::size_t coarse_groups = 0;  ///< number of groups up to the last compared dimension
     std::size_t fine_groups = 0;    ///< a multiple of 8
   };
-  /// `allowed_rows` empty: all. A block counts when all its rows do.
+  /// Prepares a query. `allowed_rows` empty: all rows. A block is compared only if all its rows are
+  /// allowed.
   [[nodiscard]] Query make_query(const std::uint8_t* magnitudes, int components,
                                  std::span<const std::uint8_t> allowed_rows) const;
 
-  /// Lower bounds of all rows below `rows_end()` (rounded up to a block), and the smallest of each
-  /// block.
+  /// Computes lower bounds of the distances of all rows, rounded up to a block, and the smallest
+  /// bound of each block.
   void compute_coarse_bounds(const kernels::DistanceKernels& kernels, const Query& query,
                              std::span<std::uint32_t> bounds,
                              std::span<std::uint32_t> smallest) const;
@@ -111,7 +114,8 @@ class SketchIndex {
    public:
     FineBounds(const SketchIndex& index, const kernels::DistanceKernels& kernels,
                const Query& query);
-    /// bounds[i] is that of row `first` + places[i]. All of them lie in one segment.
+    /// Sets bounds[i] to the lower bound of row `first` + places[i]. All rows must be in one
+    /// segment.
     void operator()(Row first, std::span<const std::uint32_t> places, std::uint32_t* bounds);
     /// Bytes that one bound reads.
     [[nodiscard]] std::size_t bytes() const noexcept;
@@ -144,7 +148,7 @@ class SketchIndex {
     Level coarse, fine;
     std::size_t used = 0;
     std::size_t learnt_from = 0;  // views in the segment when the scales were learnt
-    std::size_t outside = 0;      // views since then that lay outside
+    std::size_t outside = 0;      // views added since then that are outside the scales
   };
 
   [[nodiscard]] Segment make_segment() const;

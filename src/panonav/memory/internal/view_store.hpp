@@ -10,8 +10,8 @@
 namespace panonav {
 
 /// Stores packed signatures in rows that do not move while they are in use, so that a memory grows
-/// without copying. Magnitudes start on 64-byte borders and are padded with zeros up to the next
-/// one. Freed rows are reused. Row numbers are below `rows_end()`.
+/// without copying. Magnitudes start at 64-byte boundaries and are padded with zeros up to the next
+/// boundary. Freed rows are reused. Row numbers are below `rows_end()`.
 class ViewStore {
  public:
   using Row = std::uint32_t;

@@ -27,13 +27,13 @@ Coherence sum_coherence(PairCoefficients& c, int k, std::size_t rows) {
   return sum;
 }
 
-/// Fits a Gaussian exp(-k^2 / (2 width^2)) to the coherences by least squares, up to a factor:
-/// noise lowers all coherences, distance the high ones first. Only the width is fitted, as one row
-/// says little about each frequency.
+/// Fits the width of a Gaussian exp(-k^2 / (2 width^2)) to the coherences by least squares, with a
+/// free factor: noise lowers all coherences, distance those of high frequencies first. The
+/// coherences themselves are not used, as a single row shows little about each frequency.
 PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
   PerFrequency best{};
   double best_gain = -std::numeric_limits<double>::infinity();
-  constexpr double min_width = 1.5;    // the first frequency counts four fifths
+  constexpr double min_width = 1.5;    // the first frequency has a weight of 0.8
   constexpr double width_step = 1.19;  // a quarter of an octave
   for (double width = min_width; width < 3.0 * highest; width *= width_step) {
     PerFrequency gaussian{};
@@ -59,7 +59,8 @@ PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
   return best;
 }
 
-/// Divides weights by amplitudes; their sum stays. `power`: the mean of the powers.
+/// Divides the weights by the amplitudes of the components and keeps the sum of the weights.
+/// `power`: mean of `powers`.
 void whiten_weights(PerFrequency& weights, const PerFrequency& powers, double power, int highest) {
   if (!(power > 0.0)) return;
   constexpr double noise_share = 0.02;  // of the mean power: weaker components are mostly noise
@@ -76,7 +77,8 @@ void whiten_weights(PerFrequency& weights, const PerFrequency& powers, double po
 
 }  // namespace
 
-PerFrequency weigh_components(PairCoefficients& coefficients, int highest, std::size_t rows) {
+PerFrequency compute_component_weights(PairCoefficients& coefficients, int highest,
+                                       std::size_t rows) {
   PerFrequency coherences{};
   PerFrequency powers{};
   double power = 0.0;
@@ -95,8 +97,8 @@ PerFrequency weigh_components(PairCoefficients& coefficients, int highest, std::
   return weights;
 }
 
-std::vector<float> weigh_rows(PairCoefficients& coefficients, int highest, std::size_t rows,
-                              const PerFrequency& weights) {
+std::vector<float> compute_row_weights(PairCoefficients& coefficients, int highest,
+                                       std::size_t rows, const PerFrequency& weights) {
   std::vector<double> common(rows);
   std::vector<double> home(rows);
   std::vector<double> current(rows);
@@ -112,7 +114,7 @@ std::vector<float> weigh_rows(PairCoefficients& coefficients, int highest, std::
       current[y] += weight * static_cast<double>(ca[y] * ca[y] + cb[y] * cb[y]);
     }
   }
-  constexpr double min_weight = 0.05;  // no row is left out, so that a bad compass can recover
+  constexpr double min_weight = 0.05;  // no row is left out completely
   std::vector<float> result(rows);
   for (std::size_t y = 0; y < rows; ++y) {
     const double max_correlation = std::sqrt(home[y]) * std::sqrt(current[y]);

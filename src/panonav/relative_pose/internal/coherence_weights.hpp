@@ -12,16 +12,16 @@ namespace panonav {
 /// A number for each frequency; entry 0 is not used.
 using PerFrequency = std::array<double, TurnCorrelation::max_frequencies + 1>;
 
-/// Weighs the components 1 .. highest by the coherence of both views at the present turn: a
-/// Gaussian as wide as the coherent components, over their amplitude. The power of views falls with
-/// about the square of the frequency [S06 section 4.5], so that without the amplitude the first few
-/// would decide alone. Residuals by unequal distances are a share of the power, those by pixels are
-/// equal for all frequencies: the amplitude is half way between the two.
-[[nodiscard]] PerFrequency weigh_components(PairCoefficients& coefficients, int highest,
-                                            std::size_t rows);
+/// Returns weights of the components 1 .. highest: a Gaussian fitted to the coherence of both views
+/// at the present turn, over the amplitude of each component. The power of views falls with about
+/// the square of the frequency [S06 section 4.5], so that without this division the first few
+/// components would decide alone. Residuals by unequal distances are a share of the power, and
+/// residuals by pixels are equal for all frequencies; the amplitude is half way between the two.
+[[nodiscard]] PerFrequency compute_component_weights(PairCoefficients& coefficients, int highest,
+                                                     std::size_t rows);
 
-/// Weighs rows by their coherence within the weighted components.
-[[nodiscard]] std::vector<float> weigh_rows(PairCoefficients& coefficients, int highest,
-                                            std::size_t rows, const PerFrequency& weights);
+/// Returns a weight for each row: the coherence of both views in it over the weighted components.
+[[nodiscard]] std::vector<float> compute_row_weights(PairCoefficients& coefficients, int highest,
+                                                     std::size_t rows, const PerFrequency& weights);
 
 }  // namespace panonav

@@ -17,17 +17,18 @@ namespace {
 /// Frequencies of the tables, 0 included.
 constexpr std::size_t size = max_displaced_frequencies + 1;
 
-/// Share by which displacements by one ring must differ less than none; by n rings n^2 times it.
-/// Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office (seed 901).
+/// Relative penalty on the difference of displacements at the first ring; at ring n it is n^2 times
+/// as large. Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office (seed
+/// 901).
 constexpr float far_penalty = 0.01F;
 
 double ring_radius(int ring) {
   return ring / 6.0;
 }
 
-/// The effect of a displacement straight ahead on cosines and on sines. The expected image is
-/// symmetrical about the direction of the displacement, so they do not mix. Row m, column k: the
-/// part of frequency k of the view in frequency m of the expected image.
+/// The effect of a displacement straight ahead on the cosine and on the sine coefficients. As the
+/// expected image is symmetric about the direction of the displacement, cosines and sines do not
+/// mix. Row m, column k: the part of frequency k of the view in frequency m of the expected image.
 struct DisplacementMatrix {
   std::array<float, size * size> cosines{};
   std::array<float, size * size> sines{};
@@ -42,7 +43,7 @@ struct Tables {
 
 // Integrates the matrix of a displacement by rho [S06 eq. 3].
 void fill_matrix(DisplacementMatrix& matrix, double rho) {
-  constexpr std::size_t points = 4 * size;  // exact for products of two frequencies, nearly
+  constexpr std::size_t points = 4 * size;  // nearly exact for products of two frequencies
   std::vector<float> from_cosine(points * size), from_sine(points * size);
   std::vector<float> to_cosine(points * size), to_sine(points * size);
   for (std::size_t i = 0; i < points; ++i) {
@@ -152,7 +153,8 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
   float min_difference = std::numeric_limits<float>::infinity();
   std::array<float, size> a;
   std::array<float, size> b;
-  const auto compared = static_cast<std::size_t>(std::min(frequencies, searched_frequencies)) + 1;
+  const auto compared =
+      static_cast<std::size_t>(std::min(frequencies, max_searched_frequencies)) + 1;
   float home_energy = 0.0F;
   for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row) {
     for (std::size_t k = 1; k < compared; ++k) {
@@ -194,12 +196,12 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
   return best;
 }
 
-DisplacementStart find_start(const HomingView& home, const HomingView& current, int known,
-                             const HeadingWindow& window) {
+DisplacementStart find_displacement_start(const HomingView& home, const HomingView& current,
+                                          int known, const HeadingWindow& window) {
   constexpr std::size_t max_bands = 8;
   const auto rows = static_cast<std::size_t>(home.rows());
   // Expected images need more frequencies of the current view than are compared.
-  const int frequencies = std::min(known, 2 * searched_frequencies);
+  const int frequencies = std::min(known, 2 * max_searched_frequencies);
   const std::size_t bands = std::min(max_bands, rows);
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
   std::vector<float> values(4 * bands * stride);

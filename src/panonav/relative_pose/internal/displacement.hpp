@@ -8,10 +8,10 @@
 
 namespace panonav {
 
-/// One of the displacements that are tried before the least squares: none, or one of twelve
-/// directions at a sixth, a third, a half or two thirds of R [S06 section 3 tries about 200 within
-/// two thirds]. Neighbours are at most a sixth of R apart, outwards, or 0.35 R, along the outermost
-/// ring: the least squares converge that far with the frequencies searched.
+/// A displacement that is tested before the least squares: none, or one of twelve directions at a
+/// sixth, a third, a half or two thirds of R [S06 section 3 tests about 200 within two thirds].
+/// Neighbours are at most R / 6 apart radially and 0.35 R along the outermost ring; with the
+/// searched frequencies the least squares converge over such distances.
 struct Displacement {
   static constexpr int rings = 4;
   static constexpr int directions = 12;
@@ -22,9 +22,9 @@ struct Displacement {
   [[nodiscard]] double direction_rad() const noexcept;
 };
 
-/// Frequencies that the search compares at most: half way between two rings, a twelfth of R, the
-/// phase of frequency 8 is off by at most 8 / 12, well within its linear range.
-inline constexpr int searched_frequencies = 8;
+/// Highest frequency that the search compares. Half way between two rings, R / 12 from each, its
+/// phase is off by at most 8 / 12 rad, well within the linear range.
+inline constexpr int max_searched_frequencies = 8;
 
 /// Highest frequency of `displace`.
 inline constexpr int max_displaced_frequencies = 63;
@@ -32,7 +32,7 @@ inline constexpr int max_displaced_frequencies = 63;
 /// Computes the coefficients of the expected image [S06 eq. 3, no turn] for one row: the view at
 /// the displacement when all things are at distance R. `from_a`, `from_b`: frequencies 0 ..
 /// from_a.size() - 1 of the current view; fills all of `to_a`, `to_b`. Frequency 0 does not change.
-/// Throws nothing. Cost: 2 from to multiplications.
+/// Throws nothing. Cost: 2 from_a.size() to_a.size() multiplications.
 void displace(Displacement displacement, std::span<const float> from_a,
               std::span<const float> from_b, std::span<float> to_a, std::span<float> to_b) noexcept;
 
@@ -43,10 +43,10 @@ struct BestDisplacement {
 };
 
 /// Finds the displacement whose expected image differs least from the home view at its best turn
-/// within the window: hs_ei [S06 section 2.2] in the Fourier domain; far ones must differ a little
-/// less than near ones. `rows` rows of `frequencies` + 1 coefficients each, one row after the
-/// other. Cost: for one row 49 expected images of 8 frequencies, about 15 microseconds; a fifth of
-/// that for each further row.
+/// within the window: hs_ei [S06 section 2.2] in the Fourier domain. Far displacements must differ
+/// a little less than near ones to be chosen. The views are `rows` rows of `frequencies` + 1
+/// coefficients each, row after row. Cost: for one row 49 expected images of 8 frequencies, about
+/// 15 microseconds; a fifth of that for each further row.
 [[nodiscard]] BestDisplacement find_displacement(std::span<const float> home_a,
                                                  std::span<const float> home_b,
                                                  std::span<const float> current_a,
@@ -56,15 +56,16 @@ struct BestDisplacement {
 /// The start of the least squares of two views, with the heading that fits there.
 struct DisplacementStart {
   Displacement displacement;
-  double ahead_rad = 0.0;  ///< origin of the displacement's direction
+  double ahead_rad = 0.0;  ///< azimuth from which the displacement's direction is measured
   double turn_rad = 0.0;   ///< heading of home minus heading of the current view
 };
 
-/// Finds the displacement between two views whose rows are averaged to a few bands: things move up
-/// or down by less than a band, and coarse structure decides. Directions are counted from the
-/// maximum of the first frequency of the current view, so that the robot's heading does not matter.
-/// `known`: the highest frequency that both have.
-[[nodiscard]] DisplacementStart find_start(const HomingView& home, const HomingView& current,
-                                           int known, const HeadingWindow& window);
+/// Finds the displacement between two views after averaging their rows to a few bands: things move
+/// up or down by less than a band, and coarse structure suffices. Directions are measured from the
+/// maximum of the first frequency of the current view, so that the result does not depend on the
+/// robot's heading. `known`: the highest frequency that both have.
+[[nodiscard]] DisplacementStart find_displacement_start(const HomingView& home,
+                                                        const HomingView& current, int known,
+                                                        const HeadingWindow& window);
 
 }  // namespace panonav

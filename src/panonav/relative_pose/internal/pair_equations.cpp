@@ -62,7 +62,7 @@ class ComponentRows {
   float frequency_;
 };
 
-// Adds that things off the horizon rise as the robot approaches.
+// Adds the vertical motion of things off the horizon as the robot approaches.
 RowSlopes add_approach(RowSlopes slopes, const RowRises& rises, float approach) noexcept {
   slopes.xa -= approach * rises.ra;
   slopes.xb -= approach * rises.rb;
@@ -168,7 +168,7 @@ PairEquations eliminate_tilt(PairEquations equations, const TiltEquations& tilt,
 // Solves by Cholesky's decomposition [S06 eq. 30].
 PairSolution solve(const PairEquations& equations) noexcept {
   const auto& m = equations.matrix;
-  // A pivot below this share of its own size is rounding.
+  // Smallest pivot as a share of its diagonal entry; smaller ones are rounding errors.
   constexpr double min_pivot = 1e-6;
   std::array<double, 3> d{};
   const double d0 = m[0];

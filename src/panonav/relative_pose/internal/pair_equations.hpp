@@ -23,7 +23,7 @@ class PairCoefficients {
   [[nodiscard]] float* home_b(int k) noexcept { return at(1, k); }
   [[nodiscard]] float* current_a(int k) noexcept { return at(2, k); }
   [[nodiscard]] float* current_b(int k) noexcept { return at(3, k); }
-  /// The view whose derivatives count.
+  /// The view whose derivatives are used: the current view or the mean of both.
   [[nodiscard]] float* middle_a(int k) noexcept { return at(4, k); }
   [[nodiscard]] float* middle_b(int k) noexcept { return at(5, k); }
   /// Its derivative by elevation.
@@ -60,8 +60,8 @@ struct PairEquations {
   void add(const PairEquations& other, double weight) noexcept;
 };
 
-/// The additional sums of a tilt in two directions, P and Q: PD Px Pe, QD Qx Qe, PP PQ QQ, right
-/// sides P Q.
+/// Additional sums for a tilt with two unknowns P and Q, in this order: products of P with heading,
+/// xi and eta; the same of Q; PP, PQ and QQ; right sides of P and Q.
 struct TiltEquations {
   std::array<double, 11> sums{};
 
@@ -71,13 +71,14 @@ struct TiltEquations {
 /// Sums the equations of component k over all rows [S06 eq. 17-20].
 [[nodiscard]] PairEquations sum_equations(PairCoefficients& coefficients, int k, std::size_t rows,
                                           const RowTerms& terms);
-/// Sums those of a tilt of the robot, which moves things up and down by P cos phi + Q sin phi, and
-/// those off the horizon to the side by tan(elevation) (P sin phi - Q cos phi).
+/// Sums the equations of a tilt of the robot for component k over all rows. A tilt moves things up
+/// or down by P cos phi + Q sin phi, and things off the horizon sideways by tan(elevation) (P sin
+/// phi - Q cos phi).
 [[nodiscard]] TiltEquations sum_tilt_equations(PairCoefficients& coefficients, int k,
                                                std::size_t rows, const RowTerms& terms);
 
-/// Eliminates the tilt from the normal equations. `certainty`: the inverse variance of the tilt, in
-/// units of that of an equation.
+/// Eliminates the tilt from the normal equations. `certainty`: variance of the residual of an
+/// equation over the expected variance of the tilt.
 [[nodiscard]] PairEquations eliminate_tilt(PairEquations equations, const TiltEquations& tilt,
                                            double certainty) noexcept;
 
@@ -86,7 +87,7 @@ struct PairSolution {
   double turn = 0.0;
   double xi = 0.0;
   double eta = 0.0;
-  double explained = 0.0;  ///< energy
+  double explained = 0.0;  ///< energy that the solution explains
   double variance = 0.0;   ///< of xi and eta, for unit variance of an equation
 };
 

@@ -20,8 +20,8 @@ void for_frequencies(int frequencies, double turn_rad, const Visit& visit) {
   }
 }
 
-/// Turns the coefficients of one row, frequencies 0 .. a.size() - 1, as a turn of the robot does
-/// [S06 eq. 6].
+/// Rotates the coefficients of one row, frequencies 0 .. a.size() - 1, as a turn of the robot by
+/// `turn_rad` does [S06 eq. 6].
 inline void turn_row(std::span<float> a, std::span<float> b, double turn_rad) {
   for_frequencies(static_cast<int>(a.size()), turn_rad, [&](int k, float cosine, float sine) {
     const float turned = a[k] * cosine + b[k] * sine;
