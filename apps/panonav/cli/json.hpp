@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "panonav/geometry/pose2.hpp"
+#include "panonav/memory/visual_memory.hpp"
 
 namespace panonav::command {
 
@@ -24,6 +25,11 @@ template <class Value>
 
 [[nodiscard]] inline ordered_json pose_json(const Pose2& pose) {
   return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
+}
+
+/// The heading is null if it is unknown.
+[[nodiscard]] inline ordered_json pose_json(const ReferencePose& pose) {
+  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", to_json_or_null(pose.heading_rad)}};
 }
 
 /// The document on one line. Bytes of names that are not UTF-8 become the replacement character

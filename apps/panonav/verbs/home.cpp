@@ -28,7 +28,7 @@ struct HomeArguments {
   std::optional<std::string> report;
 };
 
-ordered_json to_json(const std::string& goal, const HomeAnswer& answer) {
+ordered_json to_json(const HomeAnswer& answer, const std::string& goal) {
   const HomingResult& way = answer.way;
   const HomeVector& found = way.vector;
   const auto if_known = [&](double value) {
@@ -88,7 +88,7 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
       [&](std::size_t, HomeAnswer&& answer) {
         progress.clear();
         pointing += answer.way.direction_rad ? 1 : 0;
-        session.print(session.json() ? json_line(to_json(goal.name, answer))
+        session.print(session.json() ? json_line(to_json(answer, goal.name))
                                      : format_line(answer, session));
         answers.push_back(std::move(answer));
         progress.advance();

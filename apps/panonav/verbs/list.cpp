@@ -17,16 +17,13 @@ struct ListArguments {
 
 ordered_json to_json(const ViewRecord& record) {
   const auto& [view, info, links, thumbnail, component] = record;
-  ordered_json json{{"id", view.value},      {"name", info.name},
-                    {"pose", nullptr},       {"stamp_s", to_json_or_null(info.stamp_s)},
-                    {"links", links},        {"connected_component", to_json_or_null(component)},
-                    {"thumbnail", thumbnail}};
-  if (info.pose) {
-    json["pose"] = {{"x_m", info.pose->x_m},
-                    {"y_m", info.pose->y_m},
-                    {"heading_rad", to_json_or_null(info.pose->heading_rad)}};
-  }
-  return json;
+  return {{"id", view.value},
+          {"name", info.name},
+          {"pose", info.pose ? pose_json(*info.pose) : ordered_json()},
+          {"stamp_s", to_json_or_null(info.stamp_s)},
+          {"links", links},
+          {"connected_component", to_json_or_null(component)},
+          {"thumbnail", thumbnail}};
 }
 
 /// A column's title and its text for a view; empty: nothing.

@@ -140,7 +140,7 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
   ordered_json shown{{"memory", arguments.memory},
                      {"id", view.value},
                      {"name", info.name},
-                     {"pose", nullptr},
+                     {"pose", info.pose ? pose_json(*info.pose) : ordered_json()},
                      {"stamp_s", to_json_or_null(info.stamp_s)},
                      {"signature_bytes", 2 * file.header().shape.size()},
                      {"thumbnail", nullptr},
@@ -148,11 +148,6 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
                      {"similar", find_similar(memory, view)},
                      {"near", find_near(memory, view)},
                      {"maps", find_maps(file, view)}};
-  if (const auto& pose = info.pose) {
-    shown["pose"] = {{"x_m", pose->x_m},
-                     {"y_m", pose->y_m},
-                     {"heading_rad", to_json_or_null(pose->heading_rad)}};
-  }
   const auto bytes = file.thumbnail(view);
   if (!bytes && arguments.thumbnail) {
     throw FileError(arguments.memory,

@@ -100,12 +100,6 @@ ordered_json to_json(const TrackedImage& image) {
   const MonteCarloEstimate& estimate = image.estimate;
   auto modes = ordered_json::array();
   for (const PoseMode& mode : estimate.modes) modes.push_back(to_json(mode));
-  ordered_json truth;
-  if (image.truth) {
-    truth = {{"x_m", image.truth->x_m},
-             {"y_m", image.truth->y_m},
-             {"heading_rad", to_json_or_null(image.truth->heading_rad)}};
-  }
   return {{"file", image.file},
           {"stamp_s", to_json_or_null(image.stamp_s)},
           {"state", name_of(estimate.state)},
@@ -120,7 +114,7 @@ ordered_json to_json(const TrackedImage& image) {
           {"injected", estimate.injected},
           {"difference_here", to_json_or_null(estimate.difference_here)},
           {"difference_anywhere", to_json_or_null(estimate.difference_anywhere)},
-          {"ground_truth", std::move(truth)}};
+          {"ground_truth", image.truth ? pose_json(*image.truth) : ordered_json()}};
 }
 
 std::string format_position(const Pose2& pose) {
