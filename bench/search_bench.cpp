@@ -2,8 +2,6 @@
 // bench/search_bench.sh starts a server for it. Of the views 100,000 are rendered; the others are
 // made in places of 1000, each of two rendered runs of 1000 views that are mixed with one weight.
 // Such places are more like each other and like every query than rendered ones.
-#include <time.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -35,12 +33,6 @@ constexpr std::size_t batch = 10000;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double get_thread_cpu_time_s() {
-  timespec used{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
-  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
 }
 
 const ViewSet& rendered_views() {

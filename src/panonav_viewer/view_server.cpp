@@ -14,7 +14,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
-#include <span>
 #include <string_view>
 #include <thread>
 #include <utility>
