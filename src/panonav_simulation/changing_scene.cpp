@@ -38,11 +38,6 @@ bool is_movable(const Extent& extent) {
          extent.high_m[2] > 0.1 && extent.high_m[2] <= 3.0;
 }
 
-double distance_to_area_m(const FloorArea& area, Point2 at) {
-  return std::hypot(std::max({area.low.x_m - at.x_m, 0.0, at.x_m - area.high.x_m}),
-                    std::max({area.low.y_m - at.y_m, 0.0, at.y_m - area.high.y_m}));
-}
-
 }  // namespace
 
 ChangingScene::ChangingScene(Scene scene, std::uint64_t seed)

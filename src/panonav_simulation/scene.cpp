@@ -45,6 +45,12 @@ bool is_in_reach(const Vector3& point) noexcept {
   return within(point.x_m) && within(point.y_m) && within(point.z_m);
 }
 
+double distance_to_area_m(const FloorArea& area, Point2 point) {
+  const double dx_m = std::max({area.low.x_m - point.x_m, 0.0, point.x_m - area.high.x_m});
+  const double dy_m = std::max({area.low.y_m - point.y_m, 0.0, point.y_m - area.high.y_m});
+  return std::hypot(dx_m, dy_m);
+}
+
 void validate(const Scene& scene) {
   for (const Mesh& mesh : scene.meshes) validate_mesh(scene, mesh);
   for (const PointLight& light : scene.lights) {

@@ -67,6 +67,9 @@ struct FloorArea {
   friend bool operator==(const FloorArea&, const FloorArea&) = default;
 };
 
+/// Returns the distance of a point from the nearest point of the area in metres; 0 inside it.
+[[nodiscard]] double distance_to_area_m(const FloorArea& area, Point2 point);
+
 /// A world for the simulated robot. The robot may drive in `floor_low` .. `floor_high`, and there
 /// only in the `drivable` areas if there are any, less the places where a mesh below the robot's
 /// height stands within its radius (see `FreeSpace`).

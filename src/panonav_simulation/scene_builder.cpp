@@ -11,12 +11,6 @@ namespace panonav::simulation {
 namespace {
 
 // Returns the distance of a point from an area; 0 inside.
-double distance_to_area_m(const FloorArea& area, Point2 centre) {
-  const double dx = std::max({area.low.x_m - centre.x_m, 0.0, centre.x_m - area.high.x_m});
-  const double dy = std::max({area.low.y_m - centre.y_m, 0.0, centre.y_m - area.high.y_m});
-  return std::hypot(dx, dy);
-}
-
 bool is_inside(const FloorArea& area, Point2 centre, double margin_m) {
   return centre.x_m >= area.low.x_m + margin_m && centre.x_m <= area.high.x_m - margin_m &&
          centre.y_m >= area.low.y_m + margin_m && centre.y_m <= area.high.y_m - margin_m;
