@@ -350,22 +350,19 @@ TEST_F(MemoryFileAttack, MutatedChangesAreUndoneOrNamedInTime) {
   }
   run_sql(path, "PRAGMA journal_mode=DELETE");
   const std::string whole = bytes_of(path);
-  std::string changes;
+  std::string bytes;
   {
     sqlite3* database = nullptr;
     ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
-    sqlite3_exec(
-        database, "SELECT hex(changes) FROM history",
-        [](void* to, int, char** row, char**) {
-          *static_cast<std::string*>(to) = row[0];
-          return 0;
-        },
-        &changes, nullptr);
+    sqlite3_stmt* query = nullptr;
+    ASSERT_EQ(sqlite3_prepare_v2(database, "SELECT changes FROM history", -1, &query, nullptr),
+              SQLITE_OK);
+    ASSERT_EQ(sqlite3_step(query), SQLITE_ROW);
+    bytes.assign(static_cast<const char*>(sqlite3_column_blob(query, 0)),
+                 static_cast<std::size_t>(sqlite3_column_bytes(query, 0)));
+    EXPECT_EQ(sqlite3_step(query), SQLITE_DONE);
+    sqlite3_finalize(query);
     sqlite3_close(database);
-  }
-  std::string bytes;
-  for (std::size_t i = 0; i + 1 < changes.size(); i += 2) {
-    bytes += static_cast<char>(std::stoi(changes.substr(i, 2), nullptr, 16));
   }
   ASSERT_GT(bytes.size(), 500U);
   Random random(4);
