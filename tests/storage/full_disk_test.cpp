@@ -4,7 +4,6 @@
 #include <sched.h>
 #include <signal.h>
 #include <sys/mount.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -20,12 +19,6 @@ namespace panonav::testing {
 namespace {
 
 namespace fs = std::filesystem;
-
-// The view of that number, the same in every process.
-NewView view_number(int number) {
-  Random random(99, static_cast<std::uint64_t>(number));
-  return random_view(random, small_header().shape, number);
-}
 
 // A file system of its own with no free byte, where one may be mounted.
 class FullDisk : public MemoryFileTest {
@@ -55,7 +48,7 @@ class FullDisk : public MemoryFileTest {
       if (said != 0) return said;
       fs::remove(disk / "filler");  // with room again, it is read and changed as before
       MemoryFile file = MemoryFile::open(copy, Access::read_write);
-      file.append(view_number(77));
+      file.append(numbered_view(small_header().shape, 77));
       return file.verify().empty() ? 0 : 50;
     }));
   }
@@ -71,7 +64,7 @@ class FullDisk : public MemoryFileTest {
 TEST_F(FullDisk, AMemoryIsRead) {
   {
     MemoryFile file = MemoryFile::create(path, small_header());
-    for (int i = 0; i < 5; ++i) file.append(view_number(i));
+    for (int i = 0; i < 5; ++i) file.append(numbered_view(small_header().shape, i));
   }
   const int said = run_on_full_disk([](const fs::path& copy) { return read_all(copy, 5); });
   if (said == cannot_mount) GTEST_SKIP() << "no file system can be mounted here";
@@ -81,7 +74,7 @@ TEST_F(FullDisk, AMemoryIsRead) {
 TEST_F(FullDisk, AMemoryWithTheLogOfAKilledWriterIsRead) {
   EXPECT_EQ(exit_code_of(start_child([&] {
               MemoryFile file = MemoryFile::create(path, small_header());
-              for (int i = 0; i < 5; ++i) file.append(view_number(i));
+              for (int i = 0; i < 5; ++i) file.append(numbered_view(small_header().shape, i));
               ::kill(::getpid(), SIGKILL);
               return 0;
             })),

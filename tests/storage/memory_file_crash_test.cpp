@@ -21,12 +21,6 @@
 namespace panonav::testing {
 namespace {
 
-// The view of that number, the same in every process.
-NewView numbered_view(SignatureShape shape, int number) {
-  Random random(99, static_cast<std::uint64_t>(number));
-  return random_view(random, shape, number);
-}
-
 struct Acknowledgement {
   int number;
   std::uint32_t id;

@@ -37,6 +37,12 @@ inline NewView random_view(Random& random, SignatureShape shape, int number) {
   return view;
 }
 
+/// The view of that number, the same in every process.
+inline NewView numbered_view(SignatureShape shape, int number) {
+  Random random(99, static_cast<std::uint64_t>(number));
+  return random_view(random, shape, number);
+}
+
 inline MemoryHeader small_header() {
   MemoryHeader header;
   header.shape = {7, 5};
