@@ -313,10 +313,7 @@ TEST_F(SynchronisedMemory, AFullDiskOfTheFileLosesNothing) {
     const std::string message = message_of<FileError>([&] { (void)sync("b"); });
     return message.find((folder / "b").string() + ": cannot be ") == 0 ? 7 : 251;
   });
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 7);
+  EXPECT_EQ(exit_code_of(child), 7);
   EXPECT_TRUE(open("b").verify().empty());
   (void)sync("b");
   EXPECT_TRUE(is_same(content(folder / "b"), all));
