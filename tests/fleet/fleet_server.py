@@ -1,4 +1,4 @@
-"""Runs programs and a PostgreSQL server for tests; the script is called with PANONAV TEST_FLEET PANONAV_POSTGRESQL."""
+"""Runs programs and a PostgreSQL server for tests; the script is called with PANONAV_POSTGRESQL TEST_FLEET [PANONAV]."""
 import os
 import pathlib
 import re
@@ -7,11 +7,12 @@ import subprocess
 import sys
 import time
 
-PANONAV, TEST_FLEET, SERVER = sys.argv[1:4]
+SERVER, TEST_FLEET = sys.argv[1:3]
+PANONAV = sys.argv[3] if len(sys.argv) > 3 else None
 
 
-def run(*words, code=0, **more):
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120, **more)
+def run(*words, code=0, timeout=120, **more):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=timeout, **more)
     assert done.returncode == code, (words, done.returncode, done.stdout, done.stderr)
     return done.stdout
 

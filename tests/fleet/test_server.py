@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Memories on a PostgreSQL server: test_server.py PANONAV TEST_FLEET PANONAV_POSTGRESQL. One server for all, in a
-temporary folder. Exits with 77 (skipped) where there is no server program or panonav was built without libpq.
+"""Memories on a PostgreSQL server: test_server.py PANONAV_POSTGRESQL TEST_FLEET [PANONAV]. One server for all, in a
+temporary folder. Without PANONAV the tests of TEST_FLEET run on it, with PANONAV those of the verbs. Exits with 77
+(skipped) where there is no server program or panonav was built without libpq.
 """
 import json
 import os
@@ -392,9 +393,44 @@ def killed_server(server):
     run(PANONAV, "verify", address)
 
 
-def main():
+def storage(server):
+    """The tests of storage and of this component hold of memories on the server."""
+    tests = run(TEST_FLEET, f"--gtest_filter={SHARED}", timeout=None,
+                env=os.environ | {"PANONAV_TEST_SERVER": server.memory("x").replace("&memory=x", "")})
+    assert int(re.search(r"PASSED +\] (\d+)", tests)[1]) >= 20, tests
+
+
+def verbs(server, folder):
+    same_answers(server, folder)
+    print("same answers")
+    copies(server, folder)
+    print("copies")
+    served(server, folder)
+    print("served")
+    searched(server, folder)
+    print("searched")
+    stalled(server, folder)
+    roles(server, folder)
+    print("roles")
+    synchronised(server, folder)
+    print("synchronised")
+    other_schema(server)
+    print("other schema")
+    wrong_addresses(server, folder)
+    print("addresses")
+    encrypted(server, folder)
+    print("encrypted")
+    killed_server(server)
+    print("killed server")
+
+
+def is_built_without_postgresql():
     refusal = subprocess.run([PANONAV, "info", "postgresql:///d?memory=m&host=/nowhere"], capture_output=True, text=True)
-    if "built without PostgreSQL" in refusal.stderr:
+    return "built without PostgreSQL" in refusal.stderr
+
+
+def main():
+    if PANONAV and is_built_without_postgresql():
         print("skipped: built without PostgreSQL")
         return 77
     with tempfile.TemporaryDirectory() as name:
@@ -406,31 +442,10 @@ def main():
             return 77
         assert started.returncode == 0, started.stderr
         try:
-            same_answers(server, folder)
-            print("same answers")
-            tests = run(TEST_FLEET, f"--gtest_filter={SHARED}",
-                        env=os.environ | {"PANONAV_TEST_SERVER": server.memory("x").replace("&memory=x", "")})
-            assert int(re.search(r"PASSED +\] (\d+)", tests)[1]) >= 20, tests
-            print("storage tests")
-            copies(server, folder)
-            print("copies")
-            served(server, folder)
-            print("served")
-            searched(server, folder)
-            print("searched")
-            stalled(server, folder)
-            roles(server, folder)
-            print("roles")
-            synchronised(server, folder)
-            print("synchronised")
-            other_schema(server)
-            print("other schema")
-            wrong_addresses(server, folder)
-            print("addresses")
-            encrypted(server, folder)
-            print("encrypted")
-            killed_server(server)
-            print("killed server")
+            if PANONAV:
+                verbs(server, folder)
+            else:
+                storage(server)
         finally:
             server.stop()
     return 0
