@@ -160,11 +160,11 @@ function(panonav_module_tests name)
   panonav_add_suites(test_${name} PREFIX ${name} LABEL unit SOURCES ${sources})
 endfunction()
 
-# panonav_add_suites(PROGRAM PREFIX name LABEL label [COST cost] SOURCES files): one test PREFIX.SUITE for each test suite
+# panonav_add_suites(PROGRAM PREFIX name LABEL labels ... [COST cost] SOURCES files): one test PREFIX.SUITE for each test suite
 # of a test program, so that what a suite shares (a rendered scene, a memory) is made once. Those of a higher cost begin
 # first.
 function(panonav_add_suites program)
-  cmake_parse_arguments(ARG "" "PREFIX;LABEL;COST" "SOURCES" ${ARGN})
+  cmake_parse_arguments(ARG "" "PREFIX;COST" "LABEL;SOURCES" ${ARGN})
   if(NOT ARG_COST)
     set(ARG_COST 0)
   endif()
@@ -180,7 +180,7 @@ function(panonav_add_suites program)
     add_test(NAME ${ARG_PREFIX}.${suite} COMMAND ${program} "--gtest_filter=${suite}.*:*/${suite}.*")
     # A suite of which nothing ran, since what it needs is not there, counts as skipped; one that is not in the program
     # is a fault.
-    set_tests_properties(${ARG_PREFIX}.${suite} PROPERTIES LABELS ${ARG_LABEL} COST ${ARG_COST}
+    set_tests_properties(${ARG_PREFIX}.${suite} PROPERTIES LABELS "${ARG_LABEL}" COST ${ARG_COST}
       FAIL_REGULAR_EXPRESSION "from 0 test suites ran"
       SKIP_REGULAR_EXPRESSION "PASSED  . 0 tests\\.[\r\n]+(.  SKIPPED[^\r\n]*[\r\n]+)+$")
   endforeach()
