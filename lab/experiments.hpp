@@ -11,22 +11,23 @@
 
 namespace panonav::lab {
 
-/// The context of all experiments. Each experiment appends rows and writes images.
+/// Shared context of all experiments. An experiment appends its rows to `result` and writes its
+/// images to `result.out`.
 struct Experiments {
   const ReproductionOptions& options;
   Executor& executor;
   Reproduction& result;
 };
 
-/// A part of the experiments of a paper.
+/// One step of the reproduction of a paper.
 struct ReproductionStage {
-  double cost = 1.0;  ///< relative, for the progress
+  double cost = 1.0;  ///< relative, for the progress display
   std::function<void()> run;
 };
 using ReproductionPlan = std::vector<ReproductionStage>;
 
-// The stages of the papers that keep state between them; what `context` refers to must outlive
-// them. Throw ContractError on options out of range.
+// Plan the stages of the papers whose stages share state; the objects that `context` refers to must
+// outlive the plan. Throw ContractError on options out of range.
 [[nodiscard]] ReproductionPlan plan_m04(const Experiments& context);
 [[nodiscard]] ReproductionPlan plan_s06(const Experiments& context);
 
@@ -35,58 +36,59 @@ struct OptionMinimum {
   int value;
   int min;
 };
-/// Throws ContractError on the first value below its minimum.
+/// Throws ContractError on the first option whose value is below its minimum.
 void require_minima(std::initializer_list<OptionMinimum> options);
 
-/// The experiments of [F11], and those that its authors left to future work.
+/// The experiments of [F11], and those that its authors announced as future work.
 struct MappingExperiments : Experiments {
-  /// Figures 4 and 6 (a): 200 views 10 cm apart along the round trip of `loop`.
+  /// Reproduces figures 4 and 6 (a): 200 views 10 cm apart along the round trip of `loop`.
   void reproduce_first_set() const;
-  /// Figures 5 and 6 (b): 150 views captured by threshold in `lab`.
+  /// Reproduces figures 5 and 6 (b): 150 views captured by an image difference threshold in `lab`.
   void reproduce_second_set() const;
   /// Measures the time from a mirror image to a pose.
   void measure_step_time() const;
-  /// Places that look alike: closures in a corridor of identical doors.
+  /// Measures loop closures in a corridor of identical doors, where places look the same.
   void reproduce_identical_doors() const;
   /// Maps paths of 60 m with two loops in a Gazebo world of `options.data`.
   void reproduce_world(const std::string& name) const;
   /// Maps the recordings of `options.data`: a route outdoors, a walk through a building.
   void reproduce_recordings() const;
-  /// Measures time and memory at 100 views and at more, ten times each, up to `options.max_views`.
+  /// Measures time and memory of maps of 100, 1000, ... views, up to `options.max_views`.
   void measure_large_maps() const;
 
   /// Makes variant `number` of a built-in scene.
   [[nodiscard]] simulation::PlaceRecording make_variant(const std::string& scene, int number) const;
 };
 
-/// Missions over the memory: [M04] figure 18, maps of drives, tours, routes and blocked paths.
+/// Missions over a visual memory: [M04] figure 18, maps of drives, tours, routes and blocked paths.
 struct NavigationExperiments : Experiments {
-  /// [M04] figure 18: missions in a built-in scene whose references lie on a grid of `spacing_m`
-  /// and are arranged by their similarity alone.
+  /// Reproduces [M04] figure 18: missions in a built-in scene whose references lie on a grid of
+  /// `spacing_m` and are arranged by their similarity alone.
   void reproduce_grid_missions(const std::string& scene, double spacing_m) const;
-  /// Missions over maps of drives through a built-in scene, or a Gazebo world of `options.data`: as
-  /// remembered, in other light and with objects moved, and with a robot that is kidnapped.
+  /// Measures missions over maps of drives through a built-in scene or a Gazebo world of
+  /// `options.data`: in the unchanged scene, with changed light and moved objects, and with a robot
+  /// that is kidnapped.
   void reproduce_drive_missions(const std::string& scene) const;
-  /// Variants of `loop`: tours of five goals, among people too, and with all components of
-  /// signatures compared at each step instead of the first few in the open.
+  /// Measures tours of five goals in variants of `loop`: without and with people, and comparing all
+  /// signature components at each step, where the default in open space is the first few.
   void reproduce_tours() const;
-  /// Variants of `loop`: the same missions over the map of a drive with and without the route that
-  /// was recorded on it.
+  /// Measures the same missions in variants of `loop` over the map of a drive, with and without the
+  /// route that was recorded on it.
   void reproduce_route_missions() const;
-  /// Variants of `loop` with a way blocked that has a detour, and with two blocked so that there
-  /// is none.
+  /// Measures missions in variants of `loop` with one path blocked, which leaves a detour, and with
+  /// two blocked, which leaves none.
   void reproduce_blocked_missions() const;
 };
 
-/// The experiments of [Y03], and those that its author left to future work.
+/// The experiments of [Y03], and those that its author announced as future work.
 struct RouteExperiments : Experiments {
-  /// Reproduces section 5: drives across a straight path through `lab`, sweeps, time, the run to a
-  /// goal; figures 3, 5, 9 and 10.
+  /// Reproduces section 5 with figures 3, 5, 9 and 10: drives across a straight path through `lab`,
+  /// parameter sweeps, run times, and the run to a goal.
   void reproduce_lab_drives() const;
-  /// Measures routes of 60 m repeated forward and back in closed loop through variants of `loop`,
-  /// and how many bytes these routes take in a memory file.
+  /// Measures routes of 60 m through variants of `loop`, repeated forward and back in closed loop,
+  /// and the bytes that these routes need in a memory file.
   void reproduce_loop_routes() const;
-  /// Measures the same in a Gazebo world of `options.data`.
+  /// Measures the same as `reproduce_loop_routes` in a Gazebo world of `options.data`.
   void reproduce_world_routes(const std::string& name) const;
   /// Localises along a real route outdoors: `sussex_route` of `options.data`.
   void reproduce_real_route() const;

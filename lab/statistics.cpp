@@ -22,8 +22,8 @@ std::vector<double> compute_ranks(std::span<const double> values) {
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin;
     while (end < order.size() && values[order[end]] == values[order[begin]]) ++end;
-    const double shared = 0.5 * static_cast<double>(begin + end - 1);
-    for (std::size_t i = begin; i < end; ++i) result[order[i]] = shared;
+    const double shared_rank = 0.5 * static_cast<double>(begin + end - 1);
+    for (std::size_t i = begin; i < end; ++i) result[order[i]] = shared_rank;
     begin = end;
   }
   return result;
@@ -54,7 +54,7 @@ Proportion success_rate(std::size_t successes, std::size_t trials) {
   const double p = static_cast<double>(successes) / n;
   const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
   const double half = z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / (1.0 + z * z / n);
-  // At 0 or all successes one end of the interval is exact.
+  // With no success or with successes only, one end of the interval is exactly 0 or 1.
   return {p, successes == 0 ? 0.0 : std::max(0.0, centre - half),
           successes == trials ? 1.0 : std::min(1.0, centre + half)};
 }
@@ -83,7 +83,7 @@ double rank_correlation(std::span<const double> a, std::span<const double> b) {
     aa += (rank_a[i] - middle) * (rank_a[i] - middle);
     bb += (rank_b[i] - middle) * (rank_b[i] - middle);
   }
-  // One set without any spread has no ranks to correlate.
+  // A set of equal values has no rank order to correlate.
   return aa > 0.0 && bb > 0.0 ? ab / std::sqrt(aa * bb) : 0.0;
 }
 

@@ -15,20 +15,20 @@ namespace panonav::lab {
 
 namespace {
 
-// Expected views that are compared together: they and their products stay in the first cache.
-constexpr std::size_t block = 8;
+// Number of expected views compared at once, few enough that they and their products stay in the L1
+// cache.
+constexpr std::size_t positions_per_block = 8;
 
-// Largest distance of the positions, in units of R.
-constexpr double position_reach = 2.0 / 3.0;
+// Largest distance of the positions from (0, 0), in units of R.
+constexpr double max_position_distance = 2.0 / 3.0;
 
 struct LatticePoint {
   int x = 0;
   int y = 0;
-  [[nodiscard]] int square() const noexcept { return x * x + y * y; }
+  [[nodiscard]] int squared_norm() const noexcept { return x * x + y * y; }
 };
 
-// Returns points of the square lattice by their distance from (0, 0): more than `min_count` of
-// them.
+// Returns more than `min_count` points of the square lattice, sorted by their distance from (0, 0).
 std::vector<LatticePoint> make_lattice(int min_count) {
   const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(min_count)))) + 1;
   std::vector<LatticePoint> points;
@@ -37,7 +37,7 @@ std::vector<LatticePoint> make_lattice(int min_count) {
       if (x * x + y * y <= side * side) points.push_back({x, y});
     }
   }
-  std::ranges::stable_sort(points, {}, [](const LatticePoint& p) { return p.square(); });
+  std::ranges::stable_sort(points, {}, [](const LatticePoint& p) { return p.squared_norm(); });
   return points;
 }
 
@@ -54,15 +54,15 @@ ExpectedImageHoming::ExpectedImageHoming(int columns, int max_positions)
   require(columns >= 4 && columns <= 65536, "columns", columns, "4 .. 65536");
   require(max_positions >= 5 && max_positions <= 10000, "positions", max_positions, "5 .. 10000");
   const auto points = make_lattice(max_positions);
-  // Returns whole rings of points at equal distances, up to the reach.
+  // Keep only complete rings of points at equal distance, as many as `max_positions` allows.
   std::size_t count = 0;
   while (true) {
     std::size_t next = count;
-    while (points[next].square() == points[count].square()) ++next;
+    while (points[next].squared_norm() == points[count].squared_norm()) ++next;
     if (next > static_cast<std::size_t>(max_positions)) break;
     count = next;
   }
-  spacing_ = position_reach / std::sqrt(static_cast<double>(points[count].square()));
+  spacing_ = max_position_distance / std::sqrt(static_cast<double>(points[count].squared_norm()));
   const double pixels_per_radian = columns / (2.0 * std::numbers::pi);
   table_.reserve(count * static_cast<std::size_t>(columns));
   for (std::size_t p = 0; p < count; ++p) {
@@ -81,12 +81,12 @@ ExpectedImageHoming::ExpectedImageHoming(int columns, int max_positions)
 
 namespace {
 
-// A row around its mean, and its energy.
-struct FlatRow {
+// A row with its mean subtracted, and its energy (sum of squares).
+struct ZeroMeanRow {
   std::vector<float> values;
   double energy = 0.0;
 
-  explicit FlatRow(std::span<const float> row) {
+  explicit ZeroMeanRow(std::span<const float> row) {
     const double mean = compute_mean(row);
     for (const float value : row) {
       values.push_back(static_cast<float>(static_cast<double>(value) - mean));
@@ -95,10 +95,10 @@ struct FlatRow {
   }
 };
 
-// Puts the pixels that are seen from a position into `row`; returns their energy around their mean.
+// Writes the view expected from a position to `row`; returns its energy after subtracting its mean.
 float compute_expected_row(std::span<const float> flat, const std::uint16_t* seen, float* row) {
   const std::size_t columns = flat.size();
-  // Several sums side by side, so that one does not wait for the other.
+  // Four independent partial sums, so that no addition waits for another.
   std::array<float, 4> sums{};
   std::array<float, 4> squares{};
   std::size_t i = 0;
@@ -120,9 +120,9 @@ float compute_expected_row(std::span<const float> flat, const std::uint16_t* see
          sum * sum / static_cast<float>(columns);
 }
 
-// The position and turn at which the expected view is most like home.
-struct BestExpected {
-  double difference = 0.0;  // less the energy of the home view, which is the same for all
+// The position and rotation whose expected view is most similar to the home view.
+struct BestExpectedView {
+  double difference = 0.0;  // without the energy of the home view, which is the same for all
   std::size_t position = std::numeric_limits<std::size_t>::max();
   std::size_t turn = 0;
 };
@@ -143,21 +143,21 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
   require_row(current);
   const auto columns = static_cast<std::size_t>(columns_);
   const std::size_t stride = turn_products_stride(columns);
-  FlatRow periodic(home);
+  ZeroMeanRow periodic(home);
   for (std::size_t i = 0; i < stride; ++i) periodic.values.push_back(periodic.values[i]);
-  const FlatRow flat(current);
-  // Pixels are of the order of 1, so this is rounding.
+  const ZeroMeanRow flat(current);
+  // Pixel values are of the order of 1, so energies this small are rounding errors.
   if (!(periodic.energy * flat.energy > 1e-20)) return {};
-  std::vector<float> expected(block * columns);
-  std::vector<float> products(block * stride);
+  std::vector<float> expected(positions_per_block * columns);
+  std::vector<float> products(positions_per_block * stride);
   HomeVector vector;
-  BestExpected best;
-  for (std::size_t first = 0; first < positions_.size(); first += block) {
-    const std::size_t count = std::min(block, positions_.size() - first);
-    std::array<float, block> energies{};
-    std::array<float, block> largest{};
+  BestExpectedView best;
+  for (std::size_t first = 0; first < positions_.size(); first += positions_per_block) {
+    const std::size_t count = std::min(positions_per_block, positions_.size() - first);
+    std::array<float, positions_per_block> energies{};
+    std::array<float, positions_per_block> largest{};
     for (std::size_t p = 0; p < count; ++p) {
-      energies[p] = compute_expected_row(flat.values, pixels(first + p).data(),
+      energies[p] = compute_expected_row(flat.values, expected_pixel_indices(first + p).data(),
                                          expected.data() + p * columns);
     }
     turn_products(std::span(expected).first(count * columns), columns, periodic.values,
@@ -177,14 +177,14 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
       vector.residual = std::clamp((periodic.energy + difference) / energy, 0.0, 1.0);
     }
   }
-  // Value i of the turned home view is value i + turn of the home view [S06 eq. 8: i - s].
+  // The rotated home view shows value i + turn at i, [S06 eq. 8] value i - s; hence s = -turn.
   const std::size_t shift = (columns - best.turn) % columns;
   vector.xi = static_cast<double>(positions_[best.position].xi);
   vector.eta = static_cast<double>(positions_[best.position].eta);
   vector.heading_rad = wrap_angle(2.0 * std::numbers::pi * static_cast<double>(shift) / columns_);
-  const double square = vector.xi * vector.xi + vector.eta * vector.eta;
-  // The position may be anywhere in its square of the lattice.
-  vector.confidence = square / (square + spacing_ * spacing_ / 6.0);
+  const double squared_norm = vector.xi * vector.xi + vector.eta * vector.eta;
+  // The position is uniform in its lattice cell: its variance is spacing^2 / 6.
+  vector.confidence = squared_norm / (squared_norm + spacing_ * spacing_ / 6.0);
   vector.frequencies = columns_ / 2.0;
   return vector;
 }

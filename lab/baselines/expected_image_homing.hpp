@@ -8,12 +8,12 @@
 
 namespace panonav::lab {
 
-/// Homing by expected images (hs_ei, Franz et al. 1998), as [S06 section 2.2] tells it: what the
-/// current view, one row of pixels, would look like from P positions around it if all things were
-/// equally far [S06 eq. 9, nearest pixels from a table of P x N], compared with the home view at
-/// all N turns by whole pixels [S06 eq. 8]. The baseline for Fourier homing: nothing is left out
-/// and nothing approximated; only the sum of squared differences is written as energies less twice
-/// a correlation, which are computed for blocks of positions and turns at once.
+/// Homing by expected images (hs_ei, Franz et al. 1998), as described in [S06 section 2.2]:
+/// predicts the current view, one row of pixels, from P positions around the robot, assuming that
+/// all things are equally far [S06 eq. 9, nearest pixels from a table of P x N], and compares each
+/// prediction with the home view at all N rotations by whole pixels [S06 eq. 8]. The baseline for
+/// Fourier homing: an exact, exhaustive search. The sum of squared differences is computed as the
+/// energies minus twice a correlation, for blocks of positions and rotations at once.
 class ExpectedImageHoming {
  public:
   struct Position {
@@ -21,28 +21,31 @@ class ExpectedImageHoming {
     float eta = 0.0F;
   };
 
-  /// Prepares rows of `columns` pixels, with the positions of the finest square lattice around (0,
-  /// 0) that has at most `max_positions` within 2/3 R (200 gives 197): beyond R the image would
-  /// fold over. Throws ContractError unless 4 <= columns <= 65536 and 5 <= max_positions <= 10000.
+  /// Builds the table for rows of `columns` pixels and the positions of the finest square lattice
+  /// around (0, 0) that has at most `max_positions` points within 2/3 R (200 gives 197). R is the
+  /// assumed distance of all things; from positions beyond R the expected image would fold over.
+  /// Throws ContractError unless 4 <= columns <= 65536 and 5 <= max_positions <= 10000.
   explicit ExpectedImageHoming(int columns, int max_positions = 200);
 
   [[nodiscard]] int columns() const noexcept { return columns_; }
   /// Returns the positions in order of their distance from (0, 0).
   [[nodiscard]] std::span<const Position> positions() const noexcept { return positions_; }
-  /// Returns the side of a square of the lattice, in units of R.
+  /// Returns the distance between neighbouring lattice positions, in units of R.
   [[nodiscard]] double spacing() const noexcept { return spacing_; }
 
-  /// Returns the view from a position: entry i is the pixel of `current` that is seen at pixel i.
-  [[nodiscard]] std::span<const std::uint16_t> pixels(std::size_t position) const noexcept {
+  /// Returns the table row of a position: entry i is the pixel of `current` that pixel i of the
+  /// expected view shows.
+  [[nodiscard]] std::span<const std::uint16_t> expected_pixel_indices(
+      std::size_t position) const noexcept {
     return std::span(table_).subspan(position * static_cast<std::size_t>(columns_),
                                      static_cast<std::size_t>(columns_));
   }
 
   /// Conventions as `panonav::home_vector`. `residual` is the smallest sum of squared differences
-  /// over the energy of home and expected view; `confidence` knows the spacing of the positions
-  /// only. Of equal differences the position nearest to (0, 0) counts; views without structure give
-  /// zeros and residual 1. Throws ContractError unless both rows have `columns` finite values.
-  /// Safe to call from several threads. Cost: P N^2 multiplications and additions.
+  /// over the energy of home and expected view; `confidence` accounts for the spacing of the
+  /// positions only. Of equal differences the position nearest to (0, 0) wins; views without
+  /// structure give zeros and residual 1. Throws ContractError unless both rows have `columns`
+  /// finite values. Safe to call from several threads. Cost: P N^2 multiplications and additions.
   [[nodiscard]] HomeVector home_vector(std::span<const float> home,
                                        std::span<const float> current) const;
 

@@ -26,8 +26,8 @@ void require_references(const std::vector<RivalView>& references) {
   }
 }
 
-// Returns the index of the smallest value of `distance(i)`, the first of equals, without
-// `left_out`.
+// Returns the index of the smallest value of `distance(i)`, without `left_out`; the first one of
+// equal values.
 template <class Distance>
 std::size_t argmin(std::size_t count, std::optional<std::size_t> left_out,
                    const Distance& distance) {
@@ -45,7 +45,8 @@ std::size_t argmin(std::size_t count, std::optional<std::size_t> left_out,
   return *best;
 }
 
-// Compares a descriptor of each view: the nearest is the one of the smallest difference.
+// Recognises a place by one descriptor per view: the nearest reference is the one with the smallest
+// difference of descriptors.
 template <class Descriptor>
 class DescriptorRecogniser final : public RivalRecogniser {
  public:
@@ -122,7 +123,7 @@ Panorama rotate_to_zero_phase(const Panorama& view) {
     for (int y = 0; y < view.rows(); ++y) column += view.at(y, c);
     first += column * std::polar(1.0, -view.azimuth_rad(c));
   }
-  // I(phi) ~ cos(phi + psi) has its crest at phi = -psi, which is brought to column 0.
+  // I(phi) ~ cos(phi + psi) has its maximum at phi = -psi; the rotation brings it to column 0.
   const double columns_per_radian = view.columns() / (2.0 * std::numbers::pi);
   return rotate_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
 }
@@ -145,11 +146,12 @@ class EigenimageRecogniser final : public RivalRecogniser {
     }
     mean_ = views.rowwise().mean();
     views.colwise() -= mean_;
-    // Fewer views than pixels: the small matrix of inner products has the same eigenvectors.
+    // With fewer views than pixels, the small matrix of inner products gives the same eigenvectors
+    // at lower cost.
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> solver(views.transpose() * views);
-    const Eigen::Index kept = std::min<Eigen::Index>(dimensions_, count);
-    basis_ = views * solver.eigenvectors().rightCols(kept);
-    for (Eigen::Index k = 0; k < kept; ++k) {
+    const Eigen::Index component_count = std::min<Eigen::Index>(dimensions_, count);
+    basis_ = views * solver.eigenvectors().rightCols(component_count);
+    for (Eigen::Index k = 0; k < component_count; ++k) {
       const float length = basis_.col(k).norm();
       if (length > 0.0F) basis_.col(k) /= length;
     }
@@ -162,7 +164,8 @@ class EigenimageRecogniser final : public RivalRecogniser {
       return (coefficients_.col(static_cast<Eigen::Index>(i)) - coefficients).squaredNorm();
     });
   }
-  /// Returns the bytes of the coefficients and of this view's share of the eigenimages.
+  /// Returns the bytes of the coefficients of one view, plus the eigenimages divided by the number
+  /// of views.
   [[nodiscard]] double bytes_per_view() const override {
     if (coefficients_.cols() == 0) return 0.0;
     return 4.0 * static_cast<double>(coefficients_.rows()) +
@@ -181,9 +184,9 @@ class EigenimageRecogniser final : public RivalRecogniser {
   Eigen::MatrixXf coefficients_;
 };
 
-// Compares all pixels at all rotations by whole columns. The sum of squared differences over all
-// rotations comes from the full spectra, which takes seconds instead of hours.
-class Spectra {
+// Compares all pixels at all rotations by whole columns. The sums of squared differences for all
+// rotations come from the spectra, which takes seconds; pixel by pixel it would take hours.
+class RotationSpectra {
  public:
   struct Spectrum {
     Eigen::MatrixXcf rows;  // rows x frequencies 0 .. columns / 2
@@ -234,7 +237,8 @@ class Spectra {
   Eigen::MatrixXcf matrix_;  // columns x frequencies
 };
 
-// SeqSLAM's 64 x 32 pixels and patches of 8 x 8; a panorama is wider.
+// Size of the shrunk view and half the patch size in pixels: SeqSLAM uses 64 x 32 and patches of 8
+// x 8, but a panorama is wider.
 constexpr int small_columns = 128;
 constexpr int small_rows = 32;
 constexpr int half_patch = 4;
@@ -277,7 +281,7 @@ Panorama normalise_patches(const Panorama& view) {
       }
       const double mean = sum / count;
       const double deviation = std::sqrt(std::max(0.0, squares / count - mean * mean));
-      // A patch without structure has no direction of change.
+      // A patch without contrast is set to 0: dividing by its deviation would amplify noise.
       result.at(y, c) =
           deviation > 1e-3 ? static_cast<float>((small.at(y, c) - mean) / deviation) : 0.0F;
     }
@@ -315,7 +319,7 @@ std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
        [](const auto& signature) { return 2.0 * static_cast<double>(signature.shape().size()); }});
 }
 
-// Compares one histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
+// Compares one grey histogram of the whole view; Ulrich and Nourbakhsh use colour histograms.
 std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
   require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
   return make_recogniser<PixelValues>(
@@ -324,7 +328,8 @@ std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
        [](const PixelValues& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
 }
 
-// Compares colours, which need no phases and no unwarping, and do not depend on the heading.
+// Compares colour histograms, which need no phases and no unwarping and do not depend on the
+// heading.
 std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channel) {
   require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
           bins_per_channel, "2 .. 32");
@@ -349,8 +354,8 @@ std::unique_ptr<RivalRecogniser> zero_phase_recogniser() {
 }
 
 std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
-  const auto spectra = std::make_shared<Spectra>();
-  return make_recogniser<Spectra::Spectrum>(
+  const auto spectra = std::make_shared<RotationSpectra>();
+  return make_recogniser<RotationSpectra::Spectrum>(
       {"pixels over all turns",
        [=](const RivalView& view) { return spectra->spectrum(view.panorama); },
        [=](const auto& a, const auto& b) { return spectra->distance(a, b); },

@@ -10,23 +10,23 @@
 
 namespace panonav::lab {
 
-/// One view as the rivals may use it.
+/// One view in the forms that the rival methods need.
 struct RivalView {
   Panorama panorama;
-  /// The view as a colour image, for methods that use colour or finer pixels; one grey pixel
-  /// otherwise.
+  /// The view as a colour image, for methods that use colour or a finer resolution; a single grey
+  /// pixel if there is none.
   Image picture{1, 1, 1};
 };
 
-/// A way of recognising places that [M04] argues against, as a small and honest baseline on the
-/// same views.
+/// A place recognition method that [M04] argues against, implemented as a small, fair baseline on
+/// the same views.
 class RivalRecogniser {
  public:
   virtual ~RivalRecogniser() = default;
   [[nodiscard]] virtual std::string name() const = 0;
-  /// Called once with all reference views, of one shape.
+  /// Replaces the memory by these reference views, which must have one shape.
   virtual void memorise(const std::vector<RivalView>& references) = 0;
-  /// Returns the index of the nearest reference view but for the one that is left out.
+  /// Returns the index of the most similar reference view, without the one at `left_out`.
   [[nodiscard]] virtual std::size_t nearest(const RivalView& query,
                                             std::optional<std::size_t> left_out = {}) const = 0;
   [[nodiscard]] virtual double bytes_per_view() const = 0;
@@ -34,15 +34,16 @@ class RivalRecogniser {
 
 [[nodiscard]] std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components = 15);
 [[nodiscard]] std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins = 64);
-/// Compares one histogram of RGB colours over the whole view, bins_per_channel^3 bins. Memorising
-/// throws ContractError on a view without colour.
+/// Compares one histogram of RGB colours of the whole view, with bins_per_channel^3 bins.
+/// `memorise` throws ContractError on a view without colour.
 [[nodiscard]] std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(
     int bins_per_channel = 8);
 [[nodiscard]] std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions = 15);
 [[nodiscard]] std::unique_ptr<RivalRecogniser> zero_phase_recogniser();
 [[nodiscard]] std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser();
-/// Sums of absolute differences over all turns between small views whose pixels are normalised by
-/// mean and deviation of the patch around them, as SeqSLAM does [Milford and Wyeth 2012].
+/// Compares small views by the sum of absolute differences, minimised over all rotations; their
+/// pixels are normalised by mean and deviation of the patch around them, as SeqSLAM does [Milford
+/// and Wyeth 2012].
 [[nodiscard]] std::unique_ptr<RivalRecogniser> patch_normalised_recogniser();
 
 }  // namespace panonav::lab

@@ -8,16 +8,16 @@ namespace panonav::lab {
 
 namespace {
 
-/// Products of a row come in multiples of this many turns: the floats of the widest register.
-constexpr std::size_t turn_lanes = 16;
+/// Number of turns by which the products of a row are padded: the floats of the widest register.
+constexpr std::size_t padded_lanes = 16;
 
 template <int lanes>
 struct Lanes {
   typedef float Floats __attribute__((vector_size(4 * lanes), aligned(4)));
 };
 
-/// Correlates `row_count` rows at `vectors * lanes` turns from turn `t` on: all sums stay in
-/// registers, and each value that is loaded serves all rows or all turns.
+/// Correlates `row_count` rows at `vectors * lanes` turns from turn `t` on. All sums stay in
+/// registers; each loaded value is used for all rows or all turns.
 template <int lanes, int row_count, int vectors>
 [[gnu::always_inline]] inline void correlate_block(const float* rows, std::size_t columns,
                                                    const float* periodic, std::size_t t,
@@ -67,7 +67,8 @@ template <int lanes, int row_count, int vectors>
   }
 }
 
-/// `vectors`: as many as leave registers for the rows.
+/// Correlates all rows, four at a time. `vectors` is the largest number of turn registers that
+/// still leaves registers for the rows.
 template <int lanes, int vectors>
 [[gnu::always_inline]] inline void correlate_all(const float* rows, std::size_t count,
                                                  std::size_t columns, const float* periodic,
@@ -98,7 +99,8 @@ correlate_by_avx512(const float* rows, std::size_t count, std::size_t columns,
 }
 #endif
 
-/// Correlates with registers of four floats, which every processor has: ARM has 32 of them.
+/// Number of registers of four floats, which every processor has, for the turns; ARM has 32
+/// registers and x86 16.
 #if defined(__aarch64__)
 constexpr int vectors_of_four = 4;
 #else
@@ -112,7 +114,7 @@ void correlate_by_four(const float* rows, std::size_t count, std::size_t columns
 }  // namespace
 
 std::size_t turn_products_stride(std::size_t columns) noexcept {
-  return (columns + turn_lanes - 1) / turn_lanes * turn_lanes;
+  return (columns + padded_lanes - 1) / padded_lanes * padded_lanes;
 }
 
 void turn_products(std::span<const float> rows, std::size_t columns,

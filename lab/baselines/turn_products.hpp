@@ -7,7 +7,7 @@
 
 namespace panonav::lab {
 
-/// Returns how many products of one row `turn_products` writes: its columns, rounded up to a
+/// Returns the number of products that `turn_products` writes per row: `columns` rounded up to a
 /// multiple of 16.
 [[nodiscard]] std::size_t turn_products_stride(std::size_t columns) noexcept;
 
@@ -16,8 +16,8 @@ namespace panonav::lab {
 /// and writes the largest of each row. `periodic` holds columns + stride values, value i + columns
 /// the same as value i: turns from `columns` on repeat the first ones. Rounding: a few units of
 /// 1e-7 times the sum of the absolute terms. Throws ContractError on other sizes. Cost: rows *
-/// columns * stride multiplications and additions, in registers of `instructions`, so that the
-/// baseline is compared at the speed that this machine allows.
+/// columns * stride multiplications and additions, in registers of `instructions`; the baseline is
+/// as fast as this machine allows, so the comparison of run times is fair.
 void turn_products(std::span<const float> rows, std::size_t columns,
                    std::span<const float> periodic, std::span<float> products,
                    std::span<float> largest,

@@ -1,4 +1,5 @@
-// A place that changes day by day, with a memory that is kept true and with one that is not.
+// Localisation in a place that changes day by day: with a memory that is updated and with an
+// unchanged one.
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +29,7 @@ namespace {
 constexpr double spacing_m = 0.5;
 constexpr int rows = 40;
 constexpr int columns = 256;
-constexpr double moved_share = 0.03;
+constexpr double moved_fraction_per_day = 0.03;
 
 using FeatureMap = std::map<ViewId, std::optional<LocalFeatures>>;
 using Features = std::shared_ptr<const FeatureMap>;
@@ -42,7 +43,7 @@ Features extract_all_features(const simulation::PlaceRecording& place, const Vis
   return features;
 }
 
-/// A memory with all that localises in it and the features of its views.
+/// A memory with its localisers and the local features of its views.
 class RememberedPlace {
  public:
   RememberedPlace(VisualMemory memory, Features features)
@@ -67,9 +68,9 @@ class RememberedPlace {
   Localiser localiser_;
 };
 
-/// Records the memory again with the scene of that day.
-RememberedPlace record_again(simulation::PlaceRecording today, std::uint64_t seed,
-                             Executor& executor) {
+/// Records the memory again in the scene of `today`.
+RememberedPlace rerecord_memory(simulation::PlaceRecording today, std::uint64_t seed,
+                                Executor& executor) {
   std::vector<Pose2> grid;
   for (const auto& point : today.free_space->grid(spacing_m)) {
     grid.push_back({point.position.x_m, point.position.y_m, 0.0});
@@ -80,18 +81,18 @@ RememberedPlace record_again(simulation::PlaceRecording today, std::uint64_t see
   return {std::move(memory), features};
 }
 
-/// The daily path of a robot.
+/// The rule by which the robot chooses its goals of a day.
 enum class DailyDrive {
   errands,  ///< from one random place to the next
   rounds,   ///< to the least recently visited places, the nearest of them first
 };
 
-/// A robot that drives through a place day by day and takes a picture each spacing.
+/// A robot that drives through a place day by day and takes a picture every `spacing_m`.
 class DrivingRobot {
  public:
   explicit DrivingRobot(DailyDrive drive) : drive_(drive) {}
 
-  /// Returns the poses of the images of a day, which begins at a random place.
+  /// Returns the poses of one day's images; the day begins at a random position.
   std::vector<Pose2> simulate_day(const simulation::FreeSpace& space, int pictures,
                                   Random& random) {
     ++day_;
@@ -99,30 +100,31 @@ class DrivingRobot {
     if (drive_ == DailyDrive::rounds) grid = space.grid(spacing_m);
     std::vector<Pose2> path;
     Point2 at = space.random_pose(random).position();
-    double left_m = 0.0;  // to the next picture
+    double distance_to_picture_m = 0.0;  // distance to the next picture
     while (static_cast<int>(path.size()) < pictures) {
       Point2 goal = space.random_pose(random).position();
       if (drive_ == DailyDrive::rounds) {
         goal = find_least_recent(grid, at).value_or(goal);
-        passed_[grid_square(goal)] = day_;
+        last_visit_day_[grid_square(goal)] = day_;
       }
       const auto way = space.shortest_path(at, goal);
       if (!way) continue;
       for (const Point2 next : *way) {
         const double heading_rad = std::atan2(next.y_m - at.y_m, next.x_m - at.x_m);
         double leg_m = distance(at, next);
-        while (leg_m >= left_m && static_cast<int>(path.size()) < pictures) {
-          at = {at.x_m + left_m * std::cos(heading_rad), at.y_m + left_m * std::sin(heading_rad)};
-          leg_m -= left_m;
+        while (leg_m >= distance_to_picture_m && static_cast<int>(path.size()) < pictures) {
+          at = {at.x_m + distance_to_picture_m * std::cos(heading_rad),
+                at.y_m + distance_to_picture_m * std::sin(heading_rad)};
+          leg_m -= distance_to_picture_m;
           path.push_back({at.x_m, at.y_m, heading_rad});
           for (const simulation::GridPosition& place : grid) {
             if (distance(place.position, at) <= spacing_m) {
-              passed_[grid_square(place.position)] = day_;
+              last_visit_day_[grid_square(place.position)] = day_;
             }
           }
-          left_m = spacing_m;
+          distance_to_picture_m = spacing_m;
         }
-        left_m -= leg_m;
+        distance_to_picture_m -= leg_m;
         at = next;
       }
     }
@@ -134,15 +136,16 @@ class DrivingRobot {
   static Square grid_square(Point2 p) {
     return {std::lround(p.x_m / spacing_m), std::lround(p.y_m / spacing_m)};
   }
-  /// Returns the least recently visited place; nullopt where the robot is at the only place.
+  /// Returns the least recently visited grid position, the nearest of equal ones; nullopt if the
+  /// robot is at the only one.
   [[nodiscard]] std::optional<Point2> find_least_recent(
       const std::vector<simulation::GridPosition>& grid, Point2 at) const {
     std::optional<Point2> best;
     std::pair<int, double> best_rank;
     for (const simulation::GridPosition& place : grid) {
-      const auto found = passed_.find(grid_square(place.position));
+      const auto found = last_visit_day_.find(grid_square(place.position));
       const double distance_m = distance(place.position, at);
-      const std::pair rank(found == passed_.end() ? 0 : found->second, distance_m);
+      const std::pair rank(found == last_visit_day_.end() ? 0 : found->second, distance_m);
       if (distance_m < 0.5 * spacing_m || (best && best_rank <= rank)) continue;
       best = place.position;
       best_rank = rank;
@@ -152,22 +155,23 @@ class DrivingRobot {
 
   DailyDrive drive_;
   int day_ = 0;
-  std::map<Square, int> passed_;  ///< the day
+  std::map<Square, int> last_visit_day_;  ///< day of the last visit
 };
 
-/// Positions of known places: within one spacing of the truth (right) or not.
-struct DayAnswers {
+/// Answers that recognise the place, with a position within one spacing of the truth (right) or
+/// farther off (wrong).
+struct DayResult {
   std::size_t right = 0;
   std::size_t wrong = 0;
   std::vector<double> errors_m;
 };
 
-DayAnswers ask(const RememberedPlace& remembered, const std::vector<simulation::PlacedView>& views,
-               Executor& executor) {
+DayResult localise_all(const RememberedPlace& remembered,
+                       const std::vector<simulation::PlacedView>& views, Executor& executor) {
   const auto answers = simulation::make_each(executor, views.size(), [&](std::size_t i) {
     return remembered.localise(views[i].panorama);
   });
-  DayAnswers result;
+  DayResult result;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!answers[i].known || !answers[i].position) continue;
     const double error_m = distance(answers[i].position->position(), views[i].pose.position());
@@ -177,8 +181,9 @@ DayAnswers ask(const RememberedPlace& remembered, const std::vector<simulation::
   return result;
 }
 
-MemoryUpdate::AnsweredView make_run_view(const Pose2& odometry, const PackedSignature& signature,
-                                         const Place& answer) {
+MemoryUpdate::AnsweredView make_answered_view(const Pose2& odometry,
+                                              const PackedSignature& signature,
+                                              const Place& answer) {
   MemoryUpdate::AnsweredView view{odometry, signature, answer.known_probability, std::nullopt,
                                   std::nullopt};
   if (answer.position && answer.heading_rad) {
@@ -200,7 +205,7 @@ class LearningRobot {
   [[nodiscard]] std::size_t views() const noexcept { return memory_.size(); }
   [[nodiscard]] std::size_t added() const noexcept { return errors_m_.size(); }
   [[nodiscard]] std::size_t dropped() const noexcept { return dropped_; }
-  /// Returns the errors of the poses of learnt views, in metres.
+  /// Returns the position errors of the learnt views, in metres.
   [[nodiscard]] const std::vector<double>& errors_m() const noexcept { return errors_m_; }
 
   void learn(const std::vector<simulation::PlacedView>& seen, std::uint64_t seed,
@@ -214,7 +219,7 @@ class LearningRobot {
     for (std::size_t i = 0; i < seen.size(); ++i) {
       if (i > 0) odometry.advance(inverse(seen[i - 1].pose) * seen[i].pose);
       signatures.push_back(compute_packed_signature(seen[i].panorama, memory_));
-      update.add(make_run_view(odometry.pose(), signatures.back(), answers[i]));
+      update.add(make_answered_view(odometry.pose(), signatures.back(), answers[i]));
     }
     MemoryUpdate::Changes changes = update.finish();
     use_ = std::move(changes.use);
@@ -243,18 +248,18 @@ class LearningRobot {
   std::size_t dropped_ = 0;
 };
 
-/// A robot that learns on its daily drives.
+/// A robot that updates its memory on its daily drives.
 struct DailyRobot {
   std::string id;
   std::string what;
   DrivingRobot driving;
   LearningRobot learning;
   std::size_t max_views;
-  DayAnswers answers{};
+  DayResult answers{};
   viewer::Series series{};
 };
 
-/// A place over the days: an unchanged memory, robots that learn, and a memory that is recorded
+/// One experiment over many days with an unchanged memory, learning robots, and a memory recorded
 /// again on the last day.
 class Days {
  public:
@@ -262,7 +267,7 @@ class Days {
       : elsewhere_(elsewhere),
         options_(elsewhere.options),
         name_(name),
-        place_(simulation::record_place(first_scene(),
+        place_(simulation::record_place(make_first_scene(),
                                         {.seed = options_.seed,
                                          .spacing_m = spacing_m,
                                          .queries = 1,
@@ -282,14 +287,15 @@ class Days {
     }
   }
 
-  void pass_all() {
+  void run_days() {
     Random light(options_.seed, 91);
-    const int asked_every = std::max(1, options_.days / 6);
+    const int evaluated_every = std::max(1, options_.days / 6);
     for (int day = 1; day <= options_.days; ++day) {
-      changing_.simulate_day(moved_share);
-      const simulation::PlaceRecording today = place_today(light.uniform(0.6, 1.2));
+      changing_.simulate_day(moved_fraction_per_day);
+      const simulation::PlaceRecording today = make_place_today(light.uniform(0.6, 1.2));
       const std::uint64_t seed = options_.seed * 1000003U + static_cast<std::uint64_t>(day) * 1000U;
-      if (day == 1 || day % asked_every == 0 || day == options_.days) ask_all(today, day, seed);
+      if (day == 1 || day % evaluated_every == 0 || day == options_.days)
+        evaluate_day(today, day, seed);
       if (day == options_.days) break;
       for (DailyRobot& robot : robots_) {
         Random driving(seed, 5);
@@ -331,7 +337,7 @@ class Days {
   }
 
  private:
-  [[nodiscard]] simulation::Scene first_scene() const {
+  [[nodiscard]] simulation::Scene make_first_scene() const {
     simulation::Scene scene =
         simulation::make_or_read_scene(options_.data, name_, {.seed = options_.seed});
     scene.name = name_;
@@ -342,28 +348,29 @@ class Days {
     return static_cast<std::size_t>(3 * options_.queries);
   }
 
-  [[nodiscard]] simulation::PlaceRecording place_today(double light) const {
+  [[nodiscard]] simulation::PlaceRecording make_place_today(double light) const {
     simulation::PlaceRecording today = place_;
     static_cast<simulation::SimulatedPlace&>(today) =
         simulation::make_place(changing_.scene(light), executor());
     return today;
   }
 
-  void ask_all(const simulation::PlaceRecording& today, int day, std::uint64_t seed) {
+  void evaluate_day(const simulation::PlaceRecording& today, int day, std::uint64_t seed) {
     Random random(seed, 6);
     std::vector<Pose2> poses;
     for (std::size_t q = 0; q < query_count(); ++q)
       poses.push_back(today.free_space->random_pose(random));
     const auto queries =
         simulation::take_views(today, place_.rendering, poses, seed + 500, {}, executor());
-    without_ = ask(unchanged_, queries, executor());
+    without_ = localise_all(unchanged_, queries, executor());
     add_point(without_learning_, day, success_rate(without_.right, query_count()));
     for (DailyRobot& robot : robots_) {
-      robot.answers = ask(robot.learning.remembered(), queries, executor());
+      robot.answers = localise_all(robot.learning.remembered(), queries, executor());
       add_point(robot.series, day, success_rate(robot.answers.right, query_count()));
     }
     if (day == options_.days) {
-      rerecorded_ = ask(record_again(today, seed + 50'000, executor()), queries, executor());
+      rerecorded_ =
+          localise_all(rerecord_memory(today, seed + 50'000, executor()), queries, executor());
     }
   }
 
@@ -399,15 +406,15 @@ class Days {
   RememberedPlace unchanged_;
   std::vector<DailyRobot> robots_;
   viewer::Series without_learning_{.label = "without learning"};
-  DayAnswers without_;
-  DayAnswers rerecorded_;
+  DayResult without_;
+  DayResult rerecorded_;
 };
 
 }  // namespace
 
 void ElsewhereExperiments::reproduce_days(const std::string& place) {
   Days days(*this, place);
-  days.pass_all();
+  days.run_days();
   days.report();
 }
 

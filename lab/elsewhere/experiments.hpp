@@ -20,29 +20,33 @@ struct RecordedGround {
 
 /// Experiments in scenes, worlds and recordings that were not used for development.
 struct ElsewhereExperiments : Experiments {
-  std::vector<RecordedGround> grounds{};  ///< that the next three experiments compare
+  std::vector<RecordedGround> grounds{};  ///< compared by the next three experiments
 
   /// Returns the built-in scenes of the options and the worlds that exist in `options.data`.
   [[nodiscard]] std::vector<std::string> list_ground_names() const;
   void record_ground(const std::string& name);
 
-  /// Measures recognised own places, foreign places recognised as own, and the 95 % radius.
+  /// Measures how many own places are recognised, how many foreign places are mistaken for own
+  /// ones, and how many positions are within the stated 95 % radius.
   void reproduce_known_places();
-  /// Measures the covariance of poses that tracking reports as localised.
+  /// Measures how well the covariance of tracked poses that are reported as localised fits their
+  /// errors.
   void reproduce_tracked_poses();
-  /// Measures home vectors between views of one ground, of two, and between noise.
+  /// Measures home vectors between two views of one ground, between views of two grounds, and
+  /// between noise images.
   void reproduce_home_vectors();
-  /// Measures runs home of a robot that tilts.
+  /// Measures homing runs of a robot that tilts.
   void reproduce_tilted_homing();
-  /// Arranges views of a world on a grid of `spacing_m` by their similarity alone, and runs
-  /// missions over the arrangement.
+  /// Arranges views of a world on a grid of `spacing_m` by their similarity alone (without
+  /// positions), and runs missions over this map.
   void reproduce_floor(const std::string& world, double spacing_m);
-  /// Localises in a place whose furniture and light change for days, with and without learning.
+  /// Measures localisation in a place whose furniture and light change daily, with and without
+  /// updates of the memory.
   void reproduce_days(const std::string& place);
-  /// Merges the memories of two walks, through one place and through two places.
+  /// Merges the memories of two walks, both through one place or through different places.
   void reproduce_merging();
-  /// Localises each rotated image of a recording (the folder of a data set) in the memory of all
-  /// others: by panonav, by the built-in rivals and by `rivals`.
+  /// Localises each image of a recording (a data set's folder), rotated at random, in the memory of
+  /// all other images: by panonav, the built-in rival methods and `rivals`.
   void reproduce_leave_one_out(const std::filesystem::path& recording,
                                std::vector<std::unique_ptr<RivalRecogniser>> rivals = {});
 };

@@ -1,4 +1,4 @@
-// Whole floors, arranged by the similarity of their views alone.
+// Maps of whole floors, arranged by the similarity of their views alone.
 
 #include <algorithm>
 #include <cmath>
@@ -21,16 +21,16 @@ namespace panonav::lab {
 
 namespace {
 
-/// Missions over an arranged floor.
+/// Results of the missions over an arranged floor.
 struct FloorMissions {
   std::size_t arrived = 0;
-  std::size_t wrongly = 0;         // say that they arrived, but are elsewhere
-  std::size_t within = 0;          // from the largest component to a view in it
-  std::size_t arrived_within = 0;  // of these
+  std::size_t falsely_arrived = 0;        // report an arrival, but are elsewhere
+  std::size_t missions_in_component = 0;  // start and goal in the largest component
+  std::size_t arrived_in_component = 0;   // arrived, with both in it
   std::map<NavigationDecision::State, std::size_t> ends;
 };
 
-// True if the view nearest to the position is in the largest component.
+// True if the view nearest to `position` is in the largest component of the map.
 bool is_in_largest_component(const simulation::RememberedPlace& remembered,
                              const Point2& position) {
   const auto nearest = std::ranges::min_element(
@@ -44,17 +44,18 @@ FloorMissions count_missions(const simulation::RememberedPlace& remembered,
                              const std::vector<simulation::MissionRun>& runs, double spacing_m) {
   FloorMissions count;
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const bool arrives = runs[i].arrives(0.5 * spacing_m);
-    count.arrived += arrives ? 1 : 0;
-    count.wrongly += !arrives && runs[i].end == NavigationDecision::State::arrived ? 1 : 0;
+    const bool has_arrived = runs[i].has_arrived(0.5 * spacing_m);
+    count.arrived += has_arrived ? 1 : 0;
+    count.falsely_arrived +=
+        !has_arrived && runs[i].end == NavigationDecision::State::arrived ? 1 : 0;
     ++count.ends[runs[i].end];
     const Pose2& goal = remembered.truth[remembered.graph.node_of(missions[i].goal).value()];
     if (!is_in_largest_component(remembered, goal.position()) ||
         !is_in_largest_component(remembered, missions[i].start.position())) {
       continue;
     }
-    ++count.within;
-    count.arrived_within += arrives ? 1 : 0;
+    ++count.missions_in_component;
+    count.arrived_in_component += has_arrived ? 1 : 0;
   }
   return count;
 }
@@ -63,7 +64,7 @@ FloorMissions count_missions(const simulation::RememberedPlace& remembered,
 
 void ElsewhereExperiments::reproduce_floor(const std::string& world, double spacing_m) {
   const simulation::MissionPlace place =
-      simulation::make_mission_place(simulation::read_world(options.data, world), executor);
+      simulation::make_mission_place(simulation::read_gazebo_world(options.data, world), executor);
   const simulation::RememberedPlace remembered =
       simulation::memorise_grid(place, spacing_m, Random(options.seed, 1).next(), executor);
   const std::size_t views = remembered.truth.size();
@@ -92,10 +93,10 @@ void ElsewhereExperiments::reproduce_floor(const std::string& world, double spac
   const FloorMissions count = count_missions(remembered, missions, runs, spacing_m);
   add_rate(result, id + ".missions", what + ": missions that arrive within half the spacing",
            count.arrived, runs.size(), at_least(0.95));
-  result.rows.back().reason = simulation::explain_other_ends(count.ends, count.wrongly) +
-                              "; of the " + std::to_string(count.within) +
+  result.rows.back().reason = simulation::explain_other_ends(count.ends, count.falsely_arrived) +
+                              "; of the " + std::to_string(count.missions_in_component) +
                               " missions from the largest component to a view in it, " +
-                              std::to_string(count.arrived_within) + " arrive";
+                              std::to_string(count.arrived_in_component) + " arrive";
   std::vector<viewer::MapLayer> layers = viewer::scene_layers(place.scene);
   layers.push_back({.label = "where the views were taken", .dots = truth});
   layers.push_back({.label = "arranged, after the best rotation and scale",

@@ -1,4 +1,4 @@
-// Home vectors where there is a way home, and where there is none.
+// Home vectors where home can be reached from the current view, and where it cannot.
 
 #include <algorithm>
 #include <array>
@@ -23,9 +23,9 @@ namespace panonav::lab {
 namespace {
 
 constexpr double homing_radius_m = 1.5;
-constexpr double arrived_m = 0.1;
+constexpr double arrival_radius_m = 0.1;
 
-/// A home vector between two views of one place.
+/// Result of a home vector between two views of one place.
 struct HomeAnswer {
   std::optional<double> direction_error_rad;  ///< nullopt: no direction
   double probability = 0.0;
@@ -60,7 +60,7 @@ HomeAnswer find_home(const simulation::PlacedView& goal, const simulation::Place
 }
 
 /// Makes white noise, smoothed along columns so that neighbouring pixels are similar.
-Panorama make_noise(int rows, int columns, int smoothed, std::uint64_t seed) {
+Panorama make_noise(int rows, int columns, int smoothing_columns, std::uint64_t seed) {
   Random random(seed, 5);
   Panorama view(rows, columns, ElevationBand{radians(-30.0), radians(40.0)});
   std::vector<double> line(static_cast<std::size_t>(columns));
@@ -68,10 +68,10 @@ Panorama make_noise(int rows, int columns, int smoothed, std::uint64_t seed) {
     for (double& value : line) value = random.uniform(0.0, 1.0);
     for (int c = 0; c < columns; ++c) {
       double sum = 0.0;
-      for (int i = 0; i < smoothed; ++i) {
+      for (int i = 0; i < smoothing_columns; ++i) {
         sum += line[static_cast<std::size_t>((c + i) % columns)];
       }
-      view.at(y, c) = static_cast<float>(sum / smoothed);
+      view.at(y, c) = static_cast<float>(sum / smoothing_columns);
     }
   }
   return view;
@@ -84,14 +84,15 @@ std::vector<const simulation::PlacedView*> collect_views(const simulation::Place
   return views;
 }
 
-/// Summarises the runs that do not end at home, next to the number of level robots that do.
+/// Describes how the runs that do not reach home end, and how many runs of a level robot reach
+/// home.
 std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t level_home) {
   std::size_t others = 0;
   std::size_t away = 0;
   std::size_t alike = 0;
   std::size_t wrongly = 0;
   for (const HomingRun& run : runs) {
-    if (run.is_success(arrived_m)) continue;
+    if (run.is_success(arrival_radius_m)) continue;
     ++others;
     const double first_rad = run.vectors.front().direction_rad();
     away += direction_error_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
@@ -106,17 +107,17 @@ std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t lev
          std::to_string(wrongly) + " say that they arrived";
 }
 
-/// Adds how many of the answers have a direction. `Answer`: HomeAnswer or HomingResult.
+/// Adds the rate of answers that have a direction. `Answer` is HomeAnswer or HomingResult.
 template <class Answer>
-void add_answers(Reproduction& result, const std::string& id, const std::string& what,
-                 const std::vector<Answer>& answers, std::optional<Target> target) {
+void add_direction_rate(Reproduction& result, const std::string& id, const std::string& what,
+                        const std::vector<Answer>& answers, std::optional<Target> target) {
   add_rate(result, id, what,
            count_where(answers, [](const Answer& answer) { return has_direction(answer); }),
            answers.size(), target);
 }
 
-/// Distances between two views.
-struct Range {
+/// A range of distances between two views.
+struct DistanceRange {
   std::string id;
   double low_m;
   double high_m;
@@ -135,9 +136,9 @@ class HomeVectors {
   explicit HomeVectors(ElsewhereExperiments& elsewhere)
       : elsewhere_(elsewhere),
         random_(elsewhere.options.seed, 11),
-        pairs_(static_cast<std::size_t>(elsewhere.options.queries)) {}
+        pair_count_(static_cast<std::size_t>(elsewhere.options.queries)) {}
 
-  void answer_pairs_within(const Range& range) {
+  void measure_pairs_within(const DistanceRange& range) {
     const auto pairs = sample_pairs(range);
     const auto answers = simulation::make_each(
         elsewhere_.executor, pairs.size(),
@@ -148,8 +149,8 @@ class HomeVectors {
       const bool is_right =
           answers[i].direction_error_rad.value_or(std::numbers::pi) <= radians(45.0);
       if (has_direction(answers[i]) && answers[i].probability >= 0.9) {
-        ++sure_;
-        surely_right_ += is_right ? 1 : 0;
+        ++confident_;
+        confident_right_ += is_right ? 1 : 0;
       }
       if (!has_direction(answers[i]) || is_right) continue;
       ++off;
@@ -159,8 +160,8 @@ class HomeVectors {
     const std::string what = "views " + format_centimetres(range.low_m) + " to " +
                              format_centimetres(range.high_m) + " apart, the straight line free: ";
     Reproduction& result = elsewhere_.result;
-    add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
-                std::nullopt);
+    add_direction_rate(result, id + ".answered", what + "home vectors with a direction", answers,
+                       std::nullopt);
     const std::size_t answered =
         count_where(answers, [](const HomeAnswer& answer) { return has_direction(answer); });
     if (answered == 0) return;
@@ -174,68 +175,71 @@ class HomeVectors {
   }
 
   void report_probability() const {
-    if (sure_ == 0) return;
+    if (confident_ == 0) return;
     add_rate(elsewhere_.result, "elsewhere.home.probability",
              "views 10 cm to 600 cm apart: of home vectors with a probability of 0.9 and more, "
              "within 45 degrees",
-             surely_right_, sure_, at_least(0.9));
+             confident_right_, confident_, at_least(0.9));
   }
 
-  void answer_pairs_of_other_grounds() {
+  void measure_foreign_pairs() {
     std::vector<std::pair<const simulation::PlacedView*, const simulation::PlacedView*>> foreign;
     for (const RecordedGround& a : elsewhere_.grounds) {
       for (const RecordedGround& b : elsewhere_.grounds) {
         if (&a == &b) continue;
         const auto goals = collect_views(a.variants.front());
         const auto currents = collect_views(b.variants.front());
-        for (std::size_t i = 0; i < pairs_; i += 4) foreign.emplace_back(any(goals), any(currents));
+        for (std::size_t i = 0; i < pair_count_; i += 4)
+          foreign.emplace_back(pick_random_view(goals), pick_random_view(currents));
       }
     }
     if (foreign.empty()) return;
-    add_answers(elsewhere_.result, "elsewhere.home.foreign",
-                "views of two scenes or worlds: home vectors with a direction",
-                simulation::make_each(elsewhere_.executor, foreign.size(),
-                                      [&](std::size_t i) {
-                                        return compute_home(foreign[i].first->panorama,
-                                                            foreign[i].second->panorama);
-                                      }),
-                at_most(0.02));
+    add_direction_rate(elsewhere_.result, "elsewhere.home.foreign",
+                       "views of two scenes or worlds: home vectors with a direction",
+                       simulation::make_each(elsewhere_.executor, foreign.size(),
+                                             [&](std::size_t i) {
+                                               return compute_home(foreign[i].first->panorama,
+                                                                   foreign[i].second->panorama);
+                                             }),
+                       at_most(0.02));
   }
 
-  void answer_noise_pairs(int smoothed) const {
+  void measure_noise_pairs(int smoothing_columns) const {
     const Panorama& like = elsewhere_.grounds.front().variants.front().references.front().panorama;
     const auto noise_of = [&](std::size_t seed) {
-      return make_noise(like.rows(), like.columns(), smoothed, seed);
+      return make_noise(like.rows(), like.columns(), smoothing_columns, seed);
     };
-    add_answers(elsewhere_.result, "elsewhere.home.noise_" + std::to_string(smoothed),
-                "noise" +
-                    (smoothed > 1 ? " smoothed over " + std::to_string(smoothed) + " columns"
-                                  : std::string()) +
-                    ": home vectors with a direction",
-                simulation::make_each(elsewhere_.executor, pairs_,
-                                      [&](std::size_t i) {
-                                        return compute_home(noise_of(2 * i), noise_of(2 * i + 1));
-                                      }),
-                at_most(0.02));
+    add_direction_rate(
+        elsewhere_.result, "elsewhere.home.noise_" + std::to_string(smoothing_columns),
+        "noise" +
+            (smoothing_columns > 1
+                 ? " smoothed over " + std::to_string(smoothing_columns) + " columns"
+                 : std::string()) +
+            ": home vectors with a direction",
+        simulation::make_each(
+            elsewhere_.executor, pair_count_,
+            [&](std::size_t i) { return compute_home(noise_of(2 * i), noise_of(2 * i + 1)); }),
+        at_most(0.02));
   }
 
  private:
-  const simulation::PlacedView* any(const std::vector<const simulation::PlacedView*>& views) {
+  const simulation::PlacedView* pick_random_view(
+      const std::vector<const simulation::PlacedView*>& views) {
     return views[random_.index(views.size())];
   }
 
-  std::vector<ViewPair> sample_pairs(const Range& range) {
+  std::vector<ViewPair> sample_pairs(const DistanceRange& range) {
     std::vector<ViewPair> pairs;
     for (const RecordedGround& ground : elsewhere_.grounds) {
       const auto& place = ground.variants.front();
       const auto views = collect_views(place);
       std::size_t tries = 0;
-      for (std::size_t found = 0; found < pairs_ && tries < 200 * pairs_; ++tries) {
-        const simulation::PlacedView* goal = any(views);
-        const simulation::PlacedView* current = any(views);
+      for (std::size_t found = 0; found < pair_count_ && tries < 200 * pair_count_; ++tries) {
+        const simulation::PlacedView* goal = pick_random_view(views);
+        const simulation::PlacedView* current = pick_random_view(views);
         const double far_m = distance(goal->pose.position(), current->pose.position());
         if (far_m < range.low_m || far_m >= range.high_m) continue;
-        // A view behind a wall shows another place.
+        // Skip views behind a wall: they show another place.
         if (!place.free_space->is_free_between(goal->pose.position(), current->pose.position())) {
           continue;
         }
@@ -248,22 +252,23 @@ class HomeVectors {
 
   ElsewhereExperiments& elsewhere_;
   Random random_;
-  std::size_t pairs_;
-  std::size_t sure_ = 0;  // answers of all ranges
-  std::size_t surely_right_ = 0;
+  std::size_t pair_count_;
+  std::size_t confident_ = 0;  // confident answers of all ranges
+  std::size_t confident_right_ = 0;
 };
 
 }  // namespace
 
 void ElsewhereExperiments::reproduce_home_vectors() {
   HomeVectors vectors(*this);
-  for (const Range& range :
-       {Range{"0_1m", 0.1, 1.0}, Range{"1_3m", 1.0, 3.0}, Range{"3_6m", 3.0, 6.0}}) {
-    vectors.answer_pairs_within(range);
+  for (const DistanceRange& range :
+       {DistanceRange{"0_1m", 0.1, 1.0}, DistanceRange{"1_3m", 1.0, 3.0},
+        DistanceRange{"3_6m", 3.0, 6.0}}) {
+    vectors.measure_pairs_within(range);
   }
   vectors.report_probability();
-  vectors.answer_pairs_of_other_grounds();
-  for (const int smoothed : {1, 16}) vectors.answer_noise_pairs(smoothed);
+  vectors.measure_foreign_pairs();
+  for (const int smoothing_columns : {1, 16}) vectors.measure_noise_pairs(smoothing_columns);
 }
 
 void ElsewhereExperiments::reproduce_tilted_homing() {
@@ -286,7 +291,7 @@ void ElsewhereExperiments::reproduce_tilted_homing() {
       place.camera.levelled = measured;
       const auto runs = run_home(place, tasks, {}, options.seed, executor);
       const auto home =
-          count_where(runs, [](const HomingRun& run) { return run.is_success(arrived_m); });
+          count_where(runs, [](const HomingRun& run) { return run.is_success(arrival_radius_m); });
       if (tilt_deg == 0) level_home = home;
       std::string how = "level robot";
       if (tilt_deg > 0) {
@@ -298,7 +303,7 @@ void ElsewhereExperiments::reproduce_tilted_homing() {
           result,
           "elsewhere.tilt." + name + "." + std::to_string(tilt_deg) + (measured ? "_measured" : ""),
           name + ", starts within " + format_centimetres(homing_radius_m) + ", " + how +
-              ": home within " + format_centimetres(arrived_m),
+              ": home within " + format_centimetres(arrival_radius_m),
           home, runs.size(), target);
       result.rows.back().reason = explain_failures(runs, level_home);
     }

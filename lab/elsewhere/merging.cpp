@@ -1,4 +1,5 @@
-// Memories of two sessions made into one: of one place, and of two that have nothing in common.
+// Merging the memories of two sessions in one place, and of two sessions in places with nothing in
+// common.
 
 #include <algorithm>
 #include <filesystem>
@@ -27,20 +28,21 @@ namespace panonav::lab {
 namespace {
 
 constexpr double walk_spacing_m = 0.1;
-constexpr double same_place_m = 0.5;    // views so near to each other show one place
-constexpr double shared_much = 0.13;    // of a walk beside the other: they have places in common
-constexpr double shared_hardly = 0.02;  // they have as good as none
-constexpr double wrong_rms_m = 2.0;     // a map that is joined rightly is off by the drift of both
-constexpr std::size_t first_views = 100;  // of which a new memory's scale is learnt
+constexpr double same_place_radius_m = 0.5;     // views this near each other show one place
+constexpr double min_shared_fraction = 0.13;    // overlap of walks that share places
+constexpr double max_unshared_fraction = 0.02;  // overlap of walks that share almost no place
+constexpr double wrong_rms_m = 2.0;             // above the drift of both walks
+constexpr std::size_t first_views = 100;        // from which the full scale is learnt
 
-/// A random walk with its memory, whose map the robot made itself: noisy odometry, no positions.
+/// A random walk with its memory and the map that the robot built from noisy odometry, without
+/// known positions.
 struct Session {
   std::filesystem::path memory;
-  std::map<std::string, Point2> truth;  ///< by the names of its views
-  [[nodiscard]] double share_near(const Session& other) const {
+  std::map<std::string, Point2> truth;  ///< by view name
+  [[nodiscard]] double overlap_fraction(const Session& other) const {
     const auto beside = std::ranges::count_if(truth, [&](const auto& view) {
       return std::ranges::any_of(other.truth, [&](const auto& one) {
-        return distance(one.second, view.second) <= same_place_m;
+        return distance(one.second, view.second) <= same_place_radius_m;
       });
     });
     return static_cast<double>(beside) / static_cast<double>(truth.size());
@@ -79,16 +81,16 @@ Session record_walk(const simulation::PlaceRecording& place, const std::string& 
   return session;
 }
 
-/// Errors of the map that joins two sessions.
-struct Joined {
+/// Errors of the map that merges two sessions.
+struct MergedMapError {
   double shape_difference = 1.0;
   double rms_m = 0.0;
 };
-std::optional<Joined> join(const Session& first, const Session& second,
-                           const std::filesystem::path& folder) {
+std::optional<MergedMapError> try_merge(const Session& first, const Session& second,
+                                        const std::filesystem::path& folder) {
   const std::filesystem::path both = folder / "both.panonav";
   std::filesystem::remove(both);
-  std::optional<Joined> joined;
+  std::optional<MergedMapError> joined;
   const MergedMemory merged = merge_memories(first.memory, second.memory, both);
   if (merged.alignment) {
     const MemoryFile file = MemoryFile::open(both, Access::read_only);
@@ -110,26 +112,28 @@ std::optional<Joined> join(const Session& first, const Session& second,
   return joined;
 }
 
-/// Counts the pairs of walks, and how many of them were joined.
-struct Pairs {
+/// Number of pairs of walks, and how many of them were merged into one map.
+struct PairCount {
   std::size_t all = 0;
   std::size_t joined = 0;
 };
 
-/// Reports each walk through one place joined with the next one.
+/// Adds the results of merging each walk through one place with the next one.
 void report_place(const std::string& name, const std::vector<Session>& walks,
                   const std::filesystem::path& folder, Reproduction& result) {
-  Pairs sharing;
-  Pairs between;
-  Pairs apart;
+  PairCount sharing;
+  PairCount between;
+  PairCount apart;
   std::size_t wrong = 0;
   double worst_shape = 0.0;
   for (std::size_t i = 0; i < walks.size(); ++i) {
     const Session& first = walks[i];
     const Session& second = walks[(i + 1) % walks.size()];
-    const double share = std::max(first.share_near(second), second.share_near(first));
-    const auto found = join(first, second, folder);
-    Pairs& alike = share >= shared_much ? sharing : share < shared_hardly ? apart : between;
+    const double share = std::max(first.overlap_fraction(second), second.overlap_fraction(first));
+    const auto found = try_merge(first, second, folder);
+    PairCount& alike = share >= min_shared_fraction    ? sharing
+                       : share < max_unshared_fraction ? apart
+                                                       : between;
     ++alike.all;
     if (!found) continue;
     ++alike.joined;
@@ -138,7 +142,7 @@ void report_place(const std::string& name, const std::vector<Session>& walks,
   }
   const std::string id = "elsewhere.merge." + name;
   const std::string what = "memories of two walks through " + name + " that ";
-  const auto add_pairs = [&](const std::string& key, const std::string& how, const Pairs& pairs,
+  const auto add_pairs = [&](const std::string& key, const std::string& how, const PairCount& pairs,
                              std::optional<Target> target) {
     if (pairs.all == 0) return;
     add_rate(result, id + key, what + how + ": joined", pairs.joined, pairs.all, target);
@@ -172,12 +176,12 @@ void ElsewhereExperiments::reproduce_merging() {
     }
   }
   for (const auto& [name, walks] : sessions) report_place(name, walks, folder, result);
-  Pairs disjoint;
+  PairCount disjoint;
   for (auto one = sessions.begin(); one != sessions.end(); ++one) {
     for (auto other = std::next(one); other != sessions.end(); ++other) {
       for (std::size_t i = 0; i < one->second.size(); ++i) {
         ++disjoint.all;
-        disjoint.joined += join(one->second[i], other->second[i], folder) ? 1 : 0;
+        disjoint.joined += try_merge(one->second[i], other->second[i], folder) ? 1 : 0;
       }
     }
   }

@@ -1,4 +1,4 @@
-// Own places, foreign places, and the radius and covariance that are stated.
+// Recognition of own and foreign places, and the correctness of the stated radius and covariance.
 
 #include <algorithm>
 #include <array>
@@ -22,11 +22,11 @@ namespace {
 constexpr int columns = 256;
 constexpr double spacing_m = 0.5;
 
-std::string parse_ground(const std::string& place) {
+std::string parse_ground_name(const std::string& place) {
   return place.substr(0, place.rfind(' '));
 }
 
-/// Rates of the same kind over several places.
+/// Recognition rates of one kind for several places.
 struct Rates {
   std::size_t successes = 0;
   std::size_t trials = 0;
@@ -39,7 +39,7 @@ struct Rates {
     each.push_back(rate.value);
     named[name] = rate.value;
   }
-  [[nodiscard]] std::string extreme(bool highest) const {
+  [[nodiscard]] std::string describe_extreme(bool highest) const {
     const auto by_value = [](const auto& a, const auto& b) { return a.second < b.second; };
     const auto found = highest ? std::ranges::max_element(named, by_value)
                                : std::ranges::min_element(named, by_value);
@@ -50,17 +50,17 @@ struct Rates {
   }
 };
 
-/// Adds the median over the variants, with the interval of all of them.
+/// Adds the median rate over the variants, with the confidence interval of all trials together.
 void add_rates(Reproduction& result, const std::string& id, const std::string& what,
                const Rates& rates, Target target) {
   const Proportion all = success_rate(rates.successes, rates.trials);
   ResultRow& row =
       add_row(result, id, what, {median(rates.each), std::pair{all.low, all.high}}, "", target);
   row.over = "median of " + std::to_string(rates.each.size()) + ", of " +
-             std::to_string(rates.trials) + " places in all; " + rates.extreme(false);
+             std::to_string(rates.trials) + " places in all; " + rates.describe_extreme(false);
 }
 
-/// Adds rows of own places of one ground, in both conditions.
+/// Adds the results for own places of one ground, in clean and in hard conditions.
 void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround& ground) {
   const auto all_conditions = place_conditions();
   const std::vector<PlaceCondition> conditions(all_conditions.begin(), all_conditions.begin() + 2);
@@ -131,10 +131,10 @@ void ElsewhereExperiments::reproduce_known_places() {
   }
   Rates other;
   Rates variant;
-  for (const RecognitionRate& rate : recognition_rates(places, executor)) {
+  for (const RecognitionRate& rate : measure_recognition_rates(places, executor)) {
     if (rate.memory == rate.queries) continue;
     const std::string name = rate.queries + " in " + rate.memory;
-    (parse_ground(rate.memory) == parse_ground(rate.queries) ? variant : other)
+    (parse_ground_name(rate.memory) == parse_ground_name(rate.queries) ? variant : other)
         .add(name, rate.known, static_cast<std::size_t>(options.queries));
   }
   const auto add_foreign = [&](const std::string& id, const std::string& what, const Rates& rates,
@@ -142,7 +142,7 @@ void ElsewhereExperiments::reproduce_known_places() {
     if (rates.trials == 0) return;
     add_rate(result, "elsewhere.places." + id, what, rates.successes, rates.trials,
              at_most(max_rate));
-    result.rows.back().over += "; " + rates.extreme(true);
+    result.rows.back().over += "; " + rates.describe_extreme(true);
   };
   add_foreign("other", "places of other scenes and worlds recognised as own", other, 0.01);
   add_foreign("variant", "places of another variant of the same scene recognised as own", variant,
@@ -167,7 +167,7 @@ void ElsewhereExperiments::reproduce_tracked_poses() {
         const TrackingStep& there = walks[i].steps[step];
         if (estimate.state != LocalisationState::localised || !there.view) return;
         const PoseMode& mode = estimate.modes.front();
-        const auto& c = mode.covariance;  // of three rows
+        const auto& c = mode.covariance;  // of 3 x 3, row-major
         const double x_m = there.truth.x_m - mode.mean.x_m;
         const double y_m = there.truth.y_m - mode.mean.y_m;
         found.push_back((c[4] * x_m * x_m - 2.0 * c[1] * x_m * y_m + c[0] * y_m * y_m) /

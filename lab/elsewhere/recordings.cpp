@@ -1,4 +1,5 @@
-// Leave-one-out tests on recordings: each image, rotated, is a query to the memory of all others.
+// Leave-one-out tests on recordings: each image, rotated at random, is localised in the memory of
+// all other images.
 
 #include <algorithm>
 #include <cmath>
@@ -20,27 +21,27 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr std::size_t turns = 3;
-/// Largest distance of a correct match, in distances of the nearest view.
-constexpr double near_factor = 1.5;
+constexpr std::size_t rotations_per_view = 3;
+/// Largest distance of a correct match, as a multiple of the distance to the nearest view.
+constexpr double max_near_factor = 1.5;
 
-struct Recorded {
+struct RecordedView {
   std::string file;
   std::optional<Point2> position;
   Panorama panorama;
-  Panorama sharp;  ///< the same rows as fine as they were recorded; of a mirror the panorama
+  Panorama sharp;  ///< at recorded resolution; `panorama` for a mirror
 };
 
-/// True if `found` is near `query`: in metres, or in a recording without positions the image before
-/// or after it.
-bool is_near(const std::vector<Recorded>& views, std::size_t query, std::size_t found) {
+/// True if `found` is a correct match of `query`: near in metres, or in a recording without
+/// positions the image before or after it.
+bool is_near(const std::vector<RecordedView>& views, std::size_t query, std::size_t found) {
   if (!views[query].position) return found + 1 == query || query + 1 == found;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i != query)
       nearest_m = std::min(nearest_m, distance(*views[i].position, *views[query].position));
   }
-  return distance(*views[found].position, *views[query].position) <= near_factor * nearest_m;
+  return distance(*views[found].position, *views[query].position) <= max_near_factor * nearest_m;
 }
 
 /// Memorises all images with the defaults of the command.
@@ -72,7 +73,8 @@ struct TemporaryFile {
   std::filesystem::path file;
 };
 
-/// Returns the rows of the image that the memory keeps, at their recorded resolution.
+/// Returns the image rows that the memory uses, at their recorded resolution; `panorama` for a
+/// mirror image.
 Panorama read_sharp_view(const DatasetEntry& entry, const PictureSource& source,
                          const Panorama& panorama) {
   const Observation seen = read_observation(entry);
@@ -81,13 +83,13 @@ Panorama read_sharp_view(const DatasetEntry& entry, const PictureSource& source,
   return panorama_from_picture(picture->view(), source.layout);
 }
 
-/// The best match of a query.
-struct Found {
+/// The best match of a query, and the processor time of the search.
+struct TimedMatch {
   std::size_t view = 0;
   double milliseconds = 0.0;
 };
 
-/// Localises each image of a recording at random headings in the memory of the others.
+/// Localises each image of a recording, rotated at random, in the memory of the other images.
 class LeaveOneOut {
  public:
   LeaveOneOut(const ElsewhereExperiments& elsewhere, const Dataset& dataset,
@@ -102,45 +104,50 @@ class LeaveOneOut {
     }
     columns_ = static_cast<std::uint64_t>(views_.front().panorama.columns());
     what_ = name + ", each of " + std::to_string(views_.size()) + " pictures, turned at random " +
-            std::to_string(turns) + " times, asked of the memory of the others: ";
-    near_ = views_.front().position ? "best match within 1.5 times the distance of the nearest"
-                                    : "best match is the picture before or after";
+            std::to_string(rotations_per_view) + " times, asked of the memory of the others: ";
+    near_description_ = views_.front().position
+                            ? "best match within 1.5 times the distance of the nearest"
+                            : "best match is the picture before or after";
   }
 
   [[nodiscard]] std::size_t size() const { return views_.size(); }
 
-  /// Localises by a memory of all images; the answers are kept in `places`.
-  std::vector<Found> ask(const PlaceRecogniser& ours, std::vector<Place>& places) const {
+  /// Localises all queries with the recogniser `ours`, excluding the query's own image; writes the
+  /// answers to `places`.
+  std::vector<TimedMatch> localise_all(const PlaceRecogniser& ours,
+                                       std::vector<Place>& places) const {
     places.resize(query_count());
     return simulation::make_each(elsewhere_.executor, query_count(), [&](std::size_t n) {
-      const Observation seen(turned(n));
+      const Observation seen(rotated_view(n));
       const double start = simulation::get_thread_cpu_time_s();
-      places[n] = ours.localise(seen, {&views_[n / turns].file, 1});
+      places[n] = ours.localise(seen, {&views_[n / rotations_per_view].file, 1});
       const double spent = 1000.0 * (simulation::get_thread_cpu_time_s() - start);
-      const auto match = std::ranges::find(views_, places[n].matches.at(0).name, &Recorded::file);
-      return Found{static_cast<std::size_t>(match - views_.begin()), spent};
+      const auto match =
+          std::ranges::find(views_, places[n].matches.at(0).name, &RecordedView::file);
+      return TimedMatch{static_cast<std::size_t>(match - views_.begin()), spent};
     });
   }
 
-  std::vector<Found> ask(RivalRecogniser& rival) const {
+  std::vector<TimedMatch> localise_all(RivalRecogniser& rival) const {
     std::vector<RivalView> references;
-    for (const Recorded& view : views_) {
+    for (const RecordedView& view : views_) {
       references.push_back({view.panorama, to_picture(view.sharp)});
     }
     rival.memorise(references);
     return simulation::make_each(elsewhere_.executor, query_count(), [&](std::size_t n) {
-      const Panorama& sharp = views_[n / turns].sharp;
-      const auto turn = static_cast<int>(
-          std::lround(turn_of(n) * sharp.columns() / static_cast<double>(columns_)));
-      const RivalView query{turned(n), to_picture(rotate_columns(sharp, turn))};
+      const Panorama& sharp = views_[n / rotations_per_view].sharp;
+      const auto turn = static_cast<int>(std::lround(random_rotation_columns(n) * sharp.columns() /
+                                                     static_cast<double>(columns_)));
+      const RivalView query{rotated_view(n), to_picture(rotate_columns(sharp, turn))};
       const double start = simulation::get_thread_cpu_time_s();
-      const std::size_t view = rival.nearest(query, n / turns);
-      return Found{view, 1000.0 * (simulation::get_thread_cpu_time_s() - start)};
+      const std::size_t view = rival.nearest(query, n / rotations_per_view);
+      return TimedMatch{view, 1000.0 * (simulation::get_thread_cpu_time_s() - start)};
     });
   }
 
-  void add_near(const std::vector<Found>& found, std::optional<Target> target) const {
-    add_rate(result(), id_ + ".near", what_ + near_, count_near(found), query_count(), target);
+  void add_near(const std::vector<TimedMatch>& found, std::optional<Target> target) const {
+    add_rate(result(), id_ + ".near", what_ + near_description_, count_near(found), query_count(),
+             target);
   }
 
   void add_known(const std::vector<Place>& places) const {
@@ -149,7 +156,7 @@ class LeaveOneOut {
     std::size_t inside = 0;
     for (std::size_t n = 0; n < query_count(); ++n) {
       const Place& place = places[n];
-      const auto& truth = views_[n / turns].position;
+      const auto& truth = views_[n / rotations_per_view].position;
       known += place.known ? 1 : 0;
       if (!place.position || !place.position->radius_m || !truth) continue;
       ++placed;
@@ -162,22 +169,24 @@ class LeaveOneOut {
              placed, at_least(0.9));
   }
 
-  void add_cost(const std::vector<Found>& found, double file_bytes) const {
+  void add_cost(const std::vector<TimedMatch>& found, double file_bytes) const {
     add_median(result(), id_ + ".time", what_ + "processor time from the panorama to the answer",
                "ms", milliseconds(found), at_most(5.0));
     add_row(result(), id_ + ".bytes", what_ + "size of the memory file, for each view",
             file_bytes / static_cast<double>(size()), "B", at_most(20'000.0));
   }
 
-  /// Adds the rows of another method; returns its name and its number of correct matches.
-  std::string add_other(const std::string& other, const std::vector<Found>& found,
+  /// Adds the results of another method; returns a text of its name and its number of correct
+  /// matches.
+  std::string add_other(const std::string& other, const std::vector<TimedMatch>& found,
                         double bytes) const {
     std::string key = other;
     std::ranges::replace(key, ' ', '_');
     std::erase(key, ',');
     const std::string id = id_ + "." + key;
     const std::size_t near_count = count_near(found);
-    add_rate(result(), id + ".near", what_ + other + ": " + near_, near_count, query_count());
+    add_rate(result(), id + ".near", what_ + other + ": " + near_description_, near_count,
+             query_count());
     add_median(result(), id + ".time", what_ + other + ": processor time", "ms",
                milliseconds(found));
     add_row(result(), id + ".bytes", what_ + other + ": bytes a view", bytes, "B");
@@ -186,32 +195,32 @@ class LeaveOneOut {
 
  private:
   [[nodiscard]] Reproduction& result() const { return elsewhere_.result; }
-  [[nodiscard]] std::size_t query_count() const { return views_.size() * turns; }
-  [[nodiscard]] int turn_of(std::size_t n) const {
-    Random random(elsewhere_.options.seed + n % turns, n / turns);
+  [[nodiscard]] std::size_t query_count() const { return views_.size() * rotations_per_view; }
+  [[nodiscard]] int random_rotation_columns(std::size_t n) const {
+    Random random(elsewhere_.options.seed + n % rotations_per_view, n / rotations_per_view);
     return static_cast<int>(random.index(columns_));
   }
-  [[nodiscard]] Panorama turned(std::size_t n) const {
-    return rotate_columns(views_[n / turns].panorama, turn_of(n));
+  [[nodiscard]] Panorama rotated_view(std::size_t n) const {
+    return rotate_columns(views_[n / rotations_per_view].panorama, random_rotation_columns(n));
   }
-  [[nodiscard]] std::size_t count_near(const std::vector<Found>& found) const {
+  [[nodiscard]] std::size_t count_near(const std::vector<TimedMatch>& found) const {
     std::size_t count = 0;
     for (std::size_t n = 0; n < found.size(); ++n) {
-      count += is_near(views_, n / turns, found[n].view) ? 1 : 0;
+      count += is_near(views_, n / rotations_per_view, found[n].view) ? 1 : 0;
     }
     return count;
   }
-  static std::vector<double> milliseconds(const std::vector<Found>& found) {
+  static std::vector<double> milliseconds(const std::vector<TimedMatch>& found) {
     std::vector<double> times;
-    for (const Found& one : found) times.push_back(one.milliseconds);
+    for (const TimedMatch& one : found) times.push_back(one.milliseconds);
     return times;
   }
 
   const ElsewhereExperiments& elsewhere_;
   std::string id_;
   std::string what_;
-  std::string near_;
-  std::vector<Recorded> views_;
+  std::string near_description_;
+  std::vector<RecordedView> views_;
   std::uint64_t columns_ = 0;
 };
 
@@ -226,8 +235,8 @@ void ElsewhereExperiments::reproduce_leave_one_out(
   const PlaceRecogniser recogniser = memorise(memory.file, dataset, true, executor);
   const LeaveOneOut pictures(*this, dataset, recogniser, name);
   std::vector<Place> places;
-  const auto without_features = pictures.ask(by_columns, places);
-  const auto ours = pictures.ask(recogniser, places);
+  const auto without_features = pictures.localise_all(by_columns, places);
+  const auto ours = pictures.localise_all(recogniser, places);
   pictures.add_near(ours,
                     name == "ciirc_b670" ? std::optional(at_least(29.0 / 31.0)) : std::nullopt);
   const std::size_t judged = result.rows.size() - 1;
@@ -241,7 +250,7 @@ void ElsewhereExperiments::reproduce_leave_one_out(
   rivals.insert(rivals.begin(), pixels_over_all_turns_recogniser());
   rivals.insert(rivals.begin(), fourier_signature_recogniser());
   for (const auto& rival : rivals) {
-    const auto found = pictures.ask(*rival);
+    const auto found = pictures.localise_all(*rival);
     others += ", " + pictures.add_other(rival->name(), found, rival->bytes_per_view());
   }
   result.rows[judged].over += "; the others on the same queries: " + others;

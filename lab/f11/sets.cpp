@@ -1,4 +1,4 @@
-// The two sets of [F11]: a loop of equally spaced views, and views captured by threshold.
+// The two view sets of [F11]: equally spaced views of a loop, and views captured by threshold.
 
 #include <algorithm>
 #include <array>
@@ -26,24 +26,26 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr double first_spacing_m = 0.1;
-// Pictures between which the second set captures by threshold, and the threshold: about 9 cm of way
-// in rooms of this size, so that 150 views cover about a round.
-constexpr double second_spacing_m = 0.025;
+constexpr double loop_spacing_m = 0.1;
+// Spacing of the pictures from which the second set captures views, and the image difference that
+// captures one: a view about every 9 cm in rooms of this size, so that 150 views cover about one
+// round.
+constexpr double capture_spacing_m = 0.025;
 constexpr double capture_difference = 0.015;
-// Pictures for each view of the first set from which the second one captures.
-constexpr std::size_t second_pictures = 3;
+// Number of pictures recorded per view of the second set.
+constexpr std::size_t pictures_per_captured_view = 3;
 constexpr std::array<int, 7> k1_values{2, 4, 8, 16, 26, 40, 64};
 constexpr std::array<int, 6> k2_values{4, 8, 14, 20, 40, 64};
 constexpr int max_components = 64;
 constexpr int default_components = 15;
 constexpr std::array<int, 5> other_components{6, 10, 20, 32, 64};
 
-/// Figure 6: mu of the published rule for each k1 and k2.
-using Grid = std::map<std::pair<int, int>, std::vector<double>>;
+/// Shape differences (mu, figure 6) of the published rule for each pair (k1, k2), one per
+/// recording.
+using ErrorsByComponents = std::map<std::pair<int, int>, std::vector<double>>;
 
-// Distances depend on k1 alone and turns on k2 alone, so each is read once.
-void add_published_errors(const simulation::MappingRecording& recording, Grid& grid) {
+// Distances depend on k1 alone and turns on k2 alone, so each is computed once per value.
+void add_published_errors(const simulation::MappingRecording& recording, ErrorsByComponents& grid) {
   const std::size_t steps = recording.views.size() - 1;
   std::map<int, std::vector<double>> lengths;
   std::map<int, std::vector<double>> turns;
@@ -72,7 +74,7 @@ void add_published_errors(const simulation::MappingRecording& recording, Grid& g
   }
 }
 
-std::pair<std::pair<int, int>, double> find_best(const Grid& grid) {
+std::pair<std::pair<int, int>, double> find_best(const ErrorsByComponents& grid) {
   std::pair<std::pair<int, int>, double> best{{0, 0}, 2.0};
   for (const auto& [key, values] : grid) {
     const double middle = median(values);
@@ -81,7 +83,7 @@ std::pair<std::pair<int, int>, double> find_best(const Grid& grid) {
   return best;
 }
 
-viewer::LinePlot plot_grid(const Grid& grid, const std::string& title) {
+viewer::LinePlot plot_grid(const ErrorsByComponents& grid, const std::string& title) {
   viewer::LinePlot plot{.title = title,
                         .x_label = "components for the distance, k1",
                         .y_label = "shape difference",
@@ -101,18 +103,18 @@ std::vector<Point2> select_wheel_positions(const simulation::MappingRecording& r
   return wheels;
 }
 
-/// A set in all variants of its scene, each mapped in several ways.
-struct MappedSet {
+/// Results of one view set in all variants of its scene, each mapped in several ways.
+struct SetResults {
   std::string id;
   std::string what;
-  std::vector<double> open, closed, closed_with_wheels, wheels, ground_open, ground;
+  std::vector<double> open, closed, closed_with_wheels, wheels, known_height_open, known_height;
   std::size_t right = 0;
   std::size_t wrong = 0;
-  std::size_t missing = 0;  // recordings without any closure
-  Grid grid;
-  std::vector<viewer::MapPlot> maps;  // of the first four
+  std::size_t unclosed_recordings = 0;  // recordings without a correct closure
+  ErrorsByComponents grid;
+  std::vector<viewer::MapPlot> maps;  // of the first four variants
 
-  /// Returns the map without closure.
+  /// Maps a recording in all ways and adds the errors; returns the map without loop closures.
   simulation::MappedRecording add(const simulation::PlaceRecording& place,
                                   const simulation::MappingRecording& recording,
                                   simulation::MappingRunOptions run) {
@@ -128,13 +130,13 @@ struct MappedSet {
     wheels.push_back(simulation::shape_error(select_wheel_positions(recording, with), with.truth));
     right += with.right_closures + with_wheels.right_closures;
     wrong += with.wrong_closures + with_wheels.wrong_closures;
-    missing += with.right_closures == 0 ? 1 : 0;
+    unclosed_recordings += with.right_closures == 0 ? 1 : 0;
     run.odometry.camera_height_m = place.scene.camera_height_m;
     const auto open_map = simulation::map_recording(recording, run);
     run.mapping.close_loops = true;
     const auto closed_map = simulation::map_recording(recording, run);
-    ground.push_back(simulation::shape_error(closed_map.estimate, closed_map.truth));
-    ground_open.push_back(simulation::shape_error(open_map.estimate, open_map.truth));
+    known_height.push_back(simulation::shape_error(closed_map.estimate, closed_map.truth));
+    known_height_open.push_back(simulation::shape_error(open_map.estimate, open_map.truth));
     if (maps.size() < 4) draw(place, recording, without, with);
     return without;
   }
@@ -161,13 +163,13 @@ struct MappedSet {
     add("closed", "with closure", closed, targets.closed);
     add("closed_wheels", "with closure and steps from wheels", closed_with_wheels,
         targets.closed_with_wheels);
-    add("ground_open", "without closure, height of the camera known", ground_open);
-    add("ground", "with closure, height of the camera known", ground);
+    add("ground_open", "without closure, height of the camera known", known_height_open);
+    add("ground", "with closure, height of the camera known", known_height);
     add("wheels", "of the wheels alone", wheels);
     add_rate(result, id + ".right_closures", what + ": closures between views at most 1 m apart",
              right, std::max<std::size_t>(1, right + wrong));
-    add_rate(result, id + ".unclosed", what + ": recordings in which no loop was closed", missing,
-             open.size());
+    add_rate(result, id + ".unclosed", what + ": recordings in which no loop was closed",
+             unclosed_recordings, open.size());
     const auto best = find_best(grid).first;
     const auto with = [](std::pair<int, int> k) {
       return "k1 = " + std::to_string(k.first) + ", k2 = " + std::to_string(k.second);
@@ -199,7 +201,8 @@ struct MappedSet {
   }
 };
 
-/// The first set thinned, and with other numbers of components; heading errors of its steps.
+/// The first set with fewer views, with other numbers of components, and the heading errors of its
+/// steps.
 struct FirstSetVariations {
   std::map<int, std::vector<double>> by_components;
   std::map<int, std::vector<double>> by_spacing;
@@ -275,13 +278,13 @@ simulation::PlaceRecording MappingExperiments::make_variant(const std::string& s
 }
 
 void MappingExperiments::reproduce_first_set() const {
-  MappedSet set{.id = "f11.loop",
-                .what = "loop, " + std::to_string(options.views) + " views 10 cm apart"};
+  SetResults set{.id = "f11.loop",
+                 .what = "loop, " + std::to_string(options.views) + " views 10 cm apart"};
   FirstSetVariations variations;
   for (int s = 0; s < options.scenes; ++s) {
     const simulation::PlaceRecording place = make_variant("loop", s);
     const simulation::MappingRecording recording = simulation::record_for_mapping(
-        place, drive(place, {}, first_spacing_m, static_cast<std::size_t>(options.views)),
+        place, drive(place, {}, loop_spacing_m, static_cast<std::size_t>(options.views)),
         max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
     set.add(place, recording, {});
     add_published_errors(recording, set.grid);
@@ -303,22 +306,22 @@ void MappingExperiments::reproduce_first_set() const {
 }
 
 void MappingExperiments::reproduce_second_set() const {
-  MappedSet set{.id = "f11.lab", .what = "lab, views captured by threshold"};
+  SetResults set{.id = "f11.lab", .what = "lab, views captured by threshold"};
   const auto views = static_cast<std::size_t>(options.views);
   std::vector<double> nodes;
-  std::vector<double> ways_m;
+  std::vector<double> path_lengths_m;
   for (int s = 0; s < options.scenes; ++s) {
     const simulation::PlaceRecording place = make_variant("lab", s);
-    std::vector<Point2> way = place.scene.tour;
-    way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
+    std::vector<Point2> path = place.scene.tour;
+    path.insert(path.end(), place.scene.tour.begin(), place.scene.tour.end());
     const simulation::MappingRecording recording = simulation::record_for_mapping(
-        place, drive(place, way, second_spacing_m, second_pictures * views), max_components + 2,
-        simulation::make_noisy_wheels(), 1000 * place.seed, executor);
+        place, drive(place, path, capture_spacing_m, pictures_per_captured_view * views),
+        max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
     const auto open = set.add(
         place, recording,
         {.mapping = {.capture_difference = capture_difference}, .max_nodes = views * 3 / 4});
     nodes.push_back(static_cast<double>(open.number.size()));
-    ways_m.push_back(second_spacing_m * static_cast<double>(open.number.back()));
+    path_lengths_m.push_back(capture_spacing_m * static_cast<double>(open.number.back()));
     simulation::MappingRecording captured;
     for (const std::size_t i : open.number) {
       captured.truth.push_back(recording.truth[i]);
@@ -329,8 +332,8 @@ void MappingExperiments::reproduce_second_set() const {
   }
   add_median(result, "f11.lab.views", set.what + ": views", "views", nodes, std::nullopt,
              std::pair(150.0, 150.0));
-  add_median(result, "f11.lab.way", set.what + ": path length", "m", ways_m);
-  // Loops that close take errors of length away, as those of heading.
+  add_median(result, "f11.lab.way", set.what + ": path length", "m", path_lengths_m);
+  // Loop closures correct errors of length as well as errors of heading.
   set.report({.open = at_most(0.01),
               .published = 0.015,
               .closed = at_most(0.01),

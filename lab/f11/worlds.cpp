@@ -1,4 +1,4 @@
-// [F11] further: time, places that look alike, Gazebo worlds, recordings, large maps.
+// Further experiments on [F11]: run time, similar places, Gazebo worlds, recordings, large maps.
 
 #include <algorithm>
 #include <chrono>
@@ -51,7 +51,7 @@ std::vector<Pose2> plan_two_loops(const simulation::PlaceRecording& place, doubl
                                   double spacing_m, Random& random) {
   const simulation::FreeSpace& space = *place.free_space;
   constexpr double min_side_m = 2.0;
-  const auto far_from = [&](const std::vector<Point2>& others) {
+  const auto sample_far_from = [&](const std::vector<Point2>& others) {
     Point2 point = space.random_pose(random).position();
     constexpr int trials = 200;
     for (int i = 0; i < trials; ++i) {
@@ -63,18 +63,18 @@ std::vector<Pose2> plan_two_loops(const simulation::PlaceRecording& place, doubl
     return point;
   };
   std::vector<Point2> places{space.random_pose(random).position()};
-  while (places.size() < 5) places.push_back(far_from(places));
-  std::vector<Point2> way;
-  // Each round is 2 m or longer, so that this is enough.
+  while (places.size() < 5) places.push_back(sample_far_from(places));
+  std::vector<Point2> path;
+  // Each round is at least 2 m long, so this many rounds reach `length_m`.
   const auto rounds = static_cast<int>(std::ceil(length_m / min_side_m));
   for (int round = 0; round < rounds && round < 20; ++round) {
-    for (const std::size_t i : {0U, 1U, 2U, 0U, 3U, 4U}) way.push_back(places[i]);
+    for (const std::size_t i : {0U, 1U, 2U, 0U, 3U, 4U}) path.push_back(places[i]);
   }
   const auto views = static_cast<std::size_t>(std::lround(length_m / spacing_m));
-  return drive(place, way, spacing_m, views);
+  return drive(place, path, spacing_m, views);
 }
 
-/// Reads the views of a data set, with their positions where these are known.
+/// Reads the views of a data set, and their positions where known (else the origin).
 simulation::MappingRecording read_recording(const std::filesystem::path& folder,
                                             PanoramaShape shape, Executor& executor) {
   const Dataset dataset = read_dataset(folder);
@@ -90,16 +90,17 @@ simulation::MappingRecording read_recording(const std::filesystem::path& folder,
   return recording;
 }
 
-/// Draws pairs of views, one above the other, three pairs in a row.
+/// Draws pairs of views, the first above the second, three pairs per row.
 viewer::PicturePlot draw_pairs(const std::string& title,
                                const std::vector<std::pair<Panorama, Panorama>>& pairs) {
   constexpr int gap = 8;
-  constexpr int across = 3;
+  constexpr int pairs_per_row = 3;
   const int rows = pairs.front().first.rows();
   const int columns = pairs.front().first.columns();
-  const int down = (static_cast<int>(pairs.size()) + across - 1) / across;
-  viewer::PicturePlot plot{
-      .title = title, .columns = across * (columns + 4 * gap), .rows = down * (2 * rows + 4 * gap)};
+  const int row_count = (static_cast<int>(pairs.size()) + pairs_per_row - 1) / pairs_per_row;
+  viewer::PicturePlot plot{.title = title,
+                           .columns = pairs_per_row * (columns + 4 * gap),
+                           .rows = row_count * (2 * rows + 4 * gap)};
   plot.x_range = {0.0, plot.columns};
   plot.y_range = {0.0, plot.rows};
   plot.values.assign(static_cast<std::size_t>(plot.columns) * static_cast<std::size_t>(plot.rows),
@@ -109,8 +110,8 @@ viewer::PicturePlot draw_pairs(const std::string& title,
       const auto target = static_cast<std::size_t>(plot.rows - 1 - top - row) *
                               static_cast<std::size_t>(plot.columns) +
                           static_cast<std::size_t>(left);
-      // Azimuth grows to the left in a picture that is looked at from inside; the root shows what
-      // is dark.
+      // Draw azimuth growing to the left, as viewed from inside; the square root brightens dark
+      // areas.
       for (int c = 0; c < columns; ++c) {
         plot.values[target + static_cast<std::size_t>(columns - 1 - c)] =
             std::sqrt(view.at(row, c));
@@ -118,8 +119,8 @@ viewer::PicturePlot draw_pairs(const std::string& title,
     }
   };
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const int top = static_cast<int>(i) / across * (2 * rows + 4 * gap) + gap;
-    const int left = static_cast<int>(i) % across * (columns + 4 * gap) + 2 * gap;
+    const int top = static_cast<int>(i) / pairs_per_row * (2 * rows + 4 * gap) + gap;
+    const int left = static_cast<int>(i) % pairs_per_row * (columns + 4 * gap) + 2 * gap;
     draw(pairs[i].first, top, left);
     draw(pairs[i].second, top + rows + gap / 2, left);
   }
@@ -134,19 +135,19 @@ std::vector<TopologicalMap::Edge> filter_closures(const simulation::MappedRecord
   return closures;
 }
 
-viewer::MapPlot plot_indoor_walk(const simulation::MappedRecording& bridged) {
+viewer::MapPlot plot_indoor_walk(const simulation::MappedRecording& bridged_map) {
   viewer::MapLayer lines{.label = "closures", .colour = viewer::PlotColour::vermilion};
   const auto position_of = [&](ViewId view) {
-    return bridged.estimate[view.value - bridged.map.nodes[0].view.value];
+    return bridged_map.estimate[view.value - bridged_map.map.nodes[0].view.value];
   };
-  for (const TopologicalMap::Edge& edge : filter_closures(bridged)) {
+  for (const TopologicalMap::Edge& edge : filter_closures(bridged_map)) {
     lines.lines.push_back({position_of(edge.a), position_of(edge.b)});
   }
   return {.title = "indoor_walk_360, no positions known",
           .layers = {{.label = "consecutive pictures",
                       .colour = viewer::PlotColour::blue,
-                      .lines = {bridged.estimate},
-                      .dots = bridged.estimate},
+                      .lines = {bridged_map.estimate},
+                      .dots = bridged_map.estimate},
                      lines}};
 }
 
@@ -154,37 +155,37 @@ void map_indoor_walk(const MappingExperiments& f11) {
   const std::filesystem::path folder = f11.options.data / "indoor_walk_360";
   constexpr PanoramaShape shape{80, 512};
   const simulation::MappingRecording walk = read_recording(folder, shape, f11.executor);
-  // The pictures stand metres apart.
-  const auto parts = simulation::map_recording(walk, {});
-  const auto bridged = simulation::map_recording(walk, {.mapping = {.bridge_m = 1.5}});
-  const auto linked = static_cast<double>(
-      std::ranges::count(parts.map.edges, Link::Kind::sequence, &TopologicalMap::Edge::kind));
+  // Consecutive pictures are metres apart, and many steps cannot be computed from the views.
+  const auto unbridged_map = simulation::map_recording(walk, {});
+  const auto bridged_map = simulation::map_recording(walk, {.mapping = {.bridge_m = 1.5}});
+  const auto linked = static_cast<double>(std::ranges::count(
+      unbridged_map.map.edges, Link::Kind::sequence, &TopologicalMap::Edge::kind));
   add_row(f11.result, "f11.indoor_walk.linked",
           "indoor_walk_360: consecutive pictures linked by a step read from them",
           linked / static_cast<double>(walk.views.size() - 1), "");
   add_row(f11.result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
-          static_cast<double>(filter_closures(bridged).size()), "closures");
-  // Closures by single views, for comparison.
+          static_cast<double>(filter_closures(bridged_map).size()), "closures");
+  // Map with closures by single views, for comparison.
   const auto single = simulation::map_recording(
       walk, {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .max_drift = 100.0}});
-  auto refused = filter_closures(single);
+  auto unconfirmed = filter_closures(single);
   add_row(f11.result, "f11.indoor_walk.without_sequence",
           "indoor_walk_360: loops that single views would close, were no sequence asked for",
-          static_cast<double>(refused.size()), "closures");
+          static_cast<double>(unconfirmed.size()), "closures");
   add_plot(f11.result, "f11_indoor_walk.svg",
            "A walk through a building, pictures metres apart: steps that the views do not show "
            "count as 1.5 m straight ahead; closures in orange",
-           plot_indoor_walk(bridged));
-  if (refused.empty()) return;
+           plot_indoor_walk(bridged_map));
+  if (unconfirmed.empty()) return;
   const Dataset dataset = read_dataset(folder);
   const PanoramaReader reader(dataset.source, shape);
   const auto view_of = [&](ViewId view) {
     return reader.read(dataset.entries[view.value - single.map.nodes[0].view.value].path);
   };
   constexpr std::size_t max_pairs = 12;
-  if (refused.size() > max_pairs) refused.resize(max_pairs);
+  if (unconfirmed.size() > max_pairs) unconfirmed.resize(max_pairs);
   std::vector<std::pair<Panorama, Panorama>> pairs;
-  for (const TopologicalMap::Edge& edge : refused)
+  for (const TopologicalMap::Edge& edge : unconfirmed)
     pairs.emplace_back(view_of(edge.a), view_of(edge.b));
   add_plot(f11.result, "f11_indoor_walk_pairs.svg",
            "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
@@ -192,7 +193,7 @@ void map_indoor_walk(const MappingExperiments& f11) {
            draw_pairs("indoor_walk_360: pairs that no sequence of views confirms", pairs));
 }
 
-/// Mirror images along the round trip of the loop, and how they are unwrapped.
+/// Mirror images along the round trip of `loop`, with their unwarper.
 struct MirrorImages {
   std::vector<Image> images;
   Unwarper unwarper;
@@ -215,9 +216,9 @@ MirrorImages take_mirror_images(const MappingExperiments& f11) {
   return {std::move(images), Unwarper(camera, {80, 512})};
 }
 
-/// Median times of a step of visual odometry.
+/// Median run times of one step of visual odometry.
 struct StepTimes {
-  double all_ms = 0.0;       ///< from the mirror image
+  double total_ms = 0.0;     ///< from the mirror image
   double odometry_ms = 0.0;  ///< from the signature
 };
 
@@ -238,9 +239,9 @@ StepTimes measure_step_times(const MirrorImages& seen, int count) {
   return {1e-3 * median(all_us), 1e-3 * median(step_us)};
 }
 
-/// Two loops in a world, mapped in several ways: errors of each path.
+/// Position errors of paths with two loops in one world, one value per path and way of mapping.
 struct WorldErrors {
-  std::vector<double> wheels, open, closed, ground_open, ground, with_wheels;  // [m]
+  std::vector<double> wheels, open, closed, known_height_open, known_height, with_wheels;  // [m]
   std::size_t right = 0;
   std::size_t wrong = 0;
   std::vector<viewer::MapPlot> maps;  // of the first four
@@ -260,8 +261,8 @@ struct WorldErrors {
     wheels.push_back(rms_m(positions_of(recording.wheels), open_map.truth, false));
     open.push_back(error_of(open_map, true));
     closed.push_back(error_of(closed_map, true));
-    ground_open.push_back(error_of(ground_open_map, false));
-    ground.push_back(error_of(ground_map, false));
+    known_height_open.push_back(error_of(ground_open_map, false));
+    known_height.push_back(error_of(ground_map, false));
     with_wheels.push_back(error_of(wheels_map, false));
     for (const auto* mapped : {&closed_map, &ground_map, &wheels_map}) {
       right += mapped->right_closures;
@@ -298,12 +299,13 @@ struct WorldErrors {
 
 void MappingExperiments::measure_step_time() const {
   const MirrorImages seen = take_mirror_images(*this);
-  const StepTimes usual = measure_step_times(seen, components);
+  const StepTimes default_times = measure_step_times(seen, components);
   add_row(result, "f11.time.step",
-          "time of a step from a mirror image of 640 x 480 to a pose, median", usual.all_ms, "ms",
-          at_most(0.3), std::pair(54.0, 153.0));
-  add_row(result, "f11.time.odometry", "of these, from signature to pose", usual.odometry_ms, "ms");
-  // Figure 6 shows the influence of the components on the time, too.
+          "time of a step from a mirror image of 640 x 480 to a pose, median",
+          default_times.total_ms, "ms", at_most(0.3), std::pair(54.0, 153.0));
+  add_row(result, "f11.time.odometry", "of these, from signature to pose",
+          default_times.odometry_ms, "ms");
+  // Figure 6 also shows how the number of components changes the run time.
   viewer::Series times{.label = "signature to pose"};
   for (const int count : {6, 10, 15, 20, 32, 64}) {
     times.add(count, measure_step_times(seen, count).odometry_ms);
@@ -331,13 +333,13 @@ void MappingExperiments::reproduce_identical_doors() const {
   std::vector<double> errors;
   for (int s = 0; s < scenes; ++s) {
     const simulation::PlaceRecording place = make_variant("corridor", s);
-    std::vector<Point2> way;
+    std::vector<Point2> path;
     for (int round = 0; round < 3; ++round) {
-      way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
+      path.insert(path.end(), place.scene.tour.begin(), place.scene.tour.end());
     }
     const auto recording = simulation::record_for_mapping(
-        place, drive(place, way, spacing_m, views), components + 2, simulation::make_noisy_wheels(),
-        1000 * place.seed, executor);
+        place, drive(place, path, spacing_m, views), components + 2,
+        simulation::make_noisy_wheels(), 1000 * place.seed, executor);
     for (const bool wheels : {false, true}) {
       const auto mapped = simulation::map_recording(recording, {.wheels = wheels});
       right += mapped.right_closures;
@@ -356,7 +358,7 @@ void MappingExperiments::reproduce_world(const std::string& name) const {
   constexpr double length_m = 60.0;
   constexpr double spacing_m = 0.15;
   const simulation::PlaceRecording place = simulation::make_empty_place(
-      simulation::read_world(options.data, name), options.seed, options.columns, executor);
+      simulation::read_gazebo_world(options.data, name), options.seed, options.columns, executor);
   WorldErrors errors;
   for (int run = 0; run < options.runs; ++run) {
     Random random(options.seed, 300 + static_cast<std::uint64_t>(run));
@@ -377,14 +379,15 @@ void MappingExperiments::reproduce_world(const std::string& name) const {
   add(".open", "of the views alone, one scale, no closure", errors.open);
   add(".closed", "of the views alone, one scale, loops closed", errors.closed);
   add(".ground_open", "of the views alone, height of the camera known, no closure",
-      errors.ground_open);
-  add(".ground", "of the views alone, height of the camera known, loops closed", errors.ground);
+      errors.known_height_open);
+  add(".ground", "of the views alone, height of the camera known, loops closed",
+      errors.known_height);
   add(".closed_wheels", "with steps from these wheels, loops closed", errors.with_wheels);
   add_rate(result, id + ".better", what + "paths on which ours, steps from wheels, is better",
            errors.count_better_than_wheels(errors.with_wheels), runs, at_least(0.5));
   add_rate(result, id + ".better_without",
            what + "paths on which ours, views and height of the camera alone, is better",
-           errors.count_better_than_wheels(errors.ground), runs);
+           errors.count_better_than_wheels(errors.known_height), runs);
   add_rate(result, id + ".right_closures", what + "closures between views at most 1 m apart",
            errors.right, std::max<std::size_t>(1, errors.right + errors.wrong));
   add_plot(result, "f11_" + name + ".svg",
@@ -414,19 +417,20 @@ void MappingExperiments::reproduce_recordings() const {
 }
 
 void MappingExperiments::measure_large_maps() const {
-  // Each round has a small lateral offset.
+  // Each round has its own small lateral offset, so that no view repeats exactly.
   constexpr int columns = 256;
   const simulation::PlaceRecording place = simulation::make_empty_place(
       simulation::make_scene("loop", {.seed = options.seed}), options.seed, columns, executor);
   Random random(options.seed, 400);
-  std::vector<Point2> way;
+  std::vector<Point2> path;
   const auto rounds = options.max_views / 180 + 2;
   for (int round = 0; round < rounds; ++round) {
-    const double aside_m = random.uniform(-0.15, 0.15);
-    for (const Point2& p : place.scene.tour) way.push_back({p.x_m + aside_m, p.y_m + aside_m});
+    const double lateral_offset_m = random.uniform(-0.15, 0.15);
+    for (const Point2& p : place.scene.tour)
+      path.push_back({p.x_m + lateral_offset_m, p.y_m + lateral_offset_m});
   }
   const auto recording = simulation::record_for_mapping(
-      place, drive(place, way, 0.1, static_cast<std::size_t>(options.max_views)), components + 2,
+      place, drive(place, path, 0.1, static_cast<std::size_t>(options.max_views)), components + 2,
       simulation::make_noisy_wheels(), 1000 * options.seed, executor);
   for (std::size_t views = 100; views <= recording.views.size(); views *= 10) {
     const auto mapped = simulation::map_recording(recording, {.max_nodes = views});
@@ -440,12 +444,12 @@ void MappingExperiments::measure_large_maps() const {
             "ms");
     add_row(result, id + ".finish", what + ": the last optimisation of the whole",
             1e3 * mapped.finish_s, "ms");
-    // The mapper keeps view, path length and component of each node for its search for closures.
-    constexpr std::size_t passed_node_bytes = 3 * sizeof(double);
+    // For its closure search the mapper stores view, path length and component of each node.
+    constexpr std::size_t search_node_bytes = 3 * sizeof(double);
     const double bytes = static_cast<double>(
         mapped.map.nodes.size() *
             (static_cast<std::size_t>(2 * recording.views.front().rows() * components) +
-             sizeof(TopologicalMap::Node) + passed_node_bytes) +
+             sizeof(TopologicalMap::Node) + search_node_bytes) +
         mapped.map.edges.size() * (sizeof(TopologicalMap::Edge) + sizeof(PoseEdge)));
     add_row(result, id + ".memory", what + ": packed signatures, nodes and edges", 1e-6 * bytes,
             "MB");

@@ -1,4 +1,4 @@
-// [M03] section 4.1, announced by its authors: a long corridor with a loop, identical doors and
+// [M03] section 4.1, future work of its authors: a long corridor with a loop, identical doors and
 // junctions.
 
 #include <algorithm>
@@ -19,18 +19,19 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr std::uint64_t seed_of_corridor = 70'000;
-constexpr int max_images = 64;  // 16 m: more than lies between two distinct things of the ring
-constexpr std::size_t images_after = 10;
-constexpr double right_m = 0.5;
+constexpr std::uint64_t corridor_seed = 70'000;
+constexpr int max_images = 64;  // 16 m: longer than any stretch of the ring without distinct object
+constexpr std::size_t max_images_after = 10;
+constexpr double correct_radius_m = 0.5;
 
-// Half a period of the highest of 15 components: what covers less has hardly a part in them.
-constexpr int distinct_degrees = 13;
+// Half a period of the highest of 15 components: smaller objects contribute hardly anything to
+// them.
+constexpr int min_distinct_degrees = 13;
 
-struct Box {
+struct BoundingBox {
   simulation::Vector3 low{1e9, 1e9, 1e9};
   simulation::Vector3 high{-1e9, -1e9, -1e9};
-  [[nodiscard]] bool holds(const simulation::Vector3& p) const {
+  [[nodiscard]] bool contains(const simulation::Vector3& p) const {
     constexpr double margin = 0.02;
     return p.x_m >= low.x_m - margin && p.x_m <= high.x_m + margin && p.y_m >= low.y_m - margin &&
            p.y_m <= high.y_m + margin && p.z_m >= low.z_m - margin && p.z_m <= high.z_m + margin;
@@ -38,10 +39,10 @@ struct Box {
 };
 
 /// Returns the boxes around the objects that exist only once in the corridor.
-std::vector<Box> find_distinct_objects(const simulation::Scene& scene) {
-  std::vector<Box> boxes;
+std::vector<BoundingBox> find_distinct_objects(const simulation::Scene& scene) {
+  std::vector<BoundingBox> boxes;
   for (const std::string_view name : {"window", "notice board", "plant"}) {
-    Box box;
+    BoundingBox box;
     for (const simulation::Mesh& mesh : scene.meshes) {
       if (!std::string_view(mesh.object).starts_with(name)) continue;
       for (const simulation::Vector3& v : mesh.vertices) {
@@ -56,9 +57,9 @@ std::vector<Box> find_distinct_objects(const simulation::Scene& scene) {
   return boxes;
 }
 
-/// True if one of the objects covers at least `distinct_degrees` of the view.
-bool has_dominant_object(const simulation::PlaceRecording& place, std::span<const Box> things,
-                         Point2 at) {
+/// True if one of the distinct objects covers at least `min_distinct_degrees` of azimuth.
+bool is_distinct_object_visible(const simulation::PlaceRecording& place,
+                                std::span<const BoundingBox> things, Point2 at) {
   const simulation::Vector3 eye{at.x_m, at.y_m, place.scene.camera_height_m};
   std::vector<int> covered(things.size());
   for (int azimuth = 0; azimuth < 360; ++azimuth) {
@@ -70,18 +71,18 @@ bool has_dominant_object(const simulation::PlaceRecording& place, std::span<cons
       const simulation::Vector3 hit{eye.x_m + way * ray.x, eye.y_m + way * ray.y,
                                     eye.z_m + way * ray.z};
       for (std::size_t t = 0; t < things.size(); ++t) {
-        if (things[t].holds(hit)) seen[t] = true;
+        if (things[t].contains(hit)) seen[t] = true;
       }
     }
     for (std::size_t t = 0; t < things.size(); ++t) covered[t] += seen[t] ? 1 : 0;
   }
-  return std::ranges::any_of(covered, [](int degrees) { return degrees >= distinct_degrees; });
+  return std::ranges::any_of(covered, [](int degrees) { return degrees >= min_distinct_degrees; });
 }
 
-/// Plans a drive along the ring from a random start in a random direction, up to 0.3 m off the
-/// middle.
+/// Plans a drive along the ring from a random start in a random direction, with a lateral offset of
+/// up to 0.3 m.
 std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& random) {
-  const double aside = random.uniform(-0.3, 0.3);
+  const double lateral_offset_m = random.uniform(-0.3, 0.3);
   const bool backwards = random.index(2) == 1;
   Point2 middle;
   for (const Point2 p : scene.tour) {
@@ -90,8 +91,8 @@ std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& rando
   }
   std::vector<Point2> ring;
   for (const Point2 p : scene.tour) {
-    ring.push_back({p.x_m + (middle.x_m > p.x_m ? aside : -aside),
-                    p.y_m + (middle.y_m > p.y_m ? aside : -aside)});
+    ring.push_back({p.x_m + (middle.x_m > p.x_m ? lateral_offset_m : -lateral_offset_m),
+                    p.y_m + (middle.y_m > p.y_m ? lateral_offset_m : -lateral_offset_m)});
   }
   if (backwards) std::ranges::reverse(ring);
   std::vector<Pose2> way;
@@ -116,8 +117,8 @@ std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& rando
 
 struct CorridorRuns {
   std::vector<RunSet> sets;
-  std::vector<std::optional<std::size_t>> first_distinct;  ///< step of each run
-  std::vector<viewer::MapLayer> things;                    ///< of the first scene
+  std::vector<std::optional<std::size_t>> first_distinct;  ///< per run, step of first distinct view
+  std::vector<viewer::MapLayer> things;                    ///< map layers of the first scene
 };
 
 CorridorRuns record_corridors(const TrackingExperiments& m03) {
@@ -138,9 +139,9 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
       Random random(seed * 1000003U + 70U, r);
       ways[r] = plan_ring_drive(place.scene, random);
       for (std::size_t i = 0; i < ways[r].size(); ++i) {
-        if (!has_dominant_object(place, things, ways[r][i].position())) continue;
+        if (!is_distinct_object_visible(place, things, ways[r][i].position())) continue;
         first[r] = i;
-        ways[r].resize(std::min(ways[r].size(), i + images_after));
+        ways[r].resize(std::min(ways[r].size(), i + max_images_after));
         break;
       }
     });
@@ -151,7 +152,7 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
         executor));
     if (s == 0) {
       viewer::MapLayer layer{.label = "stands only once", .colour = viewer::PlotColour::green};
-      for (const Box& box : things) {
+      for (const BoundingBox& box : things) {
         layer.crosses.push_back(
             {0.5 * (box.low.x_m + box.high.x_m), 0.5 * (box.low.y_m + box.high.y_m)});
       }
@@ -162,37 +163,37 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
   return corridors;
 }
 
-// Counts of hypotheses before and after the first distinct place.
+// Counts of hypotheses before and after the first view of a distinct object.
 struct CorridorMeasures {
-  std::size_t before = 0;  // images before it
-  std::size_t kept = 0;    // of these, with a mode near the truth
-  std::size_t sure_before = 0;
-  std::size_t reached = 0;  // runs that come to a distinct place
+  std::size_t before = 0;            // images before it
+  std::size_t near_mode_before = 0;  // of these, with a mode near the truth
+  std::size_t localised_before = 0;
+  std::size_t distinct_runs = 0;  // runs that reach such a view
   std::size_t right = 0;
-  std::size_t right_for_good = 0;
-  std::vector<double> ways;        // images before it, of each such run
-  std::vector<double> hypotheses;  // modes, of each image before it
+  std::size_t right_to_end = 0;
+  std::vector<double> ways;        // images before that view, per such run
+  std::vector<double> hypotheses;  // number of modes, per image before it
 
   void add(const TrackedRun& run, std::optional<std::size_t> first) {
     std::optional<std::size_t> found;
     bool lost_again = false;
     for (const TrackedImage& image : run) {
-      const bool is_right = image.error_m < right_m;
+      const bool is_right = image.error_m < correct_radius_m;
       if (!first || image.step < *first) {
         ++before;
-        kept += image.nearest_mode_m < right_m ? 1 : 0;
-        sure_before += image.state == LocalisationState::localised ? 1 : 0;
+        near_mode_before += image.nearest_mode_m < correct_radius_m ? 1 : 0;
+        localised_before += image.state == LocalisationState::localised ? 1 : 0;
         hypotheses.push_back(static_cast<double>(image.modes));
         continue;
       }
       if (is_right && !found) found = image.step - *first;
       if (!is_right && image.step >= *first + 3) lost_again = true;
     }
-    if (!first) return;  // it never came to a distinct place
-    ++reached;
+    if (!first) return;  // no distinct object came into view
+    ++distinct_runs;
     ways.push_back(static_cast<double>(*first));
     right += found && *found < 3 ? 1 : 0;
-    right_for_good += found && *found < 3 && !lost_again ? 1 : 0;
+    right_to_end += found && *found < 3 && !lost_again ? 1 : 0;
   }
 };
 
@@ -201,37 +202,37 @@ struct CorridorMeasures {
 void TrackingExperiments::reproduce_corridor() {
   const CorridorRuns corridors = record_corridors(*this);
   const FilterSetting setting;
-  const auto runs = track(corridors.sets, setting, seed_of_corridor);
-  CorridorMeasures of;
-  for (std::size_t r = 0; r < runs.size(); ++r) of.add(runs[r], corridors.first_distinct[r]);
+  const auto runs = track(corridors.sets, setting, corridor_seed);
+  CorridorMeasures measures;
+  for (std::size_t r = 0; r < runs.size(); ++r) measures.add(runs[r], corridors.first_distinct[r]);
   const RunRows rows{result, "m03.corridor", "corridor", corridors.sets, runs};
-  if (of.before > 0) {
+  if (measures.before > 0) {
     add_rate(
         result, "m03.corridor.kept_before",
         "corridor of identical doors, from a random start on the ring; the first distinct place "
         "is where the window, the notice board or the plant first covers " +
-            std::to_string(distinct_degrees) +
+            std::to_string(min_distinct_degrees) +
             " degrees of the view; before it, images after which a mode is within 0.5 m of "
             "the truth",
-        of.kept, of.before, at_least(0.99));
+        measures.near_mode_before, measures.before, at_least(0.99));
     rows.append_single_image_rates();
     add_rate(result, "m03.corridor.sure_before",
              "corridor: before the first distinct place, images at which it reports localised",
-             of.sure_before, of.before);
+             measures.localised_before, measures.before);
     add_mean(result, "m03.corridor.modes_before",
-             "corridor: modes kept before the first distinct place", "modes", of.hypotheses);
+             "corridor: modes kept before the first distinct place", "modes", measures.hypotheses);
   }
   rows.add_rate_of_wrong_answers(at_most(0.0));
-  if (of.reached > 0) {
+  if (measures.distinct_runs > 0) {
     add_rate(result, "m03.corridor.right_after",
              "corridor: runs whose heaviest mode is within 0.5 m of the truth at the first "
              "distinct place or one of the two images after it",
-             of.right, of.reached, at_least(0.99));
+             measures.right, measures.distinct_runs, at_least(0.99));
     add_rate(result, "m03.corridor.right_for_good",
              "corridor: the same, and at all images from the fourth to the tenth",
-             of.right_for_good, of.reached);
+             measures.right_to_end, measures.distinct_runs);
     add_median(result, "m03.corridor.images_before",
-               "corridor: images before the first distinct place", "images", of.ways);
+               "corridor: images before the first distinct place", "images", measures.ways);
   }
   const RunSet& shown = corridors.sets.front();
   const std::size_t last = shown.runs.front().steps.size() - 1;
@@ -241,7 +242,7 @@ void TrackingExperiments::reproduce_corridor() {
            "A corridor of identical doors: the particles keep to places that look alike until "
            "something that stands only once comes into view.",
            make_particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,
-                              seed_of_corridor, steps, "Corridor"),
+                              corridor_seed, steps, "Corridor"),
            2);
 }
 

@@ -1,4 +1,4 @@
-// Rows and images that the experiments of [M03] share.
+// Result rows and images shared by the experiments of [M03].
 
 #include "lab/m03/experiments.hpp"
 
@@ -70,13 +70,13 @@ viewer::Series make_error_series(const std::string& label, std::span<const Track
   return series;
 }
 
-void RunRows::add_images(std::optional<Target> target,
-                         std::optional<std::pair<double, double>> published) const {
+void RunRows::add_images_until_localised(std::optional<Target> target,
+                                         std::optional<std::pair<double, double>> published) const {
   add_median(
       result, id + ".images",
       what + ": images until the error is below " + format_centimetres(radius_m) + " from then on",
       "images", capped_images_until_localised(runs, radius_m, first_step),
-      judged ? target : std::nullopt, published);
+      with_targets ? target : std::nullopt, published);
   append_single_image_rates();
 }
 
@@ -89,13 +89,13 @@ void RunRows::add_rate_localised_within(int images, std::optional<Target> target
   const std::string count = std::to_string(images);
   add_rate(result, id + ".within_" + count, what + ": runs localised within " + count + " images",
            count_localised_within(runs, radius_m, images, first_step), runs.size(),
-           judged ? target : std::nullopt);
+           with_targets ? target : std::nullopt);
 }
 
 void RunRows::add_error_after(std::size_t images, std::optional<Target> target) const {
   const std::string count = std::to_string(images);
   add_median(result, id + ".error_" + count, what + ": error after " + count + " images", "m",
-             errors_after(runs, images), judged ? target : std::nullopt);
+             errors_after(runs, images), with_targets ? target : std::nullopt);
 }
 
 void RunRows::add_rate_of_wrong_answers(std::optional<Target> target) const {
@@ -127,7 +127,7 @@ void RunRows::append_single_image_rates() const {
 
 namespace {
 
-// Returns the layers of one panel: particles and estimate of the filter at a step.
+// Returns the map layers of one panel: references, particles, true position and estimate at a step.
 std::vector<viewer::MapLayer> make_particle_layers(const TrackingPlace& place, const Pose2& truth,
                                                    const MonteCarloLocaliser& filter,
                                                    const MonteCarloEstimate& estimate) {
@@ -154,7 +154,7 @@ std::vector<viewer::MapPlot> make_particle_maps(const TrackingPlace& place,
                                                 std::span<const std::size_t> steps,
                                                 const std::string& title) {
   std::vector<viewer::MapPlot> maps;
-  // The estimate's line is cut where the robot was kidnapped.
+  // The line of the truth is cut where the robot was kidnapped.
   std::vector<std::vector<Point2>> truths;
   std::vector<std::vector<Point2>> estimates;
   std::size_t images = 0;

@@ -15,13 +15,13 @@ namespace panonav::lab {
 
 /// Spacing of the references in the office, and distance between two images of a run.
 inline constexpr double m03_spacing_m = 0.25;
-/// Number of images that counts for runs that need more or are never localised.
+/// Maximum of counted images; also the count of runs that need more or are never localised.
 inline constexpr int m03_max_images = 15;
-/// Error above which a pose is wrong.
+/// Position error above which an estimate is wrong.
 inline constexpr double m03_wrong_m = 1.0;
 inline constexpr std::size_t m03_images_before_kidnapping = 10;
 
-/// Runs in one place.
+/// Runs through one place, with the map that they are tracked in.
 struct RunSet {
   std::shared_ptr<const TrackingPlace> place;
   std::vector<TrackingRun> runs;
@@ -29,29 +29,30 @@ struct RunSet {
 };
 [[nodiscard]] RunSet make_run_set(std::shared_ptr<const TrackingPlace> place,
                                   std::vector<TrackingRun> runs, Executor& executor);
-/// Sums the localisation of single images over all sets.
+/// Sums the counts of single-image localisation over all sets.
 [[nodiscard]] SingleImages sum_single_images(std::span<const RunSet> sets);
 
-/// An office with everything that happens in it.
+/// All recorded runs through one office.
 struct OfficeRuns {
   std::vector<viewer::MapLayer> furniture;
   RunSet constant_heading;  ///< clean
   RunSet hard;
-  RunSet kidnapped;  ///< hard; 10 images, then kidnapped by at least 1 m
+  RunSet kidnapped;  ///< hard condition; carried off by at least 1 m after 10 images
 };
 
-/// Returns the images until localised, each at most `m03_max_images`.
+/// Returns the number of images until each run is localised, at most `m03_max_images`.
 [[nodiscard]] std::vector<double> capped_images_until_localised(std::span<const TrackedRun> runs,
                                                                 double radius_m,
                                                                 std::size_t first_step = 0);
-/// Counts the runs that are localised within `images` images.
+/// Counts the runs that are localised within `images` images from `first_step` on.
 [[nodiscard]] std::size_t count_localised_within(std::span<const TrackedRun> runs, double radius_m,
                                                  int images, std::size_t first_step = 0);
-/// Returns the errors after `images` images from `first_step` on; shorter runs are left out.
+/// Returns the error of each run at image number `images` from `first_step` on, without runs that
+/// are shorter.
 [[nodiscard]] std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step = 0);
-/// Makes the series of median errors over the images with the 5 % and 95 % quantiles as bars,
-/// shifted by `shift` along x.
+/// Makes the series of median errors against the number of images, with the 5 % and 95 % quantiles
+/// as bars; `shift` is added to all x, so that bars of several series do not overlap.
 [[nodiscard]] viewer::Series make_error_series(const std::string& label,
                                                std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step, double shift);
@@ -62,7 +63,7 @@ struct OfficeRuns {
     const FilterSetting& setting, std::uint64_t seed, std::span<const std::size_t> steps,
     const std::string& title);
 
-/// Adds rows of the runs of some sets through a filter; ids begin with `id`, texts with `what`.
+/// Adds result rows of runs that a filter tracked; ids begin with `id`, texts with `what`.
 struct RunRows {
   Reproduction& result;
   std::string id;
@@ -71,56 +72,57 @@ struct RunRows {
   std::span<const TrackedRun> runs;
   double radius_m = m03_spacing_m;  ///< within which a run is localised
   std::size_t first_step = 0;       ///< from which images are counted
-  bool judged = true;               ///< otherwise targets are left out
+  bool with_targets = true;         ///< false: rows have no targets
 
-  /// Adds the images until localised, with the rates of single images.
-  void add_images(std::optional<Target> target = std::nullopt,
-                  std::optional<std::pair<double, double>> published = std::nullopt) const;
+  /// Adds the median number of images until localised, with the rates of single images.
+  void add_images_until_localised(
+      std::optional<Target> target = std::nullopt,
+      std::optional<std::pair<double, double>> published = std::nullopt) const;
   void add_images_mean() const;
   void add_rate_localised_within(int images, std::optional<Target> target = std::nullopt) const;
   void add_error_after(std::size_t images, std::optional<Target> target = std::nullopt) const;
-  /// Adds the rate at which the filter reports localised with an error above `m03_wrong_m`.
+  /// Adds the rate of images at which the filter reports localised but its error is above
+  /// `m03_wrong_m`.
   void add_rate_of_wrong_answers(std::optional<Target> target = std::nullopt) const;
   /// Appends the rates of single images to `over` of the last row: "one image alone: right 74 % (by
   /// dissimilarity only 54 %), within 25 cm 96 %".
   void append_single_image_rates() const;
 };
 
-/// The experiments of [M03], and those that its authors announced.
+/// The experiments of [M03], and those that its authors announced as future work.
 struct TrackingExperiments : Experiments {
-  std::vector<OfficeRuns> offices{};  ///< the first four experiments need one at least
+  std::vector<OfficeRuns> offices{};  ///< recorded first; the next four experiments use them
 
   void record_office(int number);
-  /// [M03] section 4.1, Global Localisation and figure 7 (1-3).
+  /// Reproduces [M03] section 4.1, Global Localisation and figure 7 (1-3).
   void reproduce_global_localisation();
-  /// [M03] section 4.1, Position Tracking and figure 7 (4-6).
+  /// Reproduces [M03] section 4.1, Position Tracking and figure 7 (4-6).
   void reproduce_position_tracking();
-  /// [M03] section 4.1, Kidnapped Robot and figures 8 and 9.
+  /// Reproduces [M03] section 4.1, Kidnapped Robot and figures 8 and 9.
   void reproduce_kidnapping();
-  /// Varies numbers of particles and noise of odometry.
+  /// Varies the number of particles and the noise of odometry.
   void reproduce_sweeps();
   /// Reproduces "a long indoor corridor with a loop where we face many false hypothesis".
   void reproduce_corridor();
   /// Reproduces "a large outdoor environment where we are investigating the different nature of
   /// brightness variations".
   void reproduce_garden();
-  /// Runs a robot that leaves the memorised half of the scene `name` and returns.
+  /// Tracks a robot that leaves the memorised half of the scene `name` and returns.
   void reproduce_leaving(const std::string& name);
   /// Reproduces global localisation in the world `name` of `options.data`. Throws FileError.
   void reproduce_gazebo_world(const std::string& name);
-  /// Localises in the recordings sussex_route and gantry_plants of `options.data`. Throw FileError.
+  /// Localise in the recordings sussex_route and gantry_plants of `options.data`. Throw FileError.
   void reproduce_recorded_route();
   void reproduce_gantry();
 
   /// Records variant `number` of a built-in scene with its references.
   [[nodiscard]] simulation::PlaceRecording record_variant(const std::string& scene, int number,
                                                           double spacing_m, int columns) const;
-  /// Tracks all runs of all sets by a filter, in order. Runs of different sets have different
-  /// seeds.
+  /// Tracks all runs of all sets by a filter, in order. Each run has its own seed.
   [[nodiscard]] std::vector<TrackedRun> track(std::span<const RunSet> sets,
                                               const FilterSetting& setting,
                                               std::uint64_t seed) const;
-  /// Returns one set of runs of each office.
+  /// Returns the run set `set` of each office.
   [[nodiscard]] std::vector<RunSet> collect_sets(RunSet OfficeRuns::*set) const;
 };
 

@@ -1,4 +1,4 @@
-// [M03] section 4.1, announced by its authors: changing brightness outdoors.
+// [M03] section 4.1, future work of its authors: changing brightness outdoors.
 
 #include <algorithm>
 #include <array>
@@ -16,15 +16,15 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr std::uint64_t seed_of_garden = 80'000;
+constexpr std::uint64_t garden_seed = 80'000;
 constexpr double garden_spacing_m = 0.5;
 constexpr int images = 16;
 constexpr std::array<double, 7> lights{0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0};
-// A cloud comes and goes, then the sun: a step in each image.
+// Indices into `lights`, one per image: a cloud passes, then the sun comes out.
 constexpr std::array<std::size_t, 12> changing{3, 2, 1, 0, 1, 2, 3, 4, 5, 6, 5, 4};
 
 struct GardenRuns {
-  std::array<std::vector<RunSet>, lights.size()> constant;  ///< the same ways in each light
+  std::array<std::vector<RunSet>, lights.size()> constant_light;  ///< the same paths in each light
   std::vector<RunSet> changing;
 };
 
@@ -62,7 +62,7 @@ GardenRuns record_gardens(const TrackingExperiments& m03) {
       }
     }
     for (std::size_t l = 0; l < lights.size(); ++l) {
-      gardens.constant[l].push_back(make_run_set(remembered, std::move(runs[l]), executor));
+      gardens.constant_light[l].push_back(make_run_set(remembered, std::move(runs[l]), executor));
     }
     gardens.changing.push_back(make_run_set(remembered, std::move(under_clouds), executor));
   }
@@ -75,10 +75,10 @@ void TrackingExperiments::reproduce_garden() {
   const GardenRuns gardens = record_gardens(*this);
   const auto add_rows = [&](const std::string& id, const std::string& light,
                             std::span<const RunSet> sets) {
-    auto runs = track(sets, FilterSetting{}, seed_of_garden);
+    auto runs = track(sets, FilterSetting{}, garden_seed);
     const RunRows rows{result, "m03.garden." + id, "garden, 50 cm grid, " + light, sets,
                        runs,   garden_spacing_m};
-    rows.add_images();
+    rows.add_images_until_localised();
     rows.add_rate_localised_within(10);
     rows.add_error_after(10);
     rows.add_rate_of_wrong_answers();
@@ -92,8 +92,8 @@ void TrackingExperiments::reproduce_garden() {
   for (std::size_t l = 0; l < lights.size(); ++l) {
     const auto runs = add_rows("light_" + format_fixed(lights[l], 2),
                                "light " + format_fixed(lights[l], 2) + " times that of the memory",
-                               gardens.constant[l]);
-    const SingleImages single = sum_single_images(gardens.constant[l]);
+                               gardens.constant_light[l]);
+    const SingleImages single = sum_single_images(gardens.constant_light[l]);
     add_point(right, lights[l], success_rate(single.right, single.images));
     add_point(near, lights[l], success_rate(single.near, single.images));
     const auto share_within = [&](int images) {

@@ -26,19 +26,22 @@ constexpr std::size_t images_before_blind = 10;
 constexpr std::size_t blind_steps = 8;  // of 0.25 m: 2 m
 constexpr std::size_t first_after_blind = images_before_blind + blind_steps;
 
-struct Rule {
+struct NamedInjection {
   InjectionMethod injection;
   std::string id;
   std::string name;
 };
-const Rule no_injection{InjectionMethod::none, "none", "nothing injected"};
-const Rule anywhere_injection{InjectionMethod::uniform, "uniform", "50 injected anywhere"};
-const Rule paper_injection{InjectionMethod::topological, "topological", "the paper's injection"};
-const Rule own_injection{InjectionMethod::explained, "explained", "our rule of injection"};
+const NamedInjection no_injection{InjectionMethod::none, "none", "nothing injected"};
+const NamedInjection anywhere_injection{InjectionMethod::uniform, "uniform",
+                                        "50 injected anywhere"};
+const NamedInjection paper_injection{InjectionMethod::topological, "topological",
+                                     "the paper's injection"};
+const NamedInjection own_injection{InjectionMethod::explained, "explained",
+                                   "our rule of injection"};
 
 void add_paper_rows(const TrackingExperiments& m03) {
   const auto sets = m03.collect_sets(&OfficeRuns::constant_heading);
-  for (const Rule& rule : {no_injection, paper_injection}) {
+  for (const NamedInjection& rule : {no_injection, paper_injection}) {
     FilterSetting setting = paper_setting();
     setting.injection = rule.injection;
     const auto runs = m03.track(sets, setting, seed_of_clean);
@@ -48,8 +51,9 @@ void add_paper_rows(const TrackingExperiments& m03) {
                        .what = "global localisation as the paper's, clean, " + rule.name,
                        .sets = sets,
                        .runs = runs,
-                       .judged = is_papers};
-    rows.add_images(at_most(4.0), is_papers ? std::optional(std::pair{5.0, 6.0}) : std::nullopt);
+                       .with_targets = is_papers};
+    rows.add_images_until_localised(at_most(4.0),
+                                    is_papers ? std::optional(std::pair{5.0, 6.0}) : std::nullopt);
     rows.add_images_mean();
     rows.add_rate_localised_within(10, at_least(0.99));
     rows.add_error_after(10, at_most(m03_spacing_m));
@@ -57,16 +61,16 @@ void add_paper_rows(const TrackingExperiments& m03) {
   }
 }
 
-void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets, const Rule& rule,
-                   std::span<const TrackedRun> runs) {
+void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
+                   const NamedInjection& rule, std::span<const TrackedRun> runs) {
   const RunRows rows{.result = m03.result,
                      .id = "m03.global.hard." + rule.id,
                      .what = "global localisation, heading unknown, compass on, hard, " + rule.name,
                      .sets = sets,
                      .runs = runs,
-                     .judged = rule.injection == InjectionMethod::topological ||
-                               rule.injection == InjectionMethod::explained};
-  rows.add_images(at_most(4.0));
+                     .with_targets = rule.injection == InjectionMethod::topological ||
+                                     rule.injection == InjectionMethod::explained};
+  rows.add_images_until_localised(at_most(4.0));
   rows.add_images_mean();
   rows.add_rate_localised_within(10, at_least(0.99));
   rows.add_error_after(10, at_most(0.5 * m03_spacing_m));
@@ -85,7 +89,7 @@ void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
   rows.add_rate_of_wrong_answers();
 }
 
-void add_ratio_row(const Rule& rule, const std::vector<double>& with,
+void add_ratio_row(const NamedInjection& rule, const std::vector<double>& with,
                    const std::vector<double>& without, Reproduction& result) {
   std::vector<double> saved;
   for (std::size_t i = 0; i < with.size(); ++i) saved.push_back(with[i] / mean(without));
@@ -99,19 +103,19 @@ void add_ratio_row(const Rule& rule, const std::vector<double>& with,
                                                          : std::nullopt);
 }
 
-// Returns "large odometric errors": 20 % of the distance and 10 degrees a metre.
+// Returns the setting for "large odometric errors": 20 % of the distance and 10 degrees per metre.
 FilterSetting large_error_setting(InjectionMethod injection) {
   FilterSetting setting = compass_setting(injection);
   setting.odometry.translation_from_translation = 0.05;
   setting.odometry.translation_scale_error = 0.2;
   setting.odometry.rotation_from_translation = radians(10.0);
-  // The filter has no model of a wrong scale: it assumes as much random error instead.
+  // The filter does not model a scale error, so its random error is set as large as both together.
   setting.assumed_odometry.translation_from_translation = 0.25;
   setting.assumed_odometry.rotation_from_translation = radians(10.0);
   return setting;
 }
 
-// Returns the runs that were localised before the stretch without images.
+// Returns the runs that are localised at the last image before the stretch without images.
 std::vector<TrackedRun> filter_known_before_blind(std::span<const TrackedRun> runs) {
   std::vector<TrackedRun> known;
   for (const TrackedRun& run : runs) {
@@ -121,7 +125,7 @@ std::vector<TrackedRun> filter_known_before_blind(std::span<const TrackedRun> ru
 }
 
 void add_tracking_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
-                       const Rule& rule, std::span<const TrackedRun> runs,
+                       const NamedInjection& rule, std::span<const TrackedRun> runs,
                        std::span<const TrackedRun> known) {
   const std::string row = "m03.tracking.hard." + rule.id;
   const std::string what =
@@ -131,11 +135,11 @@ void add_tracking_rows(const TrackingExperiments& m03, std::span<const RunSet> s
   add_rate(m03.result, row + ".known_before", what + ": runs with an error below 25 cm before",
            known.size(), runs.size());
   if (known.empty()) return;
-  const auto is_back = [](const TrackedRun& run) {
+  const auto is_relocalised = [](const TrackedRun& run) {
     return images_until_first_fix(run, m03_spacing_m, first_after_blind).value_or(3) <= 2;
   };
   add_rate(m03.result, row + ".back_2", what + ": error below 25 cm at the first or second image",
-           count_where(known, is_back), known.size(),
+           count_where(known, is_relocalised), known.size(),
            rule.injection == InjectionMethod::none ? std::nullopt : std::optional(at_least(0.99)));
   const RunRows rows{.result = m03.result, .id = row, .what = what, .sets = sets, .runs = runs};
   rows.append_single_image_rates();
@@ -148,7 +152,7 @@ void add_tracking_rows(const TrackingExperiments& m03, std::span<const RunSet> s
 }
 
 void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
-                         const Rule& rule, std::span<const TrackedRun> runs,
+                         const NamedInjection& rule, std::span<const TrackedRun> runs,
                          const std::vector<double>& images_of_paper) {
   const RunRows rows{.result = m03.result,
                      .id = "m03.kidnapped.hard." + rule.id,
@@ -156,10 +160,10 @@ void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet>
                      .sets = sets,
                      .runs = runs,
                      .first_step = m03_images_before_kidnapping,
-                     .judged = rule.injection != InjectionMethod::uniform};
-  rows.add_images(at_most(3.0), rule.injection == InjectionMethod::topological
-                                    ? std::optional(std::pair{3.0, 4.0})
-                                    : std::nullopt);
+                     .with_targets = rule.injection != InjectionMethod::uniform};
+  rows.add_images_until_localised(at_most(3.0), rule.injection == InjectionMethod::topological
+                                                    ? std::optional(std::pair{3.0, 4.0})
+                                                    : std::nullopt);
   rows.add_images_mean();
   rows.add_rate_localised_within(8, at_least(0.99));
   rows.add_rate_of_wrong_answers();
@@ -173,7 +177,7 @@ void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet>
           mean_figure(difference), "images", at_most(0.0));
 }
 
-// Success of a filter against a varied quantity.
+// Success rate and number of images of a filter against a varied quantity.
 struct SweepCurve {
   viewer::Series success;
   viewer::Series images;
@@ -233,8 +237,9 @@ void TrackingExperiments::record_office(int number) {
                                .seed = 1}),
       walk(hard_condition(), {.variants = options.variants, .runs_each = options.runs, .seed = 2}),
       {}};
-  // From each run to another one in the same variant, so that only the place changes.
-  std::vector<TrackingRun> carried;
+  // Carry the robot from each run to another run in the same variant, so that only the position
+  // changes.
+  std::vector<TrackingRun> kidnapped_runs;
   const auto each = static_cast<std::size_t>(options.runs);
   for (std::size_t i = 0; i < office.hard.runs.size(); ++i) {
     const std::size_t first = i / each * each;
@@ -242,12 +247,12 @@ void TrackingExperiments::record_office(int number) {
       const TrackingRun& other = office.hard.runs[first + (i - first + k) % each];
       if (auto run = make_kidnapped_run(office.hard.runs[i], other, m03_images_before_kidnapping,
                                         1.0, static_cast<std::size_t>(m03_max_images))) {
-        carried.push_back(std::move(*run));
+        kidnapped_runs.push_back(std::move(*run));
         break;
       }
     }
   }
-  office.kidnapped = {remembered, std::move(carried), office.hard.single_images};
+  office.kidnapped = {remembered, std::move(kidnapped_runs), office.hard.single_images};
   offices.push_back(std::move(office));
 }
 
@@ -261,7 +266,8 @@ void TrackingExperiments::reproduce_global_localisation() {
       .log_y = true,
       .x_range = std::pair{0.5, 15.5}};
   std::vector<double> without;
-  for (const Rule& rule : {no_injection, anywhere_injection, paper_injection, own_injection}) {
+  for (const NamedInjection& rule :
+       {no_injection, anywhere_injection, paper_injection, own_injection}) {
     const auto runs = track(hard, compass_setting(rule.injection), seed_of_hard);
     add_hard_rows(*this, hard, rule, runs);
     const auto images = capped_images_until_localised(runs, m03_spacing_m);
@@ -302,7 +308,7 @@ void TrackingExperiments::reproduce_position_tracking() {
                           .x_label = "images after the blind stretch",
                           .y_label = "error [m]",
                           .x_range = std::pair{0.5, 5.5}};
-  for (const Rule& rule : {paper_injection, own_injection, no_injection}) {
+  for (const NamedInjection& rule : {paper_injection, own_injection, no_injection}) {
     const auto runs = track(sets, large_error_setting(rule.injection), seed_of_tracking);
     const auto known = filter_known_before_blind(runs);
     add_tracking_rows(*this, sets, rule, runs, known);
@@ -335,7 +341,7 @@ void TrackingExperiments::reproduce_kidnapping() {
                           .x_range = std::pair{0.5, 15.5}};
   std::vector<viewer::MapPlot> maps;
   std::vector<double> images_of_paper;
-  for (const Rule& rule : {anywhere_injection, paper_injection, own_injection}) {
+  for (const NamedInjection& rule : {anywhere_injection, paper_injection, own_injection}) {
     const FilterSetting setting = compass_setting(rule.injection);
     const auto runs = track(sets, setting, seed_of_kidnapping);
     if (rule.injection == InjectionMethod::topological) {
@@ -363,7 +369,7 @@ void TrackingExperiments::reproduce_kidnapping() {
 }
 
 void TrackingExperiments::reproduce_sweeps() {
-  struct Kind {
+  struct SweptSetting {
     std::string id;
     std::string name;
     std::string label;  ///< short, for the plots
@@ -373,15 +379,17 @@ void TrackingExperiments::reproduce_sweeps() {
   const auto hard = collect_sets(&OfficeRuns::hard);
   std::vector<SweepCurve> particles;
   std::vector<SweepCurve> odometry;
-  for (const Kind& kind :
-       {Kind{"paper", "as the paper, clean", "as the paper, clean",
-             collect_sets(&OfficeRuns::constant_heading), paper_setting()},
-        Kind{"topological", "compass and the paper's injection, hard", "paper's injection, hard",
-             hard, compass_setting(InjectionMethod::topological)},
-        Kind{"explained", "compass and our rule of injection, hard", "our rule, hard", hard,
-             compass_setting(InjectionMethod::explained)}}) {
-    const auto try_out = [&](const std::string& id, const std::string& what, std::uint64_t seed,
-                             const FilterSetting& setting, double x, SweepCurve& curve) {
+  for (const SweptSetting& kind :
+       {SweptSetting{"paper", "as the paper, clean", "as the paper, clean",
+                     collect_sets(&OfficeRuns::constant_heading), paper_setting()},
+        SweptSetting{"topological", "compass and the paper's injection, hard",
+                     "paper's injection, hard", hard,
+                     compass_setting(InjectionMethod::topological)},
+        SweptSetting{"explained", "compass and our rule of injection, hard", "our rule, hard", hard,
+                     compass_setting(InjectionMethod::explained)}}) {
+    const auto add_sweep_point = [&](const std::string& id, const std::string& what,
+                                     std::uint64_t seed, const FilterSetting& setting, double x,
+                                     SweepCurve& curve) {
       const auto runs = track(kind.sets, setting, seed);
       const RunRows rows{result, "m03." + id + "." + kind.id + "." + format_number(x),
                          what + ", " + kind.name, kind.sets, runs};
@@ -393,16 +401,17 @@ void TrackingExperiments::reproduce_sweeps() {
     for (const double share : {0.1, 0.25, 0.5, 1.0, 2.0, 4.0}) {
       FilterSetting setting = kind.setting;
       setting.particles_per_reference = share;
-      try_out("particles", format_number(share) + " particles a reference", seed_of_particles,
-              setting, share, particles.back());
+      add_sweep_point("particles", format_number(share) + " particles a reference",
+                      seed_of_particles, setting, share, particles.back());
     }
     odometry.emplace_back(kind.label);
     for (const double factor : {0.5, 1.0, 2.0, 4.0, 8.0}) {
       FilterSetting setting = kind.setting;
       scale_noise(setting.odometry, factor);
       scale_noise(setting.assumed_odometry, factor);
-      try_out("odometry", "odometry with " + format_number(factor) + " times the usual noise",
-              seed_of_odometry, setting, factor, odometry.back());
+      add_sweep_point("odometry",
+                      "odometry with " + format_number(factor) + " times the usual noise",
+                      seed_of_odometry, setting, factor, odometry.back());
     }
   }
   draw_curves(*this, "particles", "Number of particles", "particles a reference", particles);

@@ -1,4 +1,5 @@
-// Global localisation in Gazebo worlds and on real views: a route outdoors, a gantry over plants.
+// Global localisation in Gazebo worlds and on real views: an outdoor route, and a gantry over
+// plants.
 
 #include <algorithm>
 #include <cmath>
@@ -37,8 +38,8 @@ std::vector<RecordedView> read_views(const std::filesystem::path& folder) {
   return views;
 }
 
-/// Fits headings along a path whose positions jitter by more than their spacing: those of a
-/// straight line through the positions within `half` before and after.
+/// Estimates headings along a path whose positions jitter by more than their spacing, by fitting a
+/// line through the positions up to `half` before and after each one.
 std::vector<double> fit_tangents(const std::vector<RecordedView>& views, std::size_t half) {
   std::vector<double> headings;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -56,15 +57,16 @@ std::vector<double> fit_tangents(const std::vector<RecordedView>& views, std::si
   return headings;
 }
 
-void add_rows(const RunRows& rows) {
-  rows.add_images();
+void add_standard_rows(const RunRows& rows) {
+  rows.add_images_until_localised();
   rows.add_images_mean();
   rows.add_rate_localised_within(10);
   rows.add_error_after(10);
   rows.add_rate_of_wrong_answers();
 }
 
-/// Plans a walk over neighbouring places that visits none twice, up to `images` long.
+/// Plans a random walk over neighbouring grid positions without visiting any twice; at most
+/// `images` long, shorter at a dead end.
 std::vector<std::size_t> plan_grid_walk(const std::vector<RecordedView>& views, double spacing_m,
                                         std::size_t images, Random& random) {
   std::vector<std::size_t> walk{static_cast<std::size_t>(random.index(views.size()))};
@@ -88,7 +90,7 @@ std::vector<std::size_t> plan_grid_walk(const std::vector<RecordedView>& views, 
 void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
   constexpr double spacing_m = 0.5;
   const simulation::PlaceRecording place =
-      simulation::record_place(simulation::read_world(options.data, name),
+      simulation::record_place(simulation::read_gazebo_world(options.data, name),
                                {.seed = options.seed,
                                 .spacing_m = spacing_m,
                                 .queries = 1,
@@ -133,21 +135,23 @@ void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
 
 void TrackingExperiments::reproduce_recorded_route() {
   const auto views = read_views(options.data / "sussex_route");
-  constexpr std::size_t around = 8;  // 12 cm of the route
-  constexpr std::size_t stride = 8;  // images of a run are 12 cm apart
+  constexpr std::size_t tangent_half_window = 8;  // half window of the tangent fit; 12 cm
+  constexpr std::size_t stride = 8;               // 12 cm between two images of a run
   constexpr std::size_t images = 20;
   constexpr double spacing_m = 0.1;
-  const auto headings = fit_tangents(views, around);
+  const auto headings = fit_tangents(views, tangent_half_window);
   std::vector<ReferencePose> poses;
   std::vector<const Panorama*> references;
   for (std::size_t i = 0; i < views.size(); i += 2) {
     poses.push_back(views[i].pose);
     references.push_back(&views[i].panorama);
   }
-  auto facing = poses;
-  for (std::size_t k = 0; k < facing.size(); ++k) facing[k].heading_rad = headings[2 * k];
-  const auto plain = make_tracking_place(poses, references, spacing_m, executor);
-  const auto with_headings = make_tracking_place(facing, references, spacing_m, executor);
+  auto poses_with_headings = poses;
+  for (std::size_t k = 0; k < poses_with_headings.size(); ++k)
+    poses_with_headings[k].heading_rad = headings[2 * k];
+  const auto without_headings = make_tracking_place(poses, references, spacing_m, executor);
+  const auto with_headings =
+      make_tracking_place(poses_with_headings, references, spacing_m, executor);
   std::vector<TrackingRun> runs;
   for (std::size_t start = 1; start + stride * (images - 1) < views.size(); start += 4) {
     std::vector<Pose2> truth;
@@ -155,24 +159,27 @@ void TrackingExperiments::reproduce_recorded_route() {
     for (std::size_t k = 0; k < images; ++k) {
       const std::size_t i = start + stride * k;
       truth.push_back({views[i].pose.x_m, views[i].pose.y_m, headings[i]});
-      seen.push_back(compute_packed_signature(views[i].panorama, plain->memory()));
+      seen.push_back(compute_packed_signature(views[i].panorama, without_headings->memory()));
     }
     runs.push_back(make_tracking_run(truth, std::move(seen)));
   }
-  // The tracked positions jitter by some millimetres, and the tangent is not the heading.
+  // The recorded positions jitter by some millimetres, and the tangent of the path is only an
+  // approximation of the heading; hence the large rotation noise.
   FilterSetting setting;
   setting.odometry.rotation_from_translation = setting.assumed_odometry.rotation_from_translation =
       0.1;
   for (const bool compass : {false, true}) {
-    const std::vector<RunSet> sets{make_run_set(compass ? with_headings : plain, runs, executor)};
+    const std::vector<RunSet> sets{
+        make_run_set(compass ? with_headings : without_headings, runs, executor)};
     setting.options.compass = compass;
     const auto tracked = track(sets, setting, seed_of_route);
-    add_rows({result, std::string("m03.sussex_route.") + (compass ? "compass" : "no_compass"),
-              std::string("route outdoors (sussex_route), even images memorised, stretches of 20 "
-                          "odd images 12 cm apart, which overlap, ") +
-                  (compass ? "memory with headings along the path, compass on"
-                           : "memory without headings"),
-              sets, tracked});
+    add_standard_rows(
+        {result, std::string("m03.sussex_route.") + (compass ? "compass" : "no_compass"),
+         std::string("route outdoors (sussex_route), even images memorised, stretches of 20 "
+                     "odd images 12 cm apart, which overlap, ") +
+             (compass ? "memory with headings along the path, compass on"
+                      : "memory without headings"),
+         sets, tracked});
   }
 }
 
@@ -207,10 +214,11 @@ void TrackingExperiments::reproduce_gantry() {
     sets.push_back(make_run_set(remembered, {make_tracking_run(truth, std::move(seen))}, executor));
   }
   const auto tracked = track(sets, setting, seed_of_gantry);
-  add_rows({result, "m03.gantry_plants",
-            "gantry over plants (gantry_plants), random walks over its 10 cm grid, whose views are "
-            "left out of the memory",
-            sets, tracked, 2.0 * spacing_m});
+  add_standard_rows(
+      {result, "m03.gantry_plants",
+       "gantry over plants (gantry_plants), random walks over its 10 cm grid, whose views are "
+       "left out of the memory",
+       sets, tracked, 2.0 * spacing_m});
 }
 
 }  // namespace panonav::lab

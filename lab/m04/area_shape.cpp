@@ -1,6 +1,6 @@
-// [M04] figure 10: how the areas of hierarchical localisation follow the objects around. The
-// authors: "we are investigating the relation between the shape of the localisation areas and the
-// disposition of the objects".
+// [M04] figure 10: how the shape of localisation areas depends on the surrounding objects. Left
+// open by the authors: "we are investigating the relation between the shape of the localisation
+// areas and the disposition of the objects".
 
 #include <algorithm>
 #include <cmath>
@@ -24,22 +24,22 @@ namespace panonav::lab {
 
 namespace {
 
-// A finer grid than the paper's, so that an area of 1 m^2 has a shape; and fewer pixels, because 15
-// components need no more.
+// The grid is finer than the paper's, so that an area of 1 m^2 has a shape; views have fewer
+// pixels, because 15 components need no more.
 constexpr double area_spacing_m = 0.125;
 constexpr int max_view_rows = 40;
 constexpr int view_columns = 256;
-// The shape is looked at where the area is broad, and again where it no longer reaches the border
-// of the grid.
+// Numbers of components at which the shape is measured: with 3 the area is broad, with 6 it no
+// longer reaches the border of the grid.
 constexpr std::array component_counts{3, 6};
 constexpr std::size_t level_count = component_counts.size();
 constexpr double area_tolerance = 0.25;
-// Grid of positions, the same in every scene.
+// Grid of robot positions, the same in every scene.
 constexpr std::size_t places_along_x = 6;
 constexpr std::size_t places_along_y = 3;
 constexpr std::size_t place_count = places_along_x * places_along_y;
 
-// Mean extent around a place over the directions, and the extent per direction over that mean.
+// Mean extent over all directions, and the extent per direction divided by this mean.
 struct Shape {
   double size = 0.0;
   Directional relative{};
@@ -54,18 +54,18 @@ Shape normalise_shape(const Directional& values) {
   return shape;
 }
 
-// Shapes at one place of one scene.
+// Shapes at one position in one scene.
 struct Observation {
   std::array<Shape, level_count> area;       // equivalent radius of the area in each sector
   Shape free;                                // free distance
-  Shape parallax;                            // distance for equal parallax
-  std::array<Shape, level_count> predicted;  // distance for an equal change of the components
+  Shape parallax;                            // distance at which the parallax is equal
+  std::array<Shape, level_count> predicted;  // distance at which the components change equally
 };
-// Indexed by place; empty where furniture stands.
+// Indexed by grid position; nullopt where furniture occupies it.
 using SceneObservations = std::array<std::optional<Observation>, place_count>;
 
-// Returns, for each sector of 45 degrees, the radius of the circle whose sector has the area of the
-// candidates' cells there.
+// Returns the extent of the area per sector of 45 degrees: the radius of a circle whose sector has
+// the area of the candidates' cells in that sector.
 Directional compute_sector_extents(const VisualMemory& memory, const ReferenceAreas& areas,
                                    Point2 robot, const std::vector<Match>& candidates) {
   Directional area_m2{};
@@ -82,16 +82,16 @@ Directional compute_sector_extents(const VisualMemory& memory, const ReferenceAr
   return extents;
 }
 
-// A property of an observation that is correlated with another.
-using Property = double (*)(const Observation&, std::size_t level, std::size_t direction);
+// Returns one property of an observation, to be correlated with another one.
+using PropertyGetter = double (*)(const Observation&, std::size_t level, std::size_t direction);
 
 struct Relation {
   std::string id;
   std::string label;
   std::string what;
-  Property area;
-  Property surroundings;
-  std::size_t directions;  // 1 for sizes
+  PropertyGetter area;
+  PropertyGetter surroundings;
+  std::size_t directions;  // 1 for properties without direction
 };
 
 const std::array<Relation, 5>& relations() {
@@ -137,16 +137,16 @@ const std::array<Relation, 5>& relations() {
   return all;
 }
 
-// Values of one relation less their mean over all scenes for the same place and direction, which
-// removes the influence of the room and of the grid.
+// Values of one relation minus their mean over all scenes at the same position and direction; the
+// subtraction removes the influence of the room and of the grid.
 struct Residuals {
-  // [scene][place * directions + direction]; NaN where there is no observation.
+  // Indexed by [scene][position * directions + direction]; NaN without an observation.
   std::vector<std::vector<double>> area;
   std::vector<std::vector<double>> surroundings;
 };
 
 std::vector<std::vector<double>> compute_residuals(const std::vector<SceneObservations>& scenes,
-                                                   Property property, std::size_t level,
+                                                   PropertyGetter property, std::size_t level,
                                                    std::size_t directions) {
   std::vector<std::vector<double>> result(
       scenes.size(), std::vector<double>(place_count * directions, std::nan("")));
@@ -169,10 +169,11 @@ std::vector<std::vector<double>> compute_residuals(const std::vector<SceneObserv
   return result;
 }
 
-// Returns the rank correlation of the areas of scenes[i] with the surroundings of partners[i]; both
-// lists are equal for the true pairing.
-double correlation(const Residuals& residuals, const std::vector<std::size_t>& scenes,
-                   const std::vector<std::size_t>& partners) {
+// Returns the rank correlation between the areas of scenes[i] and the surroundings of scene
+// partners[i]. With partners equal to scenes it measures the relation, with shuffled partners what
+// chance gives.
+double rank_correlation_of_pairs(const Residuals& residuals, const std::vector<std::size_t>& scenes,
+                                 const std::vector<std::size_t>& partners) {
   std::vector<double> area;
   std::vector<double> around;
   for (std::size_t i = 0; i < scenes.size(); ++i) {
@@ -245,8 +246,8 @@ class AreaShape final : public Experiment {
             normalise_shape(compute_sector_extents(memory, areas, robot.position(), candidates));
         if (scenes_.empty() && level == 0 &&
             shown_places.end() != std::ranges::find(shown_places, p)) {
-          shown_.push_back(
-              draw_area_map(place, areas, robot.position(), candidates, shown_.size() + 1));
+          shown_maps_.push_back(
+              draw_area_map(place, areas, robot.position(), candidates, shown_maps_.size() + 1));
         }
       }
       here[p] = seen;
@@ -256,11 +257,11 @@ class AreaShape final : public Experiment {
 
   void report(Reproduction& result) const override {
     require(!scenes_.empty(), "places", 0.0, ">= 1");
-    if (!shown_.empty()) {
+    if (!shown_maps_.empty()) {
       add_plot(result, "fig10_areas_at_places.svg",
                "Areas after 3 components at places of one office, with its furniture seen from "
                "above ([M04] figure 10).",
-               shown_, 2);
+               shown_maps_, 2);
     }
     std::vector<std::size_t> all(scenes_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
@@ -300,18 +301,18 @@ class AreaShape final : public Experiment {
     for (int draw = 0; draw < bootstrap_draws; ++draw) {
       std::vector<std::size_t> scenes(all.size());
       for (auto& scene : scenes) scene = random.index(all.size());
-      drawn.push_back(correlation(residuals, scenes, scenes));
+      drawn.push_back(rank_correlation_of_pairs(residuals, scenes, scenes));
       std::vector<std::size_t> partners = all;
       for (std::size_t i = partners.size(); i > 1; --i) {
         std::swap(partners[i - 1], partners[random.index(i)]);
       }
-      shuffled.push_back(correlation(residuals, all, partners));
+      shuffled.push_back(rank_correlation_of_pairs(residuals, all, partners));
     }
     add_row(result, id,
             "figure 10, left open by the authors: rank correlation over " +
                 std::to_string(all.size()) + " offices, " + components + " components, of the " +
                 relation.what,
-            Figure(correlation(residuals, all, all),
+            Figure(rank_correlation_of_pairs(residuals, all, all),
                    std::pair{quantile(drawn, 0.025), quantile(drawn, 0.975)}),
             "");
     add_row(
@@ -322,7 +323,7 @@ class AreaShape final : public Experiment {
         "");
   }
 
-  // Returns the mean residual of the area in each tenth of the residuals of the surroundings.
+  // Returns the mean residual of the area per decile of the residuals of the surroundings.
   static viewer::Series mean_by_decile(const Relation& relation, std::size_t level,
                                        const Residuals& residuals) {
     std::vector<std::pair<double, double>> pairs;
@@ -353,7 +354,7 @@ class AreaShape final : public Experiment {
   }
 
   std::vector<SceneObservations> scenes_;
-  std::vector<viewer::MapPlot> shown_;
+  std::vector<viewer::MapPlot> shown_maps_;
 };
 
 }  // namespace

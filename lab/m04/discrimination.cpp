@@ -1,4 +1,4 @@
-// [M04] figure 6: how well 2, 5, 15, 50 and 256 components tell places apart.
+// [M04] figure 6: how well 2, 5, 15, 50 and 256 components discriminate between places.
 
 #include <algorithm>
 #include <array>
@@ -19,21 +19,21 @@ namespace panonav::lab {
 namespace {
 
 constexpr std::array component_counts{2, 5, 15, 50, 256};
-constexpr std::size_t count_number = component_counts.size();
+constexpr std::size_t component_count_number = component_counts.size();
 constexpr std::size_t index_of_fifteen = 2;
 constexpr std::size_t condition_count = 3;
 constexpr std::size_t hidden_condition = 1;
 constexpr std::size_t band_count = 4;  // components 0 and 1, 2 .. 14, 15 .. 49, 50 .. 255
 
-// Returns the dissimilarities of one query to all references for every number of components.
-std::array<std::vector<double>, count_number> dissimilarities(
+// Returns the dissimilarities between one query and all references, per number of components.
+std::array<std::vector<double>, component_count_number> dissimilarities(
     const FourierSignature& query, const std::vector<FourierSignature>& references) {
-  std::array<std::vector<double>, count_number> values;
+  std::array<std::vector<double>, component_count_number> values;
   for (const auto& reference : references) {
     const auto parts = dissimilarity_by_component(query, reference);
     double sum = 0.0;
     std::size_t k = 0;
-    for (std::size_t c = 0; c < count_number; ++c) {
+    for (std::size_t c = 0; c < component_count_number; ++c) {
       for (; k < static_cast<std::size_t>(component_counts[c]); ++k) sum += parts[k];
       values[c].push_back(sum);
     }
@@ -41,8 +41,8 @@ std::array<std::vector<double>, count_number> dissimilarities(
   return values;
 }
 
-// Returns the fall of the similarity from the right reference to those one spacing away, as a share
-// of its range over all references: 0 for a flat profile.
+// Returns how far the similarity falls from the nearest reference to its grid neighbours, divided
+// by the range over all references; 0 for a flat profile.
 double peak_sharpness(const simulation::PlaceRecording& place, std::size_t nearest,
                       const std::vector<double>& values) {
   const auto scaled = similarities(values);
@@ -66,20 +66,20 @@ class Discrimination final : public Experiment {
             place.rendering.columns, ">= 512: figure 6 compares 256 components");
     const auto references = compute_signatures(place.references, component_counts.back(), executor);
     const auto clean = compute_signatures(place.queries, component_counts.back(), executor);
-    std::vector<double> sharpness(count_number);
-    std::vector<double> contrast(count_number);
+    std::vector<double> sharpness(component_count_number);
+    std::vector<double> contrast(component_count_number);
     for (std::size_t condition = 0; condition < condition_count; ++condition) {
       const auto views = take_queries(place, view_conditions()[condition], executor);
       const auto queries = compute_signatures(views, component_counts.back(), executor);
       auto values = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
         return dissimilarities(queries[q], references);
       });
-      std::array<double, count_number> right{};
+      std::array<double, component_count_number> right{};
       const auto n = static_cast<double>(queries.size());
       for (std::size_t q = 0; q < queries.size(); ++q) {
         const Point2 position = views[q].pose.position();
         const std::size_t nearest = place.nearest_reference(position);
-        for (std::size_t c = 0; c < count_number; ++c) {
+        for (std::size_t c = 0; c < component_count_number; ++c) {
           const std::size_t found = find_smallest(values[q][c]);
           right[c] += found == nearest ? 1.0 / n : 0.0;
           found_[condition][c] += found == nearest ? 1 : 0;
@@ -92,13 +92,13 @@ class Discrimination final : public Experiment {
         }
       }
       trials_ += condition == 0 ? queries.size() : 0;
-      for (std::size_t c = 0; c < count_number; ++c) {
+      for (std::size_t c = 0; c < component_count_number; ++c) {
         success_by_scene_[condition][c].push_back(right[c]);
       }
-      if (condition == 0 && profile_.empty()) keep_profile(place, values.front());
+      if (condition == 0 && profile_.empty()) store_profile(place, values.front());
       if (condition == hidden_condition) compare_disturbance(place, clean, queries, references);
     }
-    for (std::size_t c = 0; c < count_number; ++c) {
+    for (std::size_t c = 0; c < component_count_number; ++c) {
       sharpness_by_scene_[c].push_back(sharpness[c]);
       contrast_by_scene_[c].push_back(contrast[c]);
     }
@@ -110,15 +110,17 @@ class Discrimination final : public Experiment {
     for (std::size_t condition = 0; condition < condition_count; ++condition) {
       const std::string& name = view_conditions()[condition].name;
       const std::string& id = view_conditions()[condition].id;
-      for (std::size_t c = 0; c < count_number; ++c) {
+      for (std::size_t c = 0; c < component_count_number; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
-        add_row(result, "m04.fig6." + id + ".found_" + text(c),
-                "figure 6: nearest reference found with " + text(c) + " components, " + name, found,
-                "");
+        add_row(
+            result, "m04.fig6." + id + ".found_" + component_text(c),
+            "figure 6: nearest reference found with " + component_text(c) + " components, " + name,
+            found, "");
       }
       for (const std::size_t more : {index_of_fifteen + 1, index_of_fifteen + 2}) {
-        add_difference(condition, "fifteen_against_" + text(more),
-                       "15 components less that with " + text(more), more, at_least(-0.02), result);
+        add_difference(condition, "fifteen_against_" + component_text(more),
+                       "15 components less that with " + component_text(more), more,
+                       at_least(-0.02), result);
         if (id == "hidden") result.rows.back().reason = explain_disturbance();
       }
       add_difference(condition, "fifteen_against_2", "15 components less that with 2", 0,
@@ -128,23 +130,23 @@ class Discrimination final : public Experiment {
           "figure 6: distance to the reference found, 15 components, 25 cm grid (median), " + name,
           median_figure(errors_m_[condition][index_of_fifteen]), "m", at_most(0.177));
     }
-    for (std::size_t c = 0; c < count_number; ++c) {
-      add_row(result, "m04.fig6.sharpness_" + text(c),
+    for (std::size_t c = 0; c < component_count_number; ++c) {
+      add_row(result, "m04.fig6.sharpness_" + component_text(c),
               "figure 6: fall of similarity from the right reference to its neighbours, " +
-                  text(c) + " components (share of the whole range; more is sharper)",
+                  component_text(c) + " components (share of the whole range; more is sharper)",
               mean_figure(sharpness_by_scene_[c]), "");
-      add_row(result, "m04.fig6.contrast_" + text(c),
+      add_row(result, "m04.fig6.contrast_" + component_text(c),
               "figure 6: dissimilarity at the right reference over that of a typical one, " +
-                  text(c) + " components (less is better)",
+                  component_text(c) + " components (less is better)",
               mean_figure(contrast_by_scene_[c]), "");
     }
     constexpr std::array band_names{"0 and 1", "2 to 14", "15 to 49", "50 to 255"};
     for (std::size_t band = 0; band < band_count; ++band) {
-      if (disturbance_[band].empty()) continue;
+      if (disturbance_over_step_[band].empty()) continue;
       add_row(result, "m04.fig6.hidden.disturbance_" + std::to_string(band + 1),
               std::string("figure 6: what hiding 10 % of the azimuths changes in components ") +
                   band_names[band] + ", over what a step of 25 cm changes there",
-              mean_figure(disturbance_[band]), "");
+              mean_figure(disturbance_over_step_[band]), "");
     }
     add_row(result, "m04.fig6.sharpness_fifteen_against_2",
             "figure 6: sharpness with 15 components less that with 2",
@@ -153,7 +155,7 @@ class Discrimination final : public Experiment {
   }
 
  private:
-  static std::string text(std::size_t c) { return std::to_string(component_counts[c]); }
+  static std::string component_text(std::size_t c) { return std::to_string(component_counts[c]); }
 
   static std::vector<double> difference(const std::vector<double>& a,
                                         const std::vector<double>& b) {
@@ -162,7 +164,8 @@ class Discrimination final : public Experiment {
     return result;
   }
 
-  // Differences are paired: the same queries in the same scenes.
+  // Adds the difference of success rates between 15 components and `other`, paired by scene (the
+  // queries are the same).
   void add_difference(std::size_t condition, const std::string& id, const std::string& what,
                       std::size_t other, Target target, Reproduction& result) const {
     const auto values = difference(success_by_scene_[condition][index_of_fifteen],
@@ -172,12 +175,12 @@ class Discrimination final : public Experiment {
             mean_figure(values), "", target);
   }
 
-  // Returns why more components help when azimuths are hidden; empty if the measured disturbance
+  // Explains why more components help when azimuths are hidden; empty if the measured disturbance
   // does not explain it.
   [[nodiscard]] std::string explain_disturbance() const {
-    if (disturbance_[1].empty()) return "";
-    const double low = mean(disturbance_[1]);
-    const double high = mean(disturbance_[3]);
+    if (disturbance_over_step_[1].empty()) return "";
+    const double low = mean(disturbance_over_step_[1]);
+    const double high = mean(disturbance_over_step_[3]);
     if (low <= high) return "";
     const auto hundredths = [](double value) { return to_text(std::round(100.0 * value) / 100.0); };
     return "hiding 10 % of the azimuths changes components 2 to 14 " + hundredths(low) +
@@ -185,8 +188,8 @@ class Discrimination final : public Experiment {
            hundredths(high) + " times as much; so more components help";
   }
 
-  // Compares the change of a view by hidden azimuths with the change by a step of one spacing, per
-  // band of components.
+  // Compares, per band of components, how much hidden azimuths change a view with how much a step
+  // of one spacing does.
   void compare_disturbance(const simulation::PlaceRecording& place,
                            const std::vector<FourierSignature>& clean,
                            const std::vector<FourierSignature>& hidden,
@@ -197,7 +200,8 @@ class Discrimination final : public Experiment {
     for (std::size_t q = 0; q < clean.size(); ++q) {
       const std::size_t nearest = place.nearest_reference(place.queries[q].pose.position());
       const auto people = dissimilarity_by_component(clean[q], hidden[q]);
-      // The raster's next reference, or the one before at its end, is a neighbour but for row ends.
+      // References are in raster order: the next one is a grid neighbour, except at the end of a
+      // row.
       const std::size_t next = nearest + 1 < references.size() ? nearest + 1 : nearest - 1;
       if (distance(place.references[nearest].pose.position(),
                    place.references[next].pose.position()) > 1.01 * place.spacing_m) {
@@ -211,18 +215,19 @@ class Discrimination final : public Experiment {
       }
     }
     for (std::size_t band = 0; band < band_count; ++band) {
-      if (by_step[band] > 0.0) disturbance_[band].push_back(by_people[band] / by_step[band]);
+      if (by_step[band] > 0.0)
+        disturbance_over_step_[band].push_back(by_people[band] / by_step[band]);
     }
   }
 
-  void keep_profile(const simulation::PlaceRecording& place,
-                    const std::array<std::vector<double>, count_number>& values) {
+  void store_profile(const simulation::PlaceRecording& place,
+                     const std::array<std::vector<double>, component_count_number>& values) {
     const simulation::PlacedView& query = place.queries.front();
     const std::size_t nearest = place.nearest_reference(query.pose.position());
     const double row_y_m = place.references[nearest].pose.y_m;
-    for (std::size_t c = 0; c < count_number; ++c) {
+    for (std::size_t c = 0; c < component_count_number; ++c) {
       const auto scaled = similarities(values[c]);
-      viewer::Series line{.label = text(c) + " components"};
+      viewer::Series line{.label = component_text(c) + " components"};
       for (std::size_t i = 0; i < place.references.size(); ++i) {
         if (std::abs(place.references[i].pose.y_m - row_y_m) < 1e-6) {
           line.add(place.references[i].pose.x_m, scaled[i]);
@@ -256,9 +261,9 @@ class Discrimination final : public Experiment {
                            .x_range = std::pair{1.5, 400.0}};
     for (std::size_t condition = 0; condition < condition_count; ++condition) {
       viewer::Series line{.label = view_conditions()[condition].name};
-      for (std::size_t c = 0; c < count_number; ++c) {
+      for (std::size_t c = 0; c < component_count_number; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
-        // Moved a little apart, so that error bars do not hide each other.
+        // Shift the conditions slightly in x, so that their error bars do not hide each other.
         line.add(component_counts[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value);
         line.y_low.push_back(found.low);
         line.y_high.push_back(found.high);
@@ -272,12 +277,13 @@ class Discrimination final : public Experiment {
   }
 
   std::size_t trials_ = 0;
-  std::array<std::array<std::size_t, count_number>, condition_count> found_{};
-  std::array<std::array<std::vector<double>, count_number>, condition_count> errors_m_;
-  std::array<std::array<std::vector<double>, count_number>, condition_count> success_by_scene_;
-  std::array<std::vector<double>, count_number> sharpness_by_scene_;
-  std::array<std::vector<double>, count_number> contrast_by_scene_;
-  std::array<std::vector<double>, band_count> disturbance_;
+  std::array<std::array<std::size_t, component_count_number>, condition_count> found_{};
+  std::array<std::array<std::vector<double>, component_count_number>, condition_count> errors_m_;
+  std::array<std::array<std::vector<double>, component_count_number>, condition_count>
+      success_by_scene_;
+  std::array<std::vector<double>, component_count_number> sharpness_by_scene_;
+  std::array<std::vector<double>, component_count_number> contrast_by_scene_;
+  std::array<std::vector<double>, band_count> disturbance_over_step_;
   std::vector<viewer::Series> profile_;
 };
 

@@ -19,7 +19,7 @@ namespace {
 constexpr double line_step_m = 0.02;
 constexpr double line_length_m = 4.0;
 
-// Values at 0, line_step_m, 2 line_step_m, ..
+// A function of distance, sampled at 0, line_step_m, 2 line_step_m, ...
 using Curve = std::vector<double>;
 
 double bin_distance_m(std::size_t bin) {
@@ -49,7 +49,8 @@ double deviation_from_line(const Curve& curve, std::size_t count) {
   return largest;
 }
 
-// Returns the largest distance up to which the whole curve stays within `tolerance` of one line.
+// Returns the largest distance up to which all values of the curve are within `tolerance` of one
+// straight line.
 double linear_range_m(const Curve& curve, double tolerance) {
   std::size_t last = 2;
   for (std::size_t count = 4; count <= curve.size(); ++count) {
@@ -59,12 +60,12 @@ double linear_range_m(const Curve& curve, double tolerance) {
   return bin_distance_m(last);
 }
 
-double find_first_above_m(const Curve& curve, double value) {
+double find_distance_reaching_m(const Curve& curve, double value) {
   const auto found = std::ranges::find_if(curve, [&](double v) { return v >= value; });
   return bin_distance_m(static_cast<std::size_t>(found - curve.begin()) - (found == curve.end()));
 }
 
-// Draws a straight free line of `line_length_m`, or the longest of `line_draws` trials.
+// Draws a free straight line of `line_length_m`, or the longest one of `line_draws` trials.
 std::pair<Point2, Point2> sample_straight_line(const simulation::FreeSpace& space, Random& random) {
   std::optional<std::pair<Point2, Point2>> best;
   constexpr int line_draws = 200;
@@ -86,7 +87,7 @@ std::pair<Point2, Point2> sample_straight_line(const simulation::FreeSpace& spac
   return *best;
 }
 
-// The mean of the values at each distance.
+// Accumulates the mean value at each distance.
 struct CurveSums {
   Curve sums;
   Curve counts;
@@ -118,24 +119,26 @@ class DistanceCurve final : public Experiment {
     Curve curve = sums.mean();
     require(curve.size() >= 50, "length of the straight ways [m]", bin_distance_m(curve.size() - 1),
             ">= 1 m");
-    // The absolute value depends on the place and carries no meaning [M04 section 2.2]: 1 is the
-    // level of far views, the mean over the farther half of all distances.
+    // The absolute dissimilarity depends on the place and has no meaning by itself [M04 section
+    // 2.2]. It is divided by the level of far views, the mean over the farther half of all
+    // distances.
     const auto middle = curve.begin() + static_cast<std::ptrdiff_t>(curve.size() / 2);
     const Curve far(middle, curve.end());
     const double level = mean(far);
     for (double& value : curve) value /= level;
-    // Single pairs are in the same unit as the curve of their scene.
-    if (single_.size() == curves_.size() + 1) {
-      for (double& value : single_.back().y) value /= level;
+    // Scale the single pair of this scene like its curve.
+    if (single_pairs_.size() == curves_.size() + 1) {
+      for (double& value : single_pairs_.back().y) value /= level;
     }
     noise_.push_back(curve[0]);
     linear_m_.push_back(linear_range_m(curve, linearity_tolerance));
-    saturation_m_.push_back(find_first_above_m(curve, 0.95));
-    half_m_.push_back(find_first_above_m(curve, 0.5));
-    at_grid_.push_back(curve[static_cast<std::size_t>(std::lround(place.spacing_m / line_step_m))]);
+    saturation_m_.push_back(find_distance_reaching_m(curve, 0.95));
+    half_m_.push_back(find_distance_reaching_m(curve, 0.5));
+    value_at_grid_spacing_.push_back(
+        curve[static_cast<std::size_t>(std::lround(place.spacing_m / line_step_m))]);
     const auto quarter = static_cast<std::ptrdiff_t>(far.size() / 2);
-    rise_.push_back(mean(Curve(far.begin() + quarter, far.end())) /
-                    mean(Curve(far.begin(), far.begin() + quarter)));
+    rise_after_saturation_.push_back(mean(Curve(far.begin() + quarter, far.end())) /
+                                     mean(Curve(far.begin(), far.begin() + quarter)));
     curves_.push_back(std::move(curve));
   }
 
@@ -145,7 +148,7 @@ class DistanceCurve final : public Experiment {
                            .style = viewer::SeriesStyle::lines_and_points};
     std::size_t shared = curves_.front().size();
     for (const Curve& curve : curves_) shared = std::min(shared, curve.size());
-    // Every point up to 30 cm, then one each 10 cm, so that error bars can be distinguished.
+    // Plot every value up to 30 cm, then one per 10 cm, so that error bars can be distinguished.
     for (std::size_t bin = 0; bin < shared; bin += bin_distance_m(bin) < 0.299 ? 1 : 5) {
       std::vector<double> here;
       for (const Curve& curve : curves_) here.push_back(curve[bin]);
@@ -154,7 +157,7 @@ class DistanceCurve final : public Experiment {
     viewer::LinePlot plot{.title = "Dissimilarity against distance ([M04] figure 7)",
                           .x_label = "distance between the views [m]",
                           .y_label = "dissimilarity (1: level of far views)",
-                          .series = single_};
+                          .series = single_pairs_};
     plot.series.push_back(average);
     add_plot(result, "fig07_dissimilarity_distance.svg",
              "Dissimilarity from one view, as the robot drives away from it (thin), and the mean "
@@ -175,69 +178,70 @@ class DistanceCurve final : public Experiment {
             "figure 7: distance at 95 % of the level of far views (mean over scenes)",
             mean_figure(saturation_m_), "m");
     add_row(result, "m04.fig7.at_25_cm",
-            "figure 7: dissimilarity 25 cm away, as a share of far views", mean_figure(at_grid_),
-            "");
+            "figure 7: dissimilarity 25 cm away, as a share of far views",
+            mean_figure(value_at_grid_spacing_), "");
     add_row(result, "m04.fig7.rise_after_saturation",
             "figure 7: level at 3 .. 4 m over that at 2 .. 3 m (1: fully saturated)",
-            mean_figure(rise_), "");
+            mean_figure(rise_after_saturation_), "");
   }
 
  private:
-  // Adds all pairs of views along one straight way.
+  // Adds all pairs of views along one straight line to `sums`.
   void add_line(const simulation::PlaceRecording& place, Point2 from, Point2 to, std::size_t line,
                 CurveSums& sums, Executor& executor) {
     const auto steps = static_cast<std::size_t>(std::lround(distance(from, to) / line_step_m));
     std::vector<Pose2> poses;
-    std::vector<Pose2> some;
+    std::vector<Pose2> repeated_poses;
     for (std::size_t i = 0; i <= steps; ++i) {
       const double share = steps > 0 ? static_cast<double>(i) / static_cast<double>(steps) : 0.0;
-      // Any heading: magnitudes do not depend on it.
+      // The heading is arbitrary, because magnitudes do not depend on it.
       poses.push_back(
           {from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m), 0.0});
-      if (i % repeat_interval == 0) some.push_back(poses.back());
+      if (i % repeat_interval == 0) repeated_poses.push_back(poses.back());
     }
     const std::uint64_t noise = place.seed * 100003U + 70000U + 5000U * line;
-    const auto see = [&](const std::vector<Pose2>& from_here, std::uint64_t seed) {
+    const auto compute_views = [&](const std::vector<Pose2>& from_here, std::uint64_t seed) {
       return compute_signatures(
           simulation::take_views(place, place.rendering, from_here, seed, {}, executor),
           m04_components, executor);
     };
-    const auto views = see(poses, noise);
-    const auto again = see(some, noise + 2500U);
+    const auto views = compute_views(poses, noise);
+    const auto repeated_views = compute_views(repeated_poses, noise + 2500U);
     for (std::size_t i = 0; i < views.size(); ++i) {
-      // At distance 0 two pictures differ by noise alone.
+      // At distance 0 only noise distinguishes the two pictures.
       if (i % repeat_interval == 0)
-        sums.add(0, dissimilarity_l1(views[i], again[i / repeat_interval]));
+        sums.add(0, dissimilarity_l1(views[i], repeated_views[i / repeat_interval]));
       for (std::size_t j = i + 1; j < views.size(); ++j) {
         sums.add(j - i, dissimilarity_l1(views[i], views[j]));
       }
     }
-    // The paper shows single pairs: one reference, one robot that drives away from it.
-    if (line > 0 || single_.size() >= shown_pairs) return;
-    viewer::Series one{.label = "pair " + std::to_string(single_.size() + 1),
+    // The paper shows single pairs: one reference view, and a robot that drives away from it.
+    if (line > 0 || single_pairs_.size() >= shown_pairs) return;
+    viewer::Series one{.label = "pair " + std::to_string(single_pairs_.size() + 1),
                        .style = viewer::SeriesStyle::lines};
     for (std::size_t j = 0; j < views.size(); ++j) {
-      one.add(bin_distance_m(j), dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
+      one.add(bin_distance_m(j), dissimilarity_l1(views[0], j == 0 ? repeated_views[0] : views[j]));
     }
-    single_.push_back(std::move(one));
+    single_pairs_.push_back(std::move(one));
   }
 
   static constexpr std::size_t lines_per_scene = 2;
-  static constexpr std::size_t repeat_interval = 10;  // every n-th view is taken twice
+  static constexpr std::size_t repeat_interval = 10;  // every tenth view is taken twice
   static constexpr std::size_t shown_pairs = 5;
   static constexpr double linearity_tolerance = 0.02;
 
   std::vector<Curve> curves_;
-  std::vector<viewer::Series> single_;
+  std::vector<viewer::Series> single_pairs_;
   std::vector<double> noise_;
   std::vector<double> linear_m_;
   std::vector<double> half_m_;
   std::vector<double> saturation_m_;
-  std::vector<double> at_grid_;
-  std::vector<double> rise_;
+  std::vector<double> value_at_grid_spacing_;
+  std::vector<double> rise_after_saturation_;
 };
 
-// Similarity of the first query of the first place.
+// Similarity of all references to a query: a map for the first query, rank correlations with
+// distance for all.
 class SimilaritySurface final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {

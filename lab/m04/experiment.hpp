@@ -8,22 +8,22 @@
 
 namespace panonav::lab {
 
-/// One figure of a paper, measured over any number of places. Places come one at a time, because
-/// the views of all of them together would need gigabytes.
+/// One figure of a paper, measured over any number of places. Places are added one at a time,
+/// because the views of all places together would need gigabytes of memory.
 class Experiment {
  public:
   virtual ~Experiment() = default;
-  /// Measures in one place. Results depend on the places and their order alone.
+  /// Measures one place. Results depend only on the places and their order.
   virtual void add(const simulation::PlaceRecording& place, Executor& executor) = 0;
-  /// Appends rows and writes images. Called once, after the last place; throws
-  /// ContractError when there was none.
+  /// Appends rows and writes images. Called once, after the last place; throws ContractError if no
+  /// place was added.
   virtual void report(Reproduction& result) const = 0;
 };
 
-/// [M04] figure 4: what a turn on the spot changes, against what a step to the next reference
-/// changes.
+/// [M04] figure 4: change of the signature by a rotation on the spot, compared with a step to the
+/// next reference.
 [[nodiscard]] std::unique_ptr<Experiment> rotational_invariance_experiment();
-/// [M04] figure 5: the power spectrum of one view and the mean of all.
+/// [M04] figure 5: power spectrum of one view, and the mean over all views.
 [[nodiscard]] std::unique_ptr<Experiment> power_spectrum_experiment();
 /// [M04] figure 6: discrimination with 2, 5, 15, 50 and 256 components.
 [[nodiscard]] std::unique_ptr<Experiment> discrimination_experiment();
@@ -31,22 +31,22 @@ class Experiment {
 [[nodiscard]] std::unique_ptr<Experiment> distance_curve_experiment();
 /// [M04] figure 8: similarity at every reference view.
 [[nodiscard]] std::unique_ptr<Experiment> similarity_surface_experiment();
-/// [M04] figure 9: areas that shrink with the number of components.
+/// [M04] figure 9: localisation areas that shrink as more components are compared.
 [[nodiscard]] std::unique_ptr<Experiment> hierarchical_areas_experiment();
-/// [M04] figure 10: how the shape of the areas follows the objects around, which the authors left
-/// open.
+/// [M04] figure 10: how the shape of localisation areas depends on the surrounding objects, left
+/// open by the authors.
 [[nodiscard]] std::unique_ptr<Experiment> area_shape_experiment();
-/// [M04] eq. 6: weights learnt in one place and used in the next.
+/// [M04] eq. 6: component weights learnt in one place and applied in the next.
 [[nodiscard]] std::unique_ptr<Experiment> component_weights_experiment();
-/// Compares the ways of recognising places that [M04] argues against, on the same views.
+/// Compares the place recognition methods that [M04] argues against on the same views.
 [[nodiscard]] std::unique_ptr<Experiment> rivals_experiment();
 
-/// [M04] section 3: views that arrange themselves (figures 12, 15, 16 and 17), in the hall, a small
-/// room and the periodic hall.
+/// [M04] section 3: views arranged by their similarity (figures 12, 15, 16 and 17), in the hall, a
+/// small room and the periodic hall.
 void reproduce_lattice(const Experiments& context);
 
-/// Adds [M03] table 1: bits of the raw image, the cylinder and the signature, counted from the
-/// objects.
+/// Adds [M03] table 1: bits of the raw image, the panorama and the signature, computed from the
+/// sizes of these objects.
 void reproduce_memory_table(Reproduction& result);
 
 }  // namespace panonav::lab

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::size_t level_count = m04_components;
 // Views within 25 % of the best known dissimilarity stay candidates: wide enough that the place
-// itself is not dropped by noise at one component, narrow enough that areas shrink visibly. The
-// rows report what it costs and misses.
+// itself is not dropped by noise at one component, and narrow enough that areas shrink visibly. The
+// result rows report the bytes read and how often the true place is lost.
 constexpr double tolerance = 0.25;
 constexpr double target_radius_m = 0.5;
 
@@ -74,17 +74,17 @@ class HierarchicalAreas final : public Experiment {
       nested_ += is_nested(levels) ? 1 : 0;
       for (std::size_t m = 0; m < levels.size(); ++m) {
         areas_m2_[m].push_back(*levels[m].area_m2);
-        holding_[m] += contains(levels[m].candidates, nearest) ? 1 : 0;
+        areas_with_truth_[m] += contains(levels[m].candidates, nearest) ? 1 : 0;
       }
       const auto coarse = localise_hierarchically(
           memory, areas, packed, {.radius_m = target_radius_m, .tolerance = tolerance});
       components_needed_.push_back(coarse.back().components);
       const std::size_t scan = memory.size() * memory.shape().size();
-      bytes_shares_.push_back(static_cast<double>(coarse.back().bytes_read) /
-                              static_cast<double>(scan));
-      if (shown_.empty()) {
+      read_byte_fractions_.push_back(static_cast<double>(coarse.back().bytes_read) /
+                                     static_cast<double>(scan));
+      if (shown_maps_.empty()) {
         for (const std::size_t m : {0U, 2U, 5U, 14U}) {
-          shown_.push_back(draw_area_map(place.scene, memory, areas, robot, levels.at(m)));
+          shown_maps_.push_back(draw_area_map(place.scene, memory, areas, robot, levels.at(m)));
         }
       }
     }
@@ -95,7 +95,7 @@ class HierarchicalAreas final : public Experiment {
     add_plot(
         result, "fig09_hierarchical_areas.svg",
         "With more components the area where the robot may be shrinks around it ([M04] figure 9).",
-        shown_, 2);
+        shown_maps_, 2);
     viewer::LinePlot curve{.title = "Area where the robot may be, by number of components",
                            .x_label = "number of components compared",
                            .y_label = "area [m^2]",
@@ -110,7 +110,7 @@ class HierarchicalAreas final : public Experiment {
               "figure 9: area where the robot may be after " + text +
                   (m == 1 ? " component (median)" : " components (median)"),
               median_figure(areas_m2_[m - 1]), "m^2");
-      const Proportion holds = success_rate(holding_[m - 1], trials_);
+      const Proportion holds = success_rate(areas_with_truth_[m - 1], trials_);
       add_row(result, "m04.fig9.holds_truth_" + text,
               "figure 9: the area holds the cell of the nearest reference, " + text +
                   (m == 1 ? " component" : " components"),
@@ -125,17 +125,17 @@ class HierarchicalAreas final : public Experiment {
             median_figure(components_needed_), "");
     add_row(result, "m04.fig9.bytes_for_50_cm",
             "figure 9: bytes read until then, as a share of all magnitudes of the memory (median)",
-            median_figure(bytes_shares_), "");
+            median_figure(read_byte_fractions_), "");
   }
 
  private:
   std::size_t trials_ = 0;
   std::size_t nested_ = 0;
   std::array<std::vector<double>, level_count> areas_m2_;
-  std::array<std::size_t, level_count> holding_{};
+  std::array<std::size_t, level_count> areas_with_truth_{};
   std::vector<double> components_needed_;
-  std::vector<double> bytes_shares_;
-  std::vector<viewer::MapPlot> shown_;
+  std::vector<double> read_byte_fractions_;
+  std::vector<viewer::MapPlot> shown_maps_;
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// [M04] section 3: figures 12, 15, 16 and 17, and what the authors expect of a 30 cm grid.
+// [M04] section 3: figures 12, 15, 16 and 17, and the 30 cm grid that the authors suggest.
 
 #include <array>
 #include <chrono>
@@ -21,19 +21,21 @@ namespace panonav::lab {
 
 namespace {
 
-// The paper's uncertainty of motion: of the distance, and of half a turn.
+// Uncertainty of motion in the paper: as a fraction of the distance, and of half a turn (180
+// degrees).
 constexpr double distance_error_share = 0.10;
 constexpr double direction_error_share = 0.15;
-// Springs of the plain lattice: with more, views on opposite sides of a hall that look alike by
-// their magnitudes fold it. Chosen on other scenes (seeds 201 to 205).
+// Number of springs per view in the lattice without phases. More springs fold the lattice, because
+// views on opposite sides of a hall have similar magnitudes. Chosen on other scenes (seeds 201 to
+// 205).
 constexpr int plain_neighbours = 4;
 
 LatticeOptions plain_options() {
   return {.neighbours = plain_neighbours, .phases = false};
 }
 
-/// Measures of one method of arranging, over scenes.
-struct Arrangements {
+/// Quality measures of one arrangement method, one value per scene.
+struct ArrangementQuality {
   std::vector<double> shape;
   std::vector<double> four_of_eight;
   std::vector<double> border_pull;
@@ -45,16 +47,16 @@ struct Arrangements {
   }
 };
 
-void add_rows(const std::string& id, const std::string& what, const Arrangements& measured,
+void add_rows(const std::string& id, const std::string& what, const ArrangementQuality& measured,
               bool judged, Reproduction& result) {
-  const auto judge = [&](const Target& target) {
+  const auto target_if_judged = [&](const Target& target) {
     return judged ? std::optional(target) : std::nullopt;
   };
   add_row(result, id + ".shape", what + ": shape difference mu (median over scenes)",
-          median_figure(measured.shape), "", judge(at_most(0.02)));
+          median_figure(measured.shape), "", target_if_judged(at_most(0.02)));
   add_row(result, id + ".four_of_eight",
           what + ": inner views with their four grid neighbours among their eight nearest",
-          median_figure(measured.four_of_eight), "", judge(at_least(1.0)));
+          median_figure(measured.four_of_eight), "", target_if_judged(at_least(1.0)));
   add_row(result, id + ".border_pull",
           what + ": how far views on the border lie inwards, laid over the true ones in equal size",
           median_figure(measured.border_pull), "spacings");
@@ -68,7 +70,7 @@ viewer::MapPlot make_map(const std::string& title, const ViewGrid& grid,
   return {.title = title, .layers = {lines, views}};
 }
 
-std::string append_mu(const std::string& title, double mu) {
+std::string with_shape_difference(const std::string& title, double mu) {
   return title + ", mu " + format_fixed(mu, 4);
 }
 
@@ -90,9 +92,9 @@ class LatticeExperiment {
 
   void report() const {
     add_rows("m04.fig15.phases", "figure 15: 10 x 8 views at 30 cm in the hall, unordered, phases",
-             phases_, true, result_);
-    add_rows("m04.fig15.plain", "figure 15: the same by dissimilarity alone, as published", plain_,
-             false, result_);
+             hall_with_phases_, true, result_);
+    add_rows("m04.fig15.plain", "figure 15: the same by dissimilarity alone, as published",
+             hall_plain_, false, result_);
     add_rows("m04.fig15.small_room", "10 x 8 views at 30 cm in a room of 4 x 3.5 m, phases",
              small_room_, false, result_);
     add_row(result_, "m04.fig15.turn_error",
@@ -106,16 +108,16 @@ class LatticeExperiment {
               median_figure(error_[i]), "spacings");
     }
     add_row(result_, "m04.fig12.range",
-            "figure 12: largest distance at which views correlate (x_1)", median_figure(range_),
-            "spacings");
+            "figure 12: largest distance at which views correlate (x_1)",
+            median_figure(correlation_range_), "spacings");
     add_rows(
         "m04.fig17",
         "figure 17: 540 x 540 cm zigzag at 60 cm in the periodic hall, coarse motion and phases",
         coarse_, true, result_);
     add_rows("m04.fig17.without_phases", "figure 17: the same without phases",
              coarse_without_phases_, false, result_);
-    add_rows("m04.fig17.plain", "figure 17: the same by dissimilarity alone: it folds", folded_,
-             false, result_);
+    add_rows("m04.fig17.plain", "figure 17: the same by dissimilarity alone: it folds",
+             coarse_plain_, false, result_);
     if (options_.fine_lattice_every > 0) {
       add_rows("m04.fig17.fine", "figure 17 at 30 cm, coarse motion and phases", fine_, true,
                result_);
@@ -145,12 +147,12 @@ class LatticeExperiment {
     const Lattice plain = arrange(grid.memory, plain_options(), {}, executor_);
     const GridComparison ours = compare_with_grid(grid, arranged);
     const GridComparison published = compare_with_grid(grid, plain);
-    phases_.add(ours, false);
-    plain_.add(published, true);
+    hall_with_phases_.add(ours, false);
+    hall_plain_.add(published, true);
     const auto errors = turn_errors(grid, arranged);
     if (!errors.empty()) turn_error_deg_.push_back(degrees(median(errors)));
     const DissimilarityCurve curve = compute_curve_of_all_pairs(grid, arranged);
-    range_.push_back(curve.range());
+    correlation_range_.push_back(curve.range());
     for (std::size_t i = 0; i < error_.size(); ++i)
       error_[i].push_back(curve.error(error_distances[i]));
     if (!drawn) return;
@@ -158,8 +160,8 @@ class LatticeExperiment {
          "Views of the hall as they were taken and as they arrange themselves, unordered and "
          "without motion: by phases, and by dissimilarity alone as published.",
          {make_map("as taken", grid, positions_of(grid.poses)),
-          make_map(append_mu("phases", ours.shape_difference), grid, ours.aligned),
-          make_map(append_mu("dissimilarity alone", published.with_reflection), grid,
+          make_map(with_shape_difference("phases", ours.shape_difference), grid, ours.aligned),
+          make_map(with_shape_difference("dissimilarity alone", published.with_reflection), grid,
                    published.aligned)});
     draw_curve(curve);
   }
@@ -170,8 +172,8 @@ class LatticeExperiment {
     small_room_.add(compare_with_grid(grid, arrange(grid.memory, {}, {}, executor_)), false);
   }
 
-  void arrange_with_motion(std::uint64_t seed, int side, double spacing_m, Arrangements& with,
-                           Arrangements& without, bool drawn) {
+  void arrange_with_motion(std::uint64_t seed, int side, double spacing_m, ArrangementQuality& with,
+                           ArrangementQuality& without, bool drawn) {
     const auto place = make_place(simulation::make_scene("hall_periodic", {.seed = seed}), seed);
     const ViewGrid grid =
         record_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
@@ -184,14 +186,16 @@ class LatticeExperiment {
     without.add(blind, true);
     const bool coarse = side == 10;
     std::vector<viewer::MapPlot> panels{
-        make_map(append_mu("motion and phases", ours.shape_difference), grid, ours.aligned),
-        make_map(append_mu("motion without phases", blind.with_reflection), grid, blind.aligned)};
+        make_map(with_shape_difference("motion and phases", ours.shape_difference), grid,
+                 ours.aligned),
+        make_map(with_shape_difference("motion without phases", blind.with_reflection), grid,
+                 blind.aligned)};
     if (coarse) {
       const auto plain =
           compare_with_grid(grid, arrange(grid.memory, plain_options(), {}, executor_));
-      folded_.add(plain, true);
-      panels.push_back(
-          make_map(append_mu("dissimilarity alone", plain.with_reflection), grid, plain.aligned));
+      coarse_plain_.add(plain, true);
+      panels.push_back(make_map(with_shape_difference("dissimilarity alone", plain.with_reflection),
+                                grid, plain.aligned));
     }
     if (!drawn) return;
     if (coarse) draw_path(grid);
@@ -201,7 +205,8 @@ class LatticeExperiment {
          panels);
   }
 
-  /// Computes distance and error over all pairs of the views, as in [M04] figure 12.
+  /// Computes the error of distances from dissimilarities over all pairs of views, as in [M04]
+  /// figure 12.
   [[nodiscard]] static DissimilarityCurve compute_curve_of_all_pairs(const ViewGrid& grid,
                                                                      const Lattice& lattice) {
     const auto views = grid.memory.views();
@@ -264,9 +269,9 @@ class LatticeExperiment {
   const ReproductionOptions& options_;
   Executor& executor_;
   Reproduction& result_;
-  Arrangements phases_, plain_, small_room_, coarse_, coarse_without_phases_, folded_, fine_,
-      fine_without_phases_;
-  std::vector<double> turn_error_deg_, range_, time_ms_;
+  ArrangementQuality hall_with_phases_, hall_plain_, small_room_, coarse_, coarse_without_phases_,
+      coarse_plain_, fine_, fine_without_phases_;
+  std::vector<double> turn_error_deg_, correlation_range_, time_ms_;
   std::array<std::vector<double>, error_distances.size()> error_;
 };
 

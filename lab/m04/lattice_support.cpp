@@ -16,29 +16,29 @@ namespace panonav::lab {
 
 namespace {
 
-/// Place of a view in the zigzag.
-struct GridPlace {
+/// Column and row of a view in the grid.
+struct GridCell {
   int i = 0;
   int j = 0;
 };
 
-GridPlace locate_in_grid(const ViewGrid& grid, std::size_t view) {
+GridCell locate_in_grid(const ViewGrid& grid, std::size_t view) {
   const int j = static_cast<int>(view) / grid.columns;
   const int along = static_cast<int>(view) % grid.columns;
   return {j % 2 == 0 ? along : grid.columns - 1 - along, j};
 }
 
-std::size_t view_index(const ViewGrid& grid, GridPlace place) {
+std::size_t view_index(const ViewGrid& grid, GridCell place) {
   const int along = place.j % 2 == 0 ? place.i : grid.columns - 1 - place.i;
   return static_cast<std::size_t>(place.j * grid.columns + along);
 }
 
-bool is_inside(const ViewGrid& grid, GridPlace place) {
+bool is_inner(const ViewGrid& grid, GridCell place) {
   return place.i > 0 && place.j > 0 && place.i < grid.columns - 1 && place.j < grid.rows - 1;
 }
 
-/// Returns the alignment with the scale that makes both sets equally large; least squares would
-/// shrink a set that does not fit.
+/// Replaces the scale of the alignment by the one that makes both sets equally large. The
+/// least-squares scale would shrink a set that fits badly.
 Alignment match_extent(std::span<const Point2> truth, std::span<const Point2> arranged,
                        Alignment alignment) {
   const auto centre = [](std::span<const Point2> points) {
@@ -77,7 +77,7 @@ ViewGrid record_grid(const simulation::PlaceRecording& place, int columns, int r
   const double middle_y = 0.5 * (scene.floor_low.y_m + scene.floor_high.y_m);
   Random random(place.seed, 91);
   for (int view = 0; view < columns * rows; ++view) {
-    const GridPlace at = locate_in_grid(grid, static_cast<std::size_t>(view));
+    const GridCell at = locate_in_grid(grid, static_cast<std::size_t>(view));
     grid.poses.push_back({middle_x + (at.i - 0.5 * (columns - 1)) * spacing_m,
                           middle_y + (at.j - 0.5 * (rows - 1)) * spacing_m,
                           random.uniform(-std::numbers::pi, std::numbers::pi)});
@@ -107,24 +107,24 @@ simulation::Scene make_small_room(std::uint64_t seed) {
 std::vector<CoarseMotion> simulate_coarse_motion(const ViewGrid& grid, double distance_share,
                                                  double direction_share, std::uint64_t seed) {
   Random random(seed, 92);
-  // Standard deviation of a uniform distribution over -1 .. 1.
-  const double even = 1.0 / std::sqrt(3.0);
+  // Standard deviation of a uniform distribution over [-1, 1].
+  const double uniform_deviation = 1.0 / std::sqrt(3.0);
   const double max_rad = direction_share * std::numbers::pi;
   const auto views = grid.memory.views();
   std::vector<CoarseMotion> motions;
   for (std::size_t i = 0; i + 1 < grid.poses.size(); ++i) {
     const Pose2 step = inverse(grid.poses[i]) * grid.poses[i + 1];
     const double length_m = std::hypot(step.x_m, step.y_m);
-    const double said_m = length_m * (1.0 + random.uniform(-distance_share, distance_share));
-    const double said_rad = std::atan2(step.y_m, step.x_m) + random.uniform(-max_rad, max_rad);
+    const double reported_m = length_m * (1.0 + random.uniform(-distance_share, distance_share));
+    const double reported_rad = std::atan2(step.y_m, step.x_m) + random.uniform(-max_rad, max_rad);
     const double turned_rad = step.heading_rad + random.uniform(-max_rad, max_rad);
-    motions.push_back(
-        {.from = views[i],
-         .to = views[i + 1],
-         .step = {said_m * std::cos(said_rad), said_m * std::sin(said_rad), wrap_angle(turned_rad)},
-         .distance_deviation_m = even * distance_share * said_m,
-         .direction_deviation_rad = even * max_rad,
-         .turn_deviation_rad = even * max_rad});
+    motions.push_back({.from = views[i],
+                       .to = views[i + 1],
+                       .step = {reported_m * std::cos(reported_rad),
+                                reported_m * std::sin(reported_rad), wrap_angle(turned_rad)},
+                       .distance_deviation_m = uniform_deviation * distance_share * reported_m,
+                       .direction_deviation_rad = uniform_deviation * max_rad,
+                       .turn_deviation_rad = uniform_deviation * max_rad});
   }
   return motions;
 }
@@ -133,7 +133,7 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
   const auto truth = positions_of(grid.poses);
   std::vector<Point2> arranged;
   for (const auto& node : lattice.nodes) {
-    // Views of other components have no place among these; the frame's origin stands for none.
+    // Views of other components have no position in this frame; the origin is used instead.
     arranged.push_back(node.component == 0 ? node.pose.position() : Point2{});
   }
   GridComparison result;
@@ -148,42 +148,42 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
   alignment = match_extent(truth, arranged, alignment);
   for (const Point2 p : arranged) result.aligned.push_back(alignment.apply(p));
 
-  const std::vector<std::size_t> together(truth.size(), 0);
-  const auto near = nearest_points(arranged, together, 8);
+  const std::vector<std::size_t> same_component(truth.size(), 0);
+  const auto near = nearest_points(arranged, same_component, 8);
   const double middle_x =
       0.5 * (truth.front().x_m + truth[view_index(grid, {grid.columns - 1, 0})].x_m);
   const double middle_y =
       0.5 * (truth.front().y_m + truth[view_index(grid, {0, grid.rows - 1})].y_m);
   std::size_t inner = 0;
   std::size_t kept = 0;
-  double pulled_m = 0.0;
+  double inward_shift_m = 0.0;
   double sides = 0.0;
   for (std::size_t view = 0; view < truth.size(); ++view) {
-    const GridPlace at = locate_in_grid(grid, view);
-    if (is_inside(grid, at)) {
+    const GridCell at = locate_in_grid(grid, view);
+    if (is_inner(grid, at)) {
       ++inner;
       bool all = lattice.nodes[view].component == 0;
-      for (const GridPlace next : {GridPlace{at.i - 1, at.j}, GridPlace{at.i + 1, at.j},
-                                   GridPlace{at.i, at.j - 1}, GridPlace{at.i, at.j + 1}}) {
+      for (const GridCell next : {GridCell{at.i - 1, at.j}, GridCell{at.i + 1, at.j},
+                                  GridCell{at.i, at.j - 1}, GridCell{at.i, at.j + 1}}) {
         all = all && std::ranges::find(near[view], view_index(grid, next)) != near[view].end();
       }
       kept += all ? 1 : 0;
       continue;
     }
-    // Inwards across each side of the grid that the view lies on.
+    // Add the inward shift for each side of the grid on which the view lies.
     if (at.i == 0 || at.i == grid.columns - 1) {
       const double sign = truth[view].x_m < middle_x ? 1.0 : -1.0;
-      pulled_m += sign * (result.aligned[view].x_m - truth[view].x_m);
+      inward_shift_m += sign * (result.aligned[view].x_m - truth[view].x_m);
       sides += 1.0;
     }
     if (at.j == 0 || at.j == grid.rows - 1) {
       const double sign = truth[view].y_m < middle_y ? 1.0 : -1.0;
-      pulled_m += sign * (result.aligned[view].y_m - truth[view].y_m);
+      inward_shift_m += sign * (result.aligned[view].y_m - truth[view].y_m);
       sides += 1.0;
     }
   }
   result.four_of_eight = inner > 0 ? static_cast<double>(kept) / static_cast<double>(inner) : 1.0;
-  result.border_pull = pulled_m / sides / grid.spacing_m;
+  result.border_pull = inward_shift_m / sides / grid.spacing_m;
   return result;
 }
 

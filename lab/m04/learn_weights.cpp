@@ -17,19 +17,22 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr double near_spacings = 1.25;  // the four neighbours of a square grid, two on a path
-constexpr double far_spacings = 1.75;   // beyond the diagonal of a square grid
+constexpr double max_near_spacings = 1.25;  // reaches 4 neighbours in a square grid, 2 on a path
+constexpr double min_far_spacings = 1.75;   // beyond the diagonal of a square grid
 constexpr std::size_t max_near = 4;
 constexpr std::size_t max_far = 12;
 constexpr std::size_t min_anchors = 16;
-constexpr std::size_t folds = 4;
-// Penalties in units of the mean diagonal of the moments; infinity gives equal weights.
-constexpr std::array<double, 7> penalties = {
+constexpr std::size_t fold_count = 4;
+// Candidate penalties, in units of the mean diagonal of the second moments; infinity gives equal
+// weights.
+constexpr std::array<double, 7> penalty_candidates = {
     1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, std::numeric_limits<double>::infinity()};
 
-// First and second moments of margins per component, over any number of triplets.
-struct Moments {
-  explicit Moments(std::size_t components) : first(components), second(components * components) {}
+// Sums of margins per component and of their products, over any number of triplets (view, near,
+// far).
+struct MarginMoments {
+  explicit MarginMoments(std::size_t components)
+      : first(components), second(components * components) {}
 
   void add(std::span<const double> margin) {
     ++count;
@@ -40,7 +43,7 @@ struct Moments {
       }
     }
   }
-  void add(const Moments& other) {
+  void add(const MarginMoments& other) {
     count += other.count;
     for (std::size_t i = 0; i < first.size(); ++i) first[i] += other.first[i];
     for (std::size_t i = 0; i < second.size(); ++i) second[i] += other.second[i];
@@ -51,8 +54,8 @@ struct Moments {
   std::vector<double> second;
 };
 
-// Returns mean over standard deviation of the weighted margin.
-double signal_to_noise(const Moments& moments, std::span<const double> weights) {
+// Returns the mean of the weighted margin over its standard deviation; 0 without variance.
+double signal_to_noise(const MarginMoments& moments, std::span<const double> weights) {
   const std::size_t size = weights.size();
   const auto n = static_cast<double>(moments.count);
   double mean = 0.0;
@@ -67,9 +70,10 @@ double signal_to_noise(const Moments& moments, std::span<const double> weights) 
   return variance > 0.0 ? mean / std::sqrt(variance) : 0.0;
 }
 
-// Minimises the mean of (1 - w . margin)^2 + penalty * sum of (w_k - mean w)^2 over w >= 0, one
-// weight at a time, which converges because the sum is convex. Scaled to mean 1.
-std::vector<double> solve_weights(const Moments& moments, double penalty) {
+// Minimises the mean of (1 - w . margin)^2 + penalty * sum of (w_k - mean w)^2 over w >= 0 by
+// coordinate descent, which converges because the objective is convex. The weights are scaled to
+// mean 1.
+std::vector<double> solve_weights(const MarginMoments& moments, double penalty) {
   const std::size_t size = moments.first.size();
   std::vector<double> weights(size, 1.0);
   if (!std::isfinite(penalty)) return weights;
@@ -77,9 +81,9 @@ std::vector<double> solve_weights(const Moments& moments, double penalty) {
   double diagonal = 0.0;
   for (std::size_t i = 0; i < size; ++i) diagonal += moments.second[i * size + i] / n;
   const double strength = penalty * diagonal / static_cast<double>(size);
-  const double share = 1.0 / static_cast<double>(size);
+  const double inverse_size = 1.0 / static_cast<double>(size);
   const auto curvature = [&](std::size_t i, std::size_t j) {
-    return moments.second[i * size + j] / n + strength * ((i == j ? 1.0 : 0.0) - share);
+    return moments.second[i * size + j] / n + strength * ((i == j ? 1.0 : 0.0) - inverse_size);
   };
   constexpr int max_rounds = 2000;
   for (int round = 0; round < max_rounds; ++round) {
@@ -97,7 +101,8 @@ std::vector<double> solve_weights(const Moments& moments, double penalty) {
     if (change < 1e-9) break;
   }
   const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
-  // All zero: no weighting puts near views first on average, so none is better than equal weights.
+  // If all weights are 0, no weighting ranks near views first on average; equal weights are as
+  // good.
   if (!(sum > 0.0)) return std::vector<double>(size, 1.0);
   for (double& weight : weights) weight *= static_cast<double>(size) / sum;
   return weights;
@@ -108,13 +113,13 @@ struct PosedView {
   Point2 position;
 };
 
-// Adds the margins of one view; false if it has no near or no far views.
+// Adds the margins of the view `anchor`; returns false if it has no near or no far views.
 bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, double spacing_m,
-                 ViewId anchor, Moments& moments) {
+                 ViewId anchor, MarginMoments& moments) {
   const Point2 here = memory.info(anchor).pose->position();
   std::vector<PosedView> near;
   for (const PosedView& other : posed) {
-    if (other.view != anchor && distance(other.position, here) <= near_spacings * spacing_m) {
+    if (other.view != anchor && distance(other.position, here) <= max_near_spacings * spacing_m) {
       near.push_back(other);
     }
   }
@@ -129,7 +134,7 @@ bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, d
   for (const Match& match : found.matches) {
     const auto& pose = memory.info(match.view).pose;
     if (far.size() < max_far && pose &&
-        distance(pose->position(), here) > far_spacings * spacing_m) {
+        distance(pose->position(), here) > min_far_spacings * spacing_m) {
       far.push_back(match.view);
     }
   }
@@ -137,18 +142,19 @@ bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, d
 
   const FourierSignature signature = memory.signature(anchor);
   std::vector<std::vector<double>> to_near;
-  double unit = 0.0;
+  double mean_near = 0.0;
   for (const PosedView& other : near) {
     to_near.push_back(dissimilarity_by_component(signature, memory.signature(other.view)));
-    unit += std::accumulate(to_near.back().begin(), to_near.back().end(), 0.0) /
-            static_cast<double>(near.size());
+    mean_near += std::accumulate(to_near.back().begin(), to_near.back().end(), 0.0) /
+                 static_cast<double>(near.size());
   }
-  if (!(unit > 0.0)) return false;  // views that were never moved apart teach nothing
+  if (!(mean_near > 0.0)) return false;  // all near views equal the anchor, so there is no scale
   std::vector<double> margin(to_near.front().size());
   for (const ViewId other : far) {
     const auto to_far = dissimilarity_by_component(signature, memory.signature(other));
     for (const auto& nearby : to_near) {
-      for (std::size_t k = 0; k < margin.size(); ++k) margin[k] = (to_far[k] - nearby[k]) / unit;
+      for (std::size_t k = 0; k < margin.size(); ++k)
+        margin[k] = (to_far[k] - nearby[k]) / mean_near;
       moments.add(margin);
     }
   }
@@ -176,33 +182,36 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
 
   const auto components = static_cast<std::size_t>(memory.shape().components);
   const auto anchors = sample_views(ids, sampled_views, seed);
-  // Views that follow each other are neighbours, so a fold is one run of them.
-  std::vector<Moments> fold(folds, Moments(components));
+  // Consecutive views are neighbours. Each fold is a contiguous run, so that folds share few
+  // neighbours.
+  std::vector<MarginMoments> fold(fold_count, MarginMoments(components));
   std::size_t used = 0;
   for (std::size_t i = 0; i < anchors.size(); ++i) {
-    used += add_margins(memory, posed, spacing_m, anchors[i], fold[i * folds / anchors.size()]);
+    used +=
+        add_margins(memory, posed, spacing_m, anchors[i], fold[i * fold_count / anchors.size()]);
   }
-  const bool every_fold = std::ranges::all_of(fold, [](const Moments& m) { return m.count > 0; });
+  const bool every_fold =
+      std::ranges::all_of(fold, [](const MarginMoments& m) { return m.count > 0; });
   if (used < min_anchors || !every_fold) return std::nullopt;
 
-  const auto margin_left_out = [&](double penalty) {
+  const auto cross_validated_margin = [&](double penalty) {
     double sum = 0.0;
-    for (std::size_t out = 0; out < folds; ++out) {
-      Moments others(components);
-      for (std::size_t f = 0; f < folds; ++f) {
-        if (f != out) others.add(fold[f]);
+    for (std::size_t left_out_fold = 0; left_out_fold < fold_count; ++left_out_fold) {
+      MarginMoments others(components);
+      for (std::size_t f = 0; f < fold_count; ++f) {
+        if (f != left_out_fold) others.add(fold[f]);
       }
-      sum += signal_to_noise(fold[out], solve_weights(others, penalty)) / folds;
+      sum += signal_to_noise(fold[left_out_fold], solve_weights(others, penalty)) / fold_count;
     }
     return sum;
   };
-  Moments all(components);
-  for (const Moments& m : fold) all.add(m);
+  MarginMoments all(components);
+  for (const MarginMoments& m : fold) all.add(m);
   ComponentWeights result;
-  double best_penalty = penalties.back();
-  result.margin = result.margin_of_equal_weights = margin_left_out(best_penalty);
-  for (const double penalty : penalties) {
-    const double margin = margin_left_out(penalty);
+  double best_penalty = penalty_candidates.back();
+  result.margin = result.margin_of_equal_weights = cross_validated_margin(best_penalty);
+  for (const double penalty : penalty_candidates) {
+    const double margin = cross_validated_margin(penalty);
     if (margin > result.margin) {
       result.margin = margin;
       best_penalty = penalty;

@@ -8,8 +8,8 @@ namespace panonav::lab {
 
 namespace {
 
-// Other scenes than those of the offices.
-constexpr std::uint64_t mission_seeds_above = 1000;
+// Added to the seed, so that missions use other scenes than the office experiments.
+constexpr std::uint64_t mission_seed_offset = 1000;
 
 using FigureExperiments = std::vector<std::unique_ptr<Experiment>>;
 
@@ -37,7 +37,7 @@ void add_office(const FigureExperiments& experiments, std::uint64_t seed,
 }
 
 void reproduce_missions(const MissionGrid& grid, const Experiments& context) {
-  const ReproductionOptions missions{.seed = context.options.seed + mission_seeds_above,
+  const ReproductionOptions missions{.seed = context.options.seed + mission_seed_offset,
                                      .scenes = context.options.mission_scenes,
                                      .runs = context.options.runs};
   NavigationExperiments{{missions, context.executor, context.result}}.reproduce_grid_missions(

@@ -1,4 +1,4 @@
-// The ways of recognising places that [M04] argues against (sections 1, 2 and 2.1), as baselines on
+// The place recognition methods that [M04] argues against (sections 1, 2 and 2.1), as baselines on
 // the same views.
 
 #include <algorithm>
@@ -25,22 +25,23 @@ using MakeRecogniser = std::unique_ptr<RivalRecogniser> (*)();
 constexpr std::array<MakeRecogniser, 6> rival_factories{
     [] { return fourier_signature_recogniser(m04_components); },
     [] { return grey_histogram_recogniser(); }, [] { return colour_histogram_recogniser(); },
-    // Each view has as many numbers as the signature has components in a row.
+    // One eigenimage coefficient per signature component.
     [] { return eigenimage_recogniser(m04_components); }, [] { return zero_phase_recogniser(); },
     [] { return pixels_over_all_turns_recogniser(); }};
 constexpr std::size_t rival_count = rival_factories.size();
-// Queries of each scene, because pixels over all turns take long.
+// Maximum number of queries per scene, because comparing pixels over all turns is slow.
 constexpr std::size_t max_queries = 20;
 
-// Returns the conditions of the other experiments, and less light. No view is preprocessed, so that
-// no method has an advantage.
+// Returns the conditions of the other experiments and a dimmer one. No view is preprocessed, so
+// that no method has an advantage.
 std::vector<ViewCondition> rival_conditions() {
   std::vector<ViewCondition> conditions(view_conditions().begin(), view_conditions().end());
   conditions.push_back({"dim", "30 % less light", {.exposure = 0.7}});
   return conditions;
 }
 
-// Returns the mean difference between the channels of a pixel, 0 (grey) .. 1.
+// Returns the mean difference between the largest and the smallest colour channel of a pixel: 0
+// (grey) to 1.
 double mean_colourfulness(const Image& view) {
   double sum = 0.0;
   const auto pixels = view.pixels();
@@ -54,9 +55,9 @@ double mean_colourfulness(const Image& view) {
 class Rivals final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
-    const simulation::Renderer in_colour(place.scene, {.channels = 3}, executor);
+    const simulation::Renderer colour_renderer(place.scene, {.channels = 3}, executor);
     const auto references =
-        render_in_colour(place, in_colour, place.references, {}, 90000U, executor);
+        render_in_colour(place, colour_renderer, place.references, {}, 90000U, executor);
     for (const auto& view : references) colourfulness_.push_back(mean_colourfulness(view.picture));
     std::array<std::unique_ptr<RivalRecogniser>, rival_count> recognisers;
     for (std::size_t r = 0; r < rival_count; ++r) {
@@ -69,8 +70,8 @@ class Rivals final : public Experiment {
     for (std::size_t condition = 0; condition < conditions.size(); ++condition) {
       auto views = take_queries(place, conditions[condition], executor);
       views.resize(std::min(views.size(), max_queries), views.front());
-      const auto queries =
-          render_in_colour(place, in_colour, views, conditions[condition].sensor, 95000U, executor);
+      const auto queries = render_in_colour(place, colour_renderer, views,
+                                            conditions[condition].sensor, 95000U, executor);
       if (condition == 0) trials_ += queries.size();
       for (std::size_t r = 0; r < rival_count; ++r) {
         std::vector<std::size_t> found(queries.size());
@@ -134,9 +135,9 @@ class Rivals final : public Experiment {
  private:
   static constexpr std::size_t rival_condition_count = 4;
 
-  // Renders the views also in colour, at the same pose through the same kind of sensor.
+  // Adds to each view a colour rendering from the same pose through the same kind of sensor.
   static std::vector<RivalView> render_in_colour(const simulation::PlaceRecording& place,
-                                                 const simulation::Renderer& in_colour,
+                                                 const simulation::Renderer& colour_renderer,
                                                  const std::vector<simulation::PlacedView>& views,
                                                  const simulation::SensorOptions& sensor,
                                                  std::uint64_t noise, Executor& executor) {
@@ -145,9 +146,9 @@ class Rivals final : public Experiment {
                         .image_size = {place.rendering.columns, place.rendering.rows}};
     return simulation::make_each(executor, views.size(), [&](std::size_t i) {
       Executor here(1);
-      const simulation::Radiance light =
-          in_colour.render_image({.pose = views[i].pose, .height_m = place.scene.camera_height_m},
-                                 camera, place.rendering.rays_per_axis, here);
+      const simulation::Radiance light = colour_renderer.render_image(
+          {.pose = views[i].pose, .height_m = place.scene.camera_height_m}, camera,
+          place.rendering.rays_per_axis, here);
       return RivalView{
           views[i].panorama,
           simulation::apply_sensor(light, camera, sensor, place.seed * 100003U + noise + i)};

@@ -1,4 +1,5 @@
-// [M04] figures 4 and 5, and table 1 of [M03]: what the Fourier signature is and keeps.
+// [M04] figures 4 and 5, and table 1 of [M03]: invariance, spectrum and size of the Fourier
+// signature.
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +32,7 @@ std::vector<double> mean_power(const Panorama& view, int components) {
   return power;
 }
 
-// Returns the slope of log power against log k, k = 1 .. last, by least squares.
+// Returns the least-squares slope of log power against log k for k = 1 .. last.
 double fit_spectrum_exponent(const std::vector<double>& power, int last) {
   double n = 0.0;
   double sx = 0.0;
@@ -53,40 +54,45 @@ double fit_spectrum_exponent(const std::vector<double>& power, int last) {
 class RotationalInvariance final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
-    // Pairs of references one spacing apart; in the raster the next one is, but for row ends.
-    std::vector<std::size_t> firsts;
-    for (std::size_t i = 0; i + 1 < place.references.size() && firsts.size() < max_places; ++i) {
+    // Collect references whose successor in raster order is one spacing away, which excludes row
+    // ends.
+    std::vector<std::size_t> reference_indices;
+    for (std::size_t i = 0;
+         i + 1 < place.references.size() && reference_indices.size() < max_places; ++i) {
       const double step =
           distance(place.references[i].pose.position(), place.references[i + 1].pose.position());
-      if (step < 1.01 * place.spacing_m) firsts.push_back(i);
+      if (step < 1.01 * place.spacing_m) reference_indices.push_back(i);
     }
     Random random(place.seed, 78);
     std::vector<double> turns_rad;
     std::vector<Pose2> turned;
-    for (const std::size_t i : firsts) {
+    for (const std::size_t i : reference_indices) {
       turns_rad.push_back(random.uniform(-std::numbers::pi, std::numbers::pi));
       Pose2 pose = place.references[i].pose;
       pose.heading_rad = wrap_angle(pose.heading_rad + turns_rad.back());
       turned.push_back(pose);
     }
-    // A second picture at the same place: other noise and another heading, not a shifted copy.
-    const auto again =
+    // Take a second picture at the same position with another heading and other noise; a shifted
+    // copy of the first one would differ too little.
+    const auto repeated_signatures =
         compute_signatures(simulation::take_views(place, place.rendering, turned,
                                                   place.seed * 100003U + 60000U, {}, executor),
                            m04_components, executor);
-    for (std::size_t i = 0; i < firsts.size(); ++i) {
-      const auto here = compute_signature(place.references[firsts[i]].panorama, m04_components);
+    for (std::size_t i = 0; i < reference_indices.size(); ++i) {
+      const auto here =
+          compute_signature(place.references[reference_indices[i]].panorama, m04_components);
       const auto there =
-          compute_signature(place.references[firsts[i] + 1].panorama, m04_components);
-      ratios_.push_back(dissimilarity_l1(here, again[i]) / dissimilarity_l1(here, there));
-      if (const auto reading = compass(again[i], here)) {
+          compute_signature(place.references[reference_indices[i] + 1].panorama, m04_components);
+      ratios_.push_back(dissimilarity_l1(here, repeated_signatures[i]) /
+                        dissimilarity_l1(here, there));
+      if (const auto reading = compass(repeated_signatures[i], here)) {
         heading_errors_deg_.push_back(
             degrees(std::abs(angle_difference(reading->heading_rad, turns_rad[i]))));
       }
-      const auto across = compass(again[i], there);
-      if (across && std::abs(turns_rad[i]) > min_turn_rad) {
-        relative_errors_.push_back(
-            std::abs(angle_difference(across->heading_rad, turns_rad[i]) / turns_rad[i]));
+      const auto compass_from_next = compass(repeated_signatures[i], there);
+      if (compass_from_next && std::abs(turns_rad[i]) > min_turn_rad) {
+        relative_errors_.push_back(std::abs(
+            angle_difference(compass_from_next->heading_rad, turns_rad[i]) / turns_rad[i]));
       }
     }
   }
@@ -107,7 +113,7 @@ class RotationalInvariance final : public Experiment {
 
  private:
   static constexpr std::size_t max_places = 40;
-  static constexpr double min_turn_rad = 0.1;  // below it a share says nothing
+  static constexpr double min_turn_rad = 0.1;  // smaller rotations make relative errors meaningless
   std::vector<double> ratios_;
   std::vector<double> relative_errors_;
   std::vector<double> heading_errors_deg_;
@@ -117,7 +123,7 @@ class PowerSpectrum final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor&) override {
     const int all_components = place.rendering.columns / 2;
-    total_.resize(static_cast<std::size_t>(all_components));
+    power_sums_.resize(static_cast<std::size_t>(all_components));
     for (const auto& query : place.queries) {
       const auto power = mean_power(query.panorama, all_components);
       double all = 0.0;
@@ -126,14 +132,14 @@ class PowerSpectrum final : public Experiment {
         all += power[k];
         if (k < m04_components) first += power[k];
       }
-      shares_.push_back(first / all);
-      for (std::size_t k = 0; k < power.size(); ++k) total_[k] += power[k];
-      if (one_.empty()) one_ = power;
+      low_power_fractions_.push_back(first / all);
+      for (std::size_t k = 0; k < power.size(); ++k) power_sums_[k] += power[k];
+      if (first_power_.empty()) first_power_ = power;
     }
   }
 
   void report(Reproduction& result) const override {
-    require(!shares_.empty(), "views", 0.0, ">= 1");
+    require(!low_power_fractions_.empty(), "views", 0.0, ">= 1");
     viewer::LinePlot plot{
         .title = "Power spectrum of the panoramic cylinder, mean over rows ([M04] figure 5)",
         .x_label = "frequency k [cycles per turn]",
@@ -141,28 +147,30 @@ class PowerSpectrum final : public Experiment {
         .series = {},
         .log_y = true};
     viewer::Series single{.label = "one view", .style = viewer::SeriesStyle::lines_and_points};
-    viewer::Series average{.label = "mean of " + std::to_string(shares_.size()) + " views"};
+    viewer::Series average{.label =
+                               "mean of " + std::to_string(low_power_fractions_.size()) + " views"};
     for (int k = 1; k <= shown_frequencies; ++k) {
-      single.add(k, one_[static_cast<std::size_t>(k)]);
-      average.add(k, total_[static_cast<std::size_t>(k)] / static_cast<double>(shares_.size()));
+      single.add(k, first_power_[static_cast<std::size_t>(k)]);
+      average.add(k, power_sums_[static_cast<std::size_t>(k)] /
+                         static_cast<double>(low_power_fractions_.size()));
     }
     plot.series = {single, average};
     add_plot(result, "fig05_power_spectrum.svg",
              "Power falls steeply with frequency: the first 15 components hold most of it.", plot);
     add_row(result, "m04.fig5.share_15",
             "figure 5: share of the power (without k = 0) in the first 15 components (median)",
-            median_figure(shares_), "", at_least(0.5));
+            median_figure(low_power_fractions_), "", at_least(0.5));
     add_row(result, "m04.fig5.slope",
             "slope of the power spectrum, k = 1 .. 30 ([S06] reports about 1.8)",
-            -fit_spectrum_exponent(total_, shown_frequencies), "", std::nullopt,
+            -fit_spectrum_exponent(power_sums_, shown_frequencies), "", std::nullopt,
             std::pair{1.8, 1.8});
   }
 
  private:
   static constexpr int shown_frequencies = 30;
-  std::vector<double> total_;
-  std::vector<double> one_;
-  std::vector<double> shares_;
+  std::vector<double> power_sums_;
+  std::vector<double> first_power_;
+  std::vector<double> low_power_fractions_;
 };
 
 }  // namespace

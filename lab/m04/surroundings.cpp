@@ -29,7 +29,7 @@ Surroundings measure_surroundings(const simulation::PlaceRecording& place, Point
   constexpr std::size_t ray_count = 120;
   constexpr std::array heights_m{0.3, 0.6, 0.9};
   Surroundings result;
-  Directional nearness{};
+  Directional inverse_distance_sums{};
   Directional rays{};
   Directional shift{};
   for (std::size_t ray = 0; ray < ray_count; ++ray) {
@@ -37,20 +37,20 @@ Surroundings measure_surroundings(const simulation::PlaceRecording& place, Point
     for (const double height : heights_m) {
       const double free_m = place.renderer->distance_along({position.x_m, position.y_m, height},
                                                            Direction3::from_angles(azimuth, 0.0));
-      const double near = std::isfinite(free_m) ? 1.0 / std::max(free_m, 0.01) : 0.0;
+      const double inverse_distance = std::isfinite(free_m) ? 1.0 / std::max(free_m, 0.01) : 0.0;
       const std::size_t sector = find_sector(azimuth);
-      nearness[sector] += near;
+      inverse_distance_sums[sector] += inverse_distance;
       rays[sector] += 1.0;
       for (std::size_t direction = 0; direction < shape_directions; ++direction) {
         const double theta = sector_rad * static_cast<double>(direction);
-        shift[direction] += std::abs(std::sin(azimuth - theta)) * near;
+        shift[direction] += std::abs(std::sin(azimuth - theta)) * inverse_distance;
       }
     }
   }
   for (std::size_t i = 0; i < shape_directions; ++i) {
-    // Distance to open air, as outdoors: farther than any room.
+    // Distance used where all rays meet nothing, as outdoors; larger than any room.
     constexpr double far_m = 1000.0;
-    result.free_m[i] = nearness[i] > 0.0 ? rays[i] / nearness[i] : far_m;
+    result.free_m[i] = inverse_distance_sums[i] > 0.0 ? rays[i] / inverse_distance_sums[i] : far_m;
     result.parallax_m[i] =
         shift[i] > 0.0 ? static_cast<double>(ray_count * heights_m.size()) / shift[i] : far_m;
   }
@@ -70,7 +70,7 @@ Directional predict_extents(const simulation::PlaceRecording& place, const Pose2
     const double elevation = view.elevation_rad(y);
     const int above = std::max(y - 1, 0);
     const int below = std::min(y + 1, view.rows() - 1);
-    // Change of the components of this row per metre along x and y of the robot.
+    // Change of this row's components per metre of robot motion along x and along y.
     std::vector<Complex> along_x(count);
     std::vector<Complex> along_y(count);
     for (int c = 0; c < view.columns(); ++c) {
@@ -81,16 +81,18 @@ Directional predict_extents(const simulation::PlaceRecording& place, const Pose2
       if (!std::isfinite(range_m) || range_m <= 0.0) continue;
       const int left = (c + 1) % view.columns();
       const int right = (c + view.columns() - 1) % view.columns();
-      const double around = (view.at(y, left) - view.at(y, right)) / (2.0 * column_rad);
-      const double upwards =
+      const double azimuth_gradient = (view.at(y, left) - view.at(y, right)) / (2.0 * column_rad);
+      const double elevation_gradient =
           above == below ? 0.0
                          : (view.at(above, c) - view.at(below, c)) / ((below - above) * row_rad);
       // A step along theta shifts a point of the view by sin(azimuth - theta) / (range
-      // cos(elevation)), and raises it by cos(azimuth - theta) sin(elevation) / range.
-      const double turn = around / (range_m * std::max(std::cos(elevation), 1e-3));
-      const double lift = upwards * std::sin(elevation) / range_m;
-      const double x = turn * std::sin(azimuth) + lift * std::cos(azimuth);
-      const double y_part = -turn * std::cos(azimuth) + lift * std::sin(azimuth);
+      // cos(elevation)), and moves it up by cos(azimuth - theta) sin(elevation) / range.
+      const double horizontal_change =
+          azimuth_gradient / (range_m * std::max(std::cos(elevation), 1e-3));
+      const double vertical_change = elevation_gradient * std::sin(elevation) / range_m;
+      const double x = horizontal_change * std::sin(azimuth) + vertical_change * std::cos(azimuth);
+      const double y_part =
+          -horizontal_change * std::cos(azimuth) + vertical_change * std::sin(azimuth);
       for (std::size_t k = 0; k < count; ++k) {
         const Complex wave = std::polar(1.0, -static_cast<double>(k) * azimuth);
         along_x[k] += x * wave;
@@ -98,7 +100,8 @@ Directional predict_extents(const simulation::PlaceRecording& place, const Pose2
       }
     }
     for (std::size_t k = 0; k < count; ++k) {
-      // The part along the component itself changes its magnitude, the rest its phase.
+      // The change parallel to the component alters its magnitude, the perpendicular change its
+      // phase.
       const Complex unit =
           std::polar(1.0, -static_cast<double>(signature.phase_rad(y, static_cast<int>(k))));
       const double per_x = (along_x[k] * unit).real();

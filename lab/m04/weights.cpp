@@ -1,5 +1,5 @@
-// [M04] eq. 6: weights alpha_k, which the authors leave open ("not trivial because they depend on
-// the structure of the environment"), learnt in one scene and used in the next.
+// [M04] eq. 6: component weights alpha_k, left open by the authors ("not trivial because they
+// depend on the structure of the environment"), learnt in one scene and applied in the next.
 
 #include <array>
 #include <numeric>
@@ -19,19 +19,20 @@ namespace panonav::lab {
 namespace {
 
 constexpr std::size_t view_condition_count = 3;
-enum Weighting : std::size_t { equal, learnt, weightings };
+enum Weighting : std::size_t { equal, learnt, weighting_count };
 
 class WeightsOfComponents final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
     const auto references = compute_signatures(place.references, m04_components, executor);
-    if (before_) compare(place, references, executor);
+    if (previous_weights_) apply_previous_weights(place, references, executor);
     const auto learnt_here = learn_component_weights(make_memory(place.references, references));
     if (!learnt_here) return;
-    before_ = learnt_here->weights;
+    previous_weights_ = learnt_here->weights;
     margins_[equal].push_back(learnt_here->margin_of_equal_weights);
     margins_[learnt].push_back(learnt_here->margin);
-    for (std::size_t k = 0; k < before_->size(); ++k) weights_[k].push_back((*before_)[k]);
+    for (std::size_t k = 0; k < previous_weights_->size(); ++k)
+      weights_[k].push_back((*previous_weights_)[k]);
   }
 
   void report(Reproduction& result) const override {
@@ -63,7 +64,7 @@ class WeightsOfComponents final : public Experiment {
       add_row(result, "m04.eq6." + under.id + ".gain",
               "eq. 6: share found with learnt weights less that with equal ones (same queries), " +
                   under.name,
-              mean_figure(gain_[condition]), "");
+              mean_figure(gain_by_scene_[condition]), "");
     }
     for (const std::size_t w : {equal, learnt}) {
       add_row(result, std::string("m04.eq6.margin.") + (w == equal ? "equal" : "learnt"),
@@ -75,18 +76,18 @@ class WeightsOfComponents final : public Experiment {
   }
 
  private:
-  // Uses the weights of the scene before, in this one.
-  void compare(const simulation::PlaceRecording& place,
-               const std::vector<FourierSignature>& references, Executor& executor) {
-    const std::array<std::vector<double>, weightings> weights{
-        std::vector<double>(before_->size(), 1.0), *before_};
+  // Applies the weights learnt in the previous scene to this one.
+  void apply_previous_weights(const simulation::PlaceRecording& place,
+                              const std::vector<FourierSignature>& references, Executor& executor) {
+    const std::array<std::vector<double>, weighting_count> weights{
+        std::vector<double>(previous_weights_->size(), 1.0), *previous_weights_};
     for (std::size_t condition = 0; condition < view_condition_count; ++condition) {
       const auto views = take_queries(place, view_conditions()[condition], executor);
       const auto queries = compute_signatures(views, m04_components, executor);
-      std::array<double, weightings> right{};
+      std::array<double, weighting_count> right{};
       for (std::size_t q = 0; q < queries.size(); ++q) {
         const std::size_t nearest = place.nearest_reference(views[q].pose.position());
-        for (std::size_t w = 0; w < weightings; ++w) {
+        for (std::size_t w = 0; w < weighting_count; ++w) {
           std::vector<double> values;
           for (const auto& reference : references) {
             values.push_back(dissimilarity_weighted(queries[q], reference, weights[w]));
@@ -96,17 +97,17 @@ class WeightsOfComponents final : public Experiment {
           right[w] += found ? 1.0 / static_cast<double>(queries.size()) : 0.0;
         }
       }
-      gain_[condition].push_back(right[learnt] - right[equal]);
+      gain_by_scene_[condition].push_back(right[learnt] - right[equal]);
       if (condition == 0) trials_ += queries.size();
     }
   }
 
-  std::optional<std::vector<double>> before_;
+  std::optional<std::vector<double>> previous_weights_;
   std::array<std::vector<double>, m04_components> weights_;
-  std::array<std::vector<double>, weightings> margins_;
+  std::array<std::vector<double>, weighting_count> margins_;
   std::size_t trials_ = 0;
-  std::array<std::array<std::size_t, weightings>, view_condition_count> found_{};
-  std::array<std::vector<double>, view_condition_count> gain_;
+  std::array<std::array<std::size_t, weighting_count>, view_condition_count> found_{};
+  std::array<std::vector<double>, view_condition_count> gain_by_scene_;
 };
 
 }  // namespace

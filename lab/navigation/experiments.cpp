@@ -29,38 +29,39 @@ namespace panonav::lab {
 
 namespace {
 
-// Relative change of light: less in every second variant, more in the others.
+// Relative change of light: darker in every second variant, brighter in the others.
 constexpr double light_change = 0.3;
-constexpr double moved_objects_share = 0.1;
-// References along a drive, and how long that is.
+constexpr double moved_objects_fraction = 0.1;
+// Spacing of the references along a drive, and length of a drive.
 constexpr double drive_spacing_m = 0.25;
-constexpr double drive_m = 60.0;
-// Largest distance of a start from a drive, as where a robot is set down by hand.
+constexpr double drive_length_m = 60.0;
+// Largest distance of a mission's start from the drive, as if a person set the robot down.
 constexpr double max_start_offset_m = 0.3;
 
-// Measures of missions of one kind.
-struct Measures {
+// Results of all missions of one kind.
+struct MissionResults {
   std::size_t runs = 0;
   std::size_t arrived = 0;
-  std::size_t wrongly = 0;  // says that it arrived, but is elsewhere
+  std::size_t falsely_arrived = 0;  // reported an arrival elsewhere
   std::map<NavigationDecision::State, std::size_t> ends;
-  std::vector<double> lengths;  // of those that arrived, over the shortest
+  std::vector<double> relative_lengths;  // path length over the shortest, of missions that arrived
   std::vector<double> steps;
-  double bytes_read = 0.0;  // by all steps
+  double bytes_read = 0.0;  // sum over all steps
 
   void add(const std::vector<simulation::MissionRun>& missions, double radius_m) {
     for (const simulation::MissionRun& run : missions) {
       ++runs;
-      const bool arrives = run.arrives(radius_m);
-      arrived += static_cast<std::size_t>(arrives);
-      wrongly +=
-          static_cast<std::size_t>(!arrives && run.end == NavigationDecision::State::arrived);
+      const bool has_arrived = run.has_arrived(radius_m);
+      arrived += static_cast<std::size_t>(has_arrived);
+      falsely_arrived +=
+          static_cast<std::size_t>(!has_arrived && run.end == NavigationDecision::State::arrived);
       ++ends[run.end];
       steps.push_back(static_cast<double>(run.decisions.size()));
       for (const NavigationDecision& step : run.decisions) {
         bytes_read += static_cast<double>(step.bytes_read);
       }
-      if (arrives && run.shortest_m > 0.0) lengths.push_back(run.travelled_m / run.shortest_m);
+      if (has_arrived && run.shortest_m > 0.0)
+        relative_lengths.push_back(run.travelled_m / run.shortest_m);
     }
   }
 
@@ -69,17 +70,18 @@ struct Measures {
   }
 };
 
-void report(const std::string& id, const std::string& what, const Measures& measured,
+void report(const std::string& id, const std::string& what, const MissionResults& measured,
             std::optional<Target> arrival, std::optional<Target> length, Reproduction& result) {
   add_rate(result, id + ".arrived", what + ": arrive within half the reference spacing",
            measured.arrived, measured.runs, arrival);
-  result.rows.back().reason = simulation::explain_other_ends(measured.ends, measured.wrongly);
-  if (!measured.lengths.empty()) {
+  result.rows.back().reason =
+      simulation::explain_other_ends(measured.ends, measured.falsely_arrived);
+  if (!measured.relative_lengths.empty()) {
     add_median(result, id + ".length", what + ": path length against the shortest", "",
-               measured.lengths, length);
+               measured.relative_lengths, length);
   }
   add_rate(result, id + ".wrongly", what + ": report an arrival but are farther off",
-           measured.wrongly, measured.runs);
+           measured.falsely_arrived, measured.runs);
   for (const auto& [end, count] : measured.ends) {
     if (end == NavigationDecision::State::arrived) continue;
     add_rate(result, id + "." + std::string(name_of(end)),
@@ -103,15 +105,15 @@ void draw_mission(const std::string& name, const simulation::MissionPlace& place
                  "the direction of the one it is nearest to and looks again."});
 }
 
-// Plans a drive of `drive_m`: repeated round trips of the scene, or paths between random places
-// with 10 cm to spare on both sides of the robot.
+// Plans a drive of `drive_length_m`: repeated round trips of the scene, or without these paths
+// between random positions, with 10 cm clearance on both sides of the robot.
 std::vector<Pose2> plan_exploring_drive(const simulation::MissionPlace& place, std::uint64_t seed) {
   Random random(seed, 5);
-  simulation::FreeSpaceOptions roomy = simulation::free_space_options(place.scene);
-  roomy.robot_radius_m += 0.1;
-  const simulation::FreeSpace space(place.scene, roomy);
+  simulation::FreeSpaceOptions wide_clearance = simulation::free_space_options(place.scene);
+  wide_clearance.robot_radius_m += 0.1;
+  const simulation::FreeSpace space(place.scene, wide_clearance);
   std::vector<Point2> way;
-  while (path_length_m(way) < drive_m) {
+  while (path_length_m(way) < drive_length_m) {
     if (place.scene.tour.empty()) {
       way.push_back(space.random_pose(random).position());
     } else {
@@ -127,19 +129,20 @@ std::vector<Pose2> plan_exploring_drive(const simulation::MissionPlace& place, s
                                   {}, seed, way)) {
     poses.push_back(pose.pose);
   }
-  poses.resize(std::min(poses.size(), static_cast<std::size_t>(drive_m / drive_spacing_m) + 1));
+  poses.resize(
+      std::min(poses.size(), static_cast<std::size_t>(drive_length_m / drive_spacing_m) + 1));
   return poses;
 }
 
-// Returns the scene with screens as high as a robot across the path.
+// Returns the scene with screens as high as a robot across the path at the poses `across`.
 simulation::Scene add_screens(simulation::Scene scene, std::span<const Pose2> across,
                               double width_m) {
   for (const Pose2& at : across) simulation::add_screen(scene, at, width_m, 1.0);
   return scene;
 }
 
-// Returns the smallest width of screens that leaves no path past them; nullopt if none of the tried
-// widths does so and leaves room at both ends.
+// Returns the smallest width at which screens leave no path between `from` and `to`; nullopt if no
+// tried width blocks the path while both ends stay free.
 std::optional<double> find_blocking_width_m(const simulation::Scene& scene,
                                             std::span<const Pose2> across, Point2 from, Point2 to) {
   for (const double width_m : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0}) {
@@ -157,7 +160,7 @@ std::optional<double> find_blocking_width_m(const simulation::Scene& scene,
 
 void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
                                                     double spacing_m) const {
-  Measures measured;
+  MissionResults measured;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::MissionPlace place =
@@ -180,10 +183,10 @@ void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
 }
 
 void NavigationExperiments::reproduce_drive_missions(const std::string& scene) const {
-  Measures same;
-  Measures changed;
-  Measures kidnapped;
-  Measures believed;
+  MissionResults unchanged;
+  MissionResults changed;
+  MissionResults kidnapped;
+  MissionResults monte_carlo_kidnapped;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::SceneVariation variation{.seed = seed};
@@ -193,7 +196,7 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
         place, plan_exploring_drive(place, seed), simulation::make_noisy_wheels(),
         Random(seed, 1).next(), executor);
     variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
-    variation.moved_objects = moved_objects_share;
+    variation.moved_objects = moved_objects_fraction;
     variation.moved_seed = Random(seed, 4).next();
     const simulation::MissionPlace other = simulation::make_mission_place(
         simulation::make_or_read_scene(options.data, scene, variation), executor);
@@ -201,7 +204,7 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
     mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
     const double radius_m = 0.5 * remembered.spacing_m;
     const auto run = [&](const simulation::MissionPlace& where, bool is_kidnapped,
-                         std::uint64_t stream, Measures& measures) {
+                         std::uint64_t stream, MissionResults& measures) {
       const auto missions = simulation::sample_missions(where, remembered,
                                                         {.count = count_runs(options, i),
                                                          .max_distance_m = max_start_offset_m,
@@ -210,46 +213,46 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
       const auto runs = simulation::run_missions(where, remembered, missions, mission,
                                                  Random(seed, stream + 1).next(), executor);
       measures.add(runs, radius_m);
-      if (i == 0 && &measures == &same) {
+      if (i == 0 && &measures == &unchanged) {
         draw_mission(scene, where, remembered, missions.front(), runs.front(), result);
       }
     };
-    run(place, false, 5, same);
+    run(place, false, 5, unchanged);
     run(other, false, 7, changed);
     run(place, true, 9, kidnapped);
     if (scene == "corridor") {
-      // The missions of before, so that both can be compared.
+      // Repeat the kidnapped missions with the same seeds, so that both can be compared.
       mission.monte_carlo = true;
-      run(place, true, 9, believed);
+      run(place, true, 9, monte_carlo_kidnapped);
     }
   }
   const std::string what = scene + ", map of a drive of 60 m";
-  report("navigation." + scene, what, same, at_least(0.95), std::nullopt, result);
-  const bool movable =
+  report("navigation." + scene, what, unchanged, at_least(0.95), std::nullopt, result);
+  const bool has_movable_objects =
       std::ranges::find(simulation::scene_names(), scene) != simulation::scene_names().end();
   report("navigation." + scene + ".changed",
-         what + (movable ? ", light changed by 30 % and 10 % of the objects moved"
-                         : ", light changed by 30 %"),
+         what + (has_movable_objects ? ", light changed by 30 % and 10 % of the objects moved"
+                                     : ", light changed by 30 %"),
          changed, at_least(0.9), std::nullopt, result);
   report("navigation." + scene + ".kidnapped", what + ", kidnapped half way", kidnapped,
          at_least(0.9), std::nullopt, result);
-  if (believed.runs > 0) {
+  if (monte_carlo_kidnapped.runs > 0) {
     report("navigation." + scene + ".monte_carlo",
            what + ", the same missions with Monte-Carlo localisation where the place is in doubt",
-           believed, std::nullopt, std::nullopt, result);
+           monte_carlo_kidnapped, std::nullopt, std::nullopt, result);
   }
 }
 
 void NavigationExperiments::reproduce_tours() const {
-  constexpr int goals_a_tour = 5;
+  constexpr int goals_per_tour = 5;
   constexpr int people = 3;
-  struct Kind {
+  struct MissionKind {
     std::string id;
     std::string what;
     simulation::MissionOptions options;
-    Measures measures;
+    MissionResults measures;
   };
-  std::vector<Kind> kinds{
+  std::vector<MissionKind> kinds{
       {"tour", "one goal after the other", {}, {}},
       {"people", "the same with three people who walk about", {}, {}},
       {"accurate", "the same with all components compared at each step", {}, {}}};
@@ -264,26 +267,26 @@ void NavigationExperiments::reproduce_tours() const {
         Random(seed, 1).next(), executor);
     const AreaPlanner planner(remembered.graph);
     const MemoryViewSource source(remembered.memory);
-    const int tours = (count_runs(options, i) + goals_a_tour - 1) / goals_a_tour;
+    const int tours = (count_runs(options, i) + goals_per_tour - 1) / goals_per_tour;
     const auto missions = simulation::sample_missions(
-        place, remembered, {.count = tours * goals_a_tour, .max_distance_m = max_start_offset_m},
+        place, remembered, {.count = tours * goals_per_tour, .max_distance_m = max_start_offset_m},
         Random(seed, 12).next());
-    for (Kind& kind : kinds) {
+    for (MissionKind& kind : kinds) {
       auto runs =
           simulation::make_each(executor, static_cast<std::size_t>(tours), [&](std::size_t t) {
             std::vector<ViewId> goals;
-            for (std::size_t k = 0; k < goals_a_tour; ++k) {
-              goals.push_back(missions[t * goals_a_tour + k].goal);
+            for (std::size_t k = 0; k < goals_per_tour; ++k) {
+              goals.push_back(missions[t * goals_per_tour + k].goal);
             }
             Navigator navigator(source, planner, kind.options.navigator);
             return simulation::run_tour(place, remembered, navigator,
-                                        missions[t * goals_a_tour].start, goals, kind.options,
+                                        missions[t * goals_per_tour].start, goals, kind.options,
                                         Random(seed, 200 + t).next());
           });
       for (const auto& tour : runs) kind.measures.add(tour, 0.5 * remembered.spacing_m);
     }
   }
-  for (const Kind& kind : kinds) {
+  for (const MissionKind& kind : kinds) {
     report("navigation." + kind.id, "loop, tours of five goals, " + kind.what, kind.measures,
            std::nullopt, std::nullopt, result);
     add_row(result, "navigation." + kind.id + ".read",
@@ -294,14 +297,14 @@ void NavigationExperiments::reproduce_tours() const {
 }
 
 void NavigationExperiments::reproduce_route_missions() const {
-  struct Kind {
+  struct MissionKind {
     std::string id;
     std::string what;
-    Measures measures;
-    std::vector<double> off_m;  // from the way that was driven before
+    MissionResults measures;
+    std::vector<double> off_m;  // from the path of the recorded drive
   };
-  std::vector<Kind> kinds{{"route", "with the route recorded on it", {}, {}},
-                          {"without_route", "the same missions without the route", {}, {}}};
+  std::vector<MissionKind> kinds{{"route", "with the route recorded on it", {}, {}},
+                                 {"without_route", "the same missions without the route", {}, {}}};
   std::vector<double> on_route_m;
   std::map<NavigationDecision::Event, std::size_t> events;
   for (int i = 0; i < options.scenes; ++i) {
@@ -315,7 +318,7 @@ void NavigationExperiments::reproduce_route_missions() const {
     const auto missions = simulation::sample_missions(
         place, remembered, {.count = count_runs(options, i), .max_distance_m = max_start_offset_m},
         Random(seed, 13).next());
-    for (Kind& kind : kinds) {
+    for (MissionKind& kind : kinds) {
       const auto runs = simulation::run_missions(place, remembered, missions, {},
                                                  Random(seed, 14).next(), executor);
       kind.measures.add(runs, 0.5 * remembered.spacing_m);
@@ -332,7 +335,7 @@ void NavigationExperiments::reproduce_route_missions() const {
     }
   }
   const std::string map = "loop, map of a drive of 60 m, ";
-  for (const Kind& kind : kinds) {
+  for (const MissionKind& kind : kinds) {
     report("navigation." + kind.id, map + kind.what, kind.measures, std::nullopt, std::nullopt,
            result);
     add_median(result, "navigation." + kind.id + ".off",
@@ -349,8 +352,8 @@ void NavigationExperiments::reproduce_route_missions() const {
 }
 
 void NavigationExperiments::reproduce_blocked_missions() const {
-  Measures around;
-  Measures shut;
+  MissionResults around;
+  MissionResults shut;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::Scene scene = simulation::make_scene("loop", {.seed = seed});
@@ -365,8 +368,8 @@ void NavigationExperiments::reproduce_blocked_missions() const {
     const auto round = static_cast<std::size_t>(tour_m / drive_spacing_m);
     Random random(seed, 11);
     for (int k = 0; k < count_runs(options, i);) {
-      // A quarter of the round trip apart, the screen half way between; the other one on the
-      // opposite side.
+      // Start and goal are a quarter of the round trip apart. One screen is halfway between them,
+      // the other one on the opposite side of the loop.
       const std::size_t start = random.index(round);
       const std::size_t goal = (start + round / 4) % round;
       const std::array<Pose2, 2> screens{way[(start + round / 8) % round],
@@ -396,7 +399,7 @@ void NavigationExperiments::reproduce_blocked_missions() const {
   add_rate(result, "navigation.shut.unreachable", what + " on both sides: reported unreachable",
            shut.ends[NavigationDecision::State::unreachable], shut.runs, at_least(0.9));
   result.rows.back().reason = simulation::explain_other_ends(
-      shut.ends, shut.wrongly, NavigationDecision::State::unreachable);
+      shut.ends, shut.falsely_arrived, NavigationDecision::State::unreachable);
   add_rate(result, "navigation.shut.arrived", what + " on both sides: report an arrival",
            shut.ends[NavigationDecision::State::arrived], shut.runs);
   add_median(result, "navigation.shut.steps", what + " on both sides: steps until reported", "",

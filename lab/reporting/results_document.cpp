@@ -13,7 +13,7 @@ std::string format_count(std::size_t count, const std::string& one, const std::s
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-// Escapes the characters that have a meaning in Markdown.
+// Escapes the characters that have a special meaning in Markdown.
 std::string escape_markdown(const std::string& text) {
   std::string result;
   for (const char c : text) {
@@ -23,8 +23,8 @@ std::string escape_markdown(const std::string& text) {
   return result;
 }
 
-// Returns an item of a list, broken between words.
-std::string list_item(const std::string& text) {
+// Returns a Markdown list item, wrapped at word boundaries.
+std::string make_list_item(const std::string& text) {
   constexpr std::size_t width = 120;
   std::string result = "-";
   std::size_t column = result.size();
@@ -41,18 +41,18 @@ std::string list_item(const std::string& text) {
   return result + "\n";
 }
 
-// Returns one line of a table.
-std::string table_line(std::span<const std::string> cells) {
+// Returns one line of a Markdown table.
+std::string make_table_line(std::span<const std::string> cells) {
   std::string line = "|";
   for (const std::string& cell : cells) line += " " + escape_markdown(cell) + " |";
   return line + "\n";
 }
 
-// Returns the rows with a target.
-std::string target_table(std::span<const ResultRow> rows) {
-  std::string text = table_line(table_header()) + "|---|---|---|---|---|---|\n";
+// Returns a Markdown table of the rows with a target.
+std::string make_target_table(std::span<const ResultRow> rows) {
+  std::string text = make_table_line(table_header()) + "|---|---|---|---|---|---|\n";
   for (const ResultRow& row : rows) {
-    if (row.target) text += table_line(table_cells(row));
+    if (row.target) text += make_table_line(table_cells(row));
   }
   return text;
 }
@@ -117,13 +117,13 @@ std::string to_markdown(const ResultsDocument& document) {
   }
   text += "\n## Targets that were not met\n\n";
   const auto misses = list_misses(document);
-  for (const std::string& line : misses) text += list_item(escape_markdown(line));
+  for (const std::string& line : misses) text += make_list_item(escape_markdown(line));
   if (misses.empty()) text += "None.\n";
   for (const PaperResults& paper : document.papers) {
     text += "\n<a name=\"" + paper.paper + "\"></a>\n\n## " + escape_markdown(paper.title) + "\n\n";
     text += "`panonav reproduce " + paper.paper + "`\n\n";
     const bool is_judged = count_targets(paper.rows).judged > 0;
-    text += is_judged ? target_table(paper.rows) : "No row has a target.\n";
+    text += is_judged ? make_target_table(paper.rows) : "No row has a target.\n";
   }
   text += "\n`results.json` holds " + format_count(rows, "row", "rows") +
           ", those without a target too.\n";

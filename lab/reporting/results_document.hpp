@@ -8,7 +8,7 @@
 
 namespace panonav::lab {
 
-/// The rows of a group of experiments.
+/// The result rows of one group of experiments.
 struct PaperResults {
   std::string paper;  ///< short: "m04"
   std::string title;
@@ -18,24 +18,26 @@ struct PaperResults {
 /// The results of all papers, as `reproduce all` writes them.
 struct ResultsDocument {
   std::string version;  ///< of the program that made it
-  std::string command;  ///< that makes it, as typed
+  std::string command;  ///< command line that makes it
   std::vector<PaperResults> papers;
 };
 
-/// Counts the targets of all papers.
+/// Counts the targets in the results of all papers.
 [[nodiscard]] TargetCount count_targets(const ResultsDocument& document);
 
-/// Lists every row that misses its target, a sentence each: what, ours against the target, and why.
+/// Lists all rows that miss their target, one sentence per row: what, our value, the target, and
+/// why it was missed.
 [[nodiscard]] std::vector<std::string> list_misses(const ResultsDocument& document);
 
-/// Moves the rows with a target before the others; keeps their order. Returns their number.
+/// Moves the rows with a target to the front, keeping the order within both groups. Returns the
+/// number of rows with a target.
 std::size_t move_targets_first(std::vector<ResultRow>& rows);
 
-/// Returns one object: `version`, `command`, `targets`, `held`, `papers` (by name, an array of rows
-/// each).
+/// Returns one JSON object: `version`, `command`, `targets`, `held`, and `papers` (an array of rows
+/// by the name of each paper).
 [[nodiscard]] std::string to_json(const ResultsDocument& document);
-/// Returns Markdown: title, command, counts, the rows that do not hold with their reasons, then for
-/// each paper a table of its rows with a target, and how many rows the JSON document holds.
+/// Returns Markdown: title, command, counts, the rows that miss their target with reasons, then a
+/// table per paper of its rows with a target, and the number of rows of the JSON document.
 [[nodiscard]] std::string to_markdown(const ResultsDocument& document);
 
 }  // namespace panonav::lab

@@ -15,13 +15,13 @@ std::string_view to_symbol(Comparison comparison) {
   return comparison == Comparison::at_most ? "<=" : ">=";
 }
 
-// Formats four significant digits.
+// Formats a value with four significant digits.
 std::string format_value(double value, const std::string& unit) {
   return format_number(value, unit, 4);
 }
 
-// Formats a figure with its interval, without its unit.
-std::string figure_text(const ResultRow& row) {
+// Formats our value with its interval, without its unit.
+std::string format_value_and_interval(const ResultRow& row) {
   std::string text = format_value(row.ours, row.unit);
   if (row.interval) {
     text += " (" + format_value(row.interval->first, row.unit) + " .. " +
@@ -48,7 +48,8 @@ TargetCount count_targets(std::span<const ResultRow> rows) {
 }
 
 std::string format_figure(const ResultRow& row) {
-  return row.unit.empty() ? figure_text(row) : figure_text(row) + " " + row.unit;
+  return row.unit.empty() ? format_value_and_interval(row)
+                          : format_value_and_interval(row) + " " + row.unit;
 }
 
 std::string format_published(const ResultRow& row) {
@@ -70,11 +71,11 @@ std::string explain_miss(const ResultRow& row) {
   }
   std::vector<std::string> parts{"by " +
                                  format_value(std::abs(row.ours - row.target->value), row.unit)};
-  ResultRow reached = row;
+  ResultRow best_in_interval = row;
   if (row.interval) {
-    reached.ours =
+    best_in_interval.ours =
         row.target->comparison == Comparison::at_most ? row.interval->first : row.interval->second;
-    if (reached.holds()) parts.emplace_back("the 95 % interval reaches the target");
+    if (best_in_interval.holds()) parts.emplace_back("the 95 % interval reaches the target");
   }
   if (!row.reason.empty()) {
     parts.push_back(row.reason);
@@ -97,7 +98,7 @@ std::span<const std::string> table_header() {
 std::vector<std::string> table_cells(const ResultRow& row) {
   return {row.over.empty() ? row.what : row.what + " (" + row.over + ")",
           format_published(row),
-          figure_text(row),
+          format_value_and_interval(row),
           row.unit.empty() ? "-" : row.unit,
           format_target(row),
           !row.target   ? "-"

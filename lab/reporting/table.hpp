@@ -18,27 +18,27 @@ struct Target {
   friend bool operator==(const Target&, const Target&) = default;
 };
 
-/// A figure: published, ours, and whether it holds.
+/// One result: the published value, our value, and whether it meets its target.
 struct ResultRow {
   std::string id;    ///< short and stable, "m04.fig6.success_15"
-  std::string what;  ///< for people; the same in every run
+  std::string what;  ///< for readers; the same in every run
   std::optional<std::pair<double, double>>
       published;  ///< low, high; equal when the paper gives one number
   double ours = 0.0;
   std::optional<std::pair<double, double>>
-      interval;      ///< 95 % interval of `ours` where it is a statistic
+      interval;      ///< 95 % confidence interval of `ours`, if it is a statistic
   std::string unit;  ///< "" for pure numbers
   std::optional<Target> target;
-  /// Sample of the figure, "median of 120", and further notes.
+  /// Sample of the result, as "median of 120", and further notes.
   std::string over = {};
-  /// Reason of a missed target, if known: one plain sentence.
+  /// Reason of a missed target in one plain sentence; empty if unknown.
   std::string reason = {};
 
-  /// True if there is no target or `ours` meets it; false for NaN.
+  /// True if `ours` is finite and meets the target, if there is one.
   [[nodiscard]] bool holds() const;
 };
 
-/// Number of rows with a target, and of those that meet it.
+/// Number of rows with a target, and the number of these that meet it.
 struct TargetCount {
   std::size_t judged = 0;
   std::size_t held = 0;
@@ -46,26 +46,26 @@ struct TargetCount {
 };
 [[nodiscard]] TargetCount count_targets(std::span<const ResultRow> rows);
 
-/// Returns our figure for people, with its interval and unit: "0.02 (0.012 .. 0.036) m".
+/// Formats our value with its interval and unit: "0.02 (0.012 .. 0.036) m".
 [[nodiscard]] std::string format_figure(const ResultRow& row);
-/// Returns "5 .. 6", or "-" where the paper gives nothing.
+/// Formats the published range, "5 .. 6"; "-" if there is none.
 [[nodiscard]] std::string format_published(const ResultRow& row);
-/// Returns "at most 0.02", or "-" for none.
+/// Formats the target, "at most 0.02"; "-" if there is none.
 [[nodiscard]] std::string format_target(const ResultRow& row);
-/// Returns by how much a row misses its target, and why: the known reason, or that none is known; a
-/// time (ms, us) depends on the machine.
+/// Returns by how much a row misses its target and why: the known reason, that a time (ms, us)
+/// depends on the machine, or that no reason is known.
 [[nodiscard]] std::string explain_miss(const ResultRow& row);
 
 /// Returns the titles of the columns that `table_cells` fills: what, published, ours, unit, target,
 /// holds.
 [[nodiscard]] std::span<const std::string> table_header();
-/// Returns the cells of a row, for people.
+/// Returns the table cells of a row as text.
 [[nodiscard]] std::vector<std::string> table_cells(const ResultRow& row);
 
-/// Returns the array that `reproduce --json` prints (docs/formats.md). The reason of a row that
-/// holds is left out.
+/// Returns the array that `reproduce --json` prints (docs/formats.md). The reason is null for a row
+/// that meets its target.
 [[nodiscard]] std::string to_json(std::span<const ResultRow> rows);
-/// Parses the output of `to_json`; rows may lack `over` and `reason`. Throws FileError, which names
-/// `file`, the row and the field.
+/// Parses the output of `to_json`; rows may lack `over` and `reason`. Throws FileError with the
+/// name `file`, the row and the field.
 [[nodiscard]] std::vector<ResultRow> from_json(std::string_view text, std::string_view file);
 }  // namespace panonav::lab

@@ -11,15 +11,15 @@ namespace {
 
 using nlohmann::json;
 
-// Returns the text of a value for messages, shortened.
+// Returns a JSON value as text for error messages, at most 40 characters.
 std::string shorten_value(const json& value) {
   if (value.is_structured()) return "an " + std::string(value.type_name());
-  constexpr std::size_t longest = 40;
+  constexpr std::size_t max_length = 40;
   const std::string text = value.dump();
-  return text.size() <= longest ? text : text.substr(0, longest) + "...";
+  return text.size() <= max_length ? text : text.substr(0, max_length) + "...";
 }
 
-// Reads the fields of a row and names them in errors.
+// Reads the fields of one row; errors name the row and the field.
 class RowReader {
  public:
   RowReader(const json& row, std::size_t number, std::string_view file)
@@ -44,7 +44,7 @@ class RowReader {
     return row_[field];
   }
 
-  // Values that are not finite were written as null.
+  // Returns NaN for null, which `to_json` writes for values that are not finite.
   [[nodiscard]] double number_or_null(const std::string& field, const json& value) const {
     if (value.is_null()) return std::numeric_limits<double>::quiet_NaN();
     if (!value.is_number())

@@ -15,32 +15,32 @@
 
 namespace panonav::lab {
 
-/// The camera of a homing robot and the components of its signatures.
+/// The camera of a homing robot and the number of components of its signatures.
 struct HomingCamera {
   simulation::PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
   simulation::FrameOptions frame;  ///< height above the floor, tilt
-  bool levelled = false;  ///< an inertial sensor measures the tilt, and views are turned upright
+  bool levelled = false;           ///< correct the tilt, as measured by an inertial sensor
   simulation::SensorOptions sensor;
   int components = 20;
 };
 
-/// A place in which robots are sent home.
+/// A simulated place in which homing runs are made.
 struct HomingPlace : simulation::SimulatedPlace {
   HomingCamera camera;
 };
 
-/// Makes the place of a scene, with the camera at the height of the scene. Throws ContractError as
-/// `make_place`.
+/// Renders the scene into a place for homing runs, with the camera at the height that the scene
+/// states. Throws ContractError as `make_place`.
 [[nodiscard]] HomingPlace make_homing_place(simulation::Scene scene, HomingCamera camera,
                                             Executor& executor);
 
-/// Renders the view of a robot there. The same pose and seed give the same bits.
+/// Renders the robot's view at `pose`. The same pose and seed give the same bits.
 [[nodiscard]] HomingView take_homing_view(const HomingPlace& place, const Pose2& pose,
                                           std::uint64_t seed);
 
 struct HomingRunOptions {
-  /// Error of the wheels. A differential robot turns, then drives; a holonomic one never turns, and
-  /// drives sideways.
+  /// Error of the wheels, and the drive: a differential robot turns before it drives, a holonomic
+  /// one keeps its heading and drives in any direction.
   OdometryNoise motion;
   simulation::ObstacleRule obstacles = simulation::ObstacleRule::pass;
   HomingPursuitOptions pursuit;
@@ -48,49 +48,50 @@ struct HomingRunOptions {
 };
 
 enum class HomingRunEnd {
-  arrived,      ///< the robot says that it is at home
-  wrong_place,  ///< the robot says that it stopped somewhere else
+  arrived,      ///< the robot reports that it is at home
+  wrong_place,  ///< the robot reports that it stopped elsewhere
   blocked,      ///< an obstacle stopped it
   exhausted,    ///< the maximum number of steps was reached
 };
 /// Returns "arrived", "wrong place", "blocked" or "exhausted".
 [[nodiscard]] std::string_view to_string(HomingRunEnd end);
 
-/// A run home.
+/// The path and the result of one homing run.
 struct HomingRun {
   Pose2 goal;
-  std::vector<Pose2> path;          ///< true poses at the views, the start first; and the last one
-  std::vector<HomeVector> vectors;  ///< at these poses
+  std::vector<Pose2> path;          ///< true poses at all views, then at the end of the run
+  std::vector<HomeVector> vectors;  ///< one home vector per view
   HomingRunEnd end = HomingRunEnd::exhausted;
   double end_distance_m = 0.0;    ///< from the goal
   double start_difference = 0.0;  ///< image difference of the first view from home
   double end_difference = 0.0;    ///< image difference of the last view from home
-  bool met_obstacle = false;      ///< at least one step was not in the intended direction
+  bool met_obstacle = false;      ///< true if at least one step left the intended direction
 
   /// True if the robot reports an arrival within `radius_m` of the goal.
   [[nodiscard]] bool is_success(double radius_m) const noexcept;
 };
 
-/// Sends a robot from `start` to the place where `home` was seen, of which it knows that view alone
-/// and not how it is turned against it. `goal` is for the record. The same seed gives the same run.
-/// Throws OptionError, and ContractError when `start` is not free. Cost: one picture per step.
+/// Sends a robot from `start` to the place where the view `home` was taken. The robot knows only
+/// this view, not its heading difference to it. `goal` is the true pose of that place, used for the
+/// result. The same seed gives the same run. Throws OptionError, and ContractError if `start` is
+/// not free. Cost: one rendered picture per step.
 [[nodiscard]] HomingRun run_home(const HomingPlace& place, const HomingView& home,
                                  const Pose2& goal, const Pose2& start,
                                  const HomingRunOptions& options, std::uint64_t seed);
 
-/// Start and goal of a run.
+/// Goal and start of one homing run.
 struct HomingTask {
   Pose2 goal;
   Pose2 start;
 };
 
-/// Draws random goals in the free space, each with a start uniform over the free places within
-/// `radius_m`, all headings random. Places as the scene has them: walls and things may stand in
-/// between. Throws ContractError unless count >= 1 and radius_m > 0.
+/// Draws `count` random goals in the free space, each with a start drawn uniformly from the free
+/// positions within `radius_m`; all headings are random. Obstacles may be between start and goal.
+/// Throws ContractError unless count >= 1 and radius_m > 0.
 [[nodiscard]] std::vector<HomingTask> sample_homing_tasks(const HomingPlace& place, int count,
                                                           double radius_m, std::uint64_t seed);
 
-/// Runs all tasks; run i has the stream (seed, i).
+/// Runs all homing tasks; run i uses the random stream (seed, i).
 [[nodiscard]] std::vector<HomingRun> run_home(const HomingPlace& place,
                                               const std::vector<HomingTask>& tasks,
                                               const HomingRunOptions& options, std::uint64_t seed,

@@ -10,15 +10,15 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr std::size_t uniform_number = 50;      // particles that are replaced [M03 figure 8]
-constexpr double topological_share = 0.1;       // of the particles [M03 section 4.1]
-constexpr double topological_tolerance = 0.25;  // of the best dissimilarity; the paper has none
+constexpr std::size_t uniform_particle_count = 50;  // particles per image [M03 figure 8]
+constexpr double topological_fraction = 0.1;        // fraction of the particles [M03 section 4.1]
+constexpr double topological_tolerance = 0.25;  // above the best dissimilarity; not in the paper
 
 }  // namespace
 
 MonteCarloLocaliser::InjectionRule uniform_injection() {
   return [](const PackedSignature&, std::size_t particles) {
-    return MonteCarloLocaliser::InjectedParticles{std::min(particles, uniform_number), {}};
+    return MonteCarloLocaliser::InjectedParticles{std::min(particles, uniform_particle_count), {}};
   };
 }
 
@@ -35,14 +35,14 @@ MonteCarloLocaliser::InjectionRule topological_injection(
       if (ranking->memory().info(match.view).pose) injected.around.push_back(match.view);
     }
     if (injected.around.empty()) return injected;
-    injected.count =
-        static_cast<std::size_t>(std::lround(topological_share * static_cast<double>(particles)));
+    injected.count = static_cast<std::size_t>(
+        std::lround(topological_fraction * static_cast<double>(particles)));
     return injected;
   };
 }
 
-void use_injection(MonteCarloLocaliser& filter, InjectionMethod method,
-                   const std::shared_ptr<const ColumnRanking>& ranking) {
+void set_injection_method(MonteCarloLocaliser& filter, InjectionMethod method,
+                          const std::shared_ptr<const ColumnRanking>& ranking) {
   if (method == InjectionMethod::uniform) filter.set_injection_rule(uniform_injection());
   if (method == InjectionMethod::topological) {
     filter.set_injection_rule(topological_injection(ranking));

@@ -16,9 +16,9 @@ namespace panonav::lab {
 
 namespace {
 
-/// A memory of a recorded place with its localiser, by the command's defaults: columns rank the
-/// places, local features are evidence only. Neither copied nor moved: the localiser refers to the
-/// memory.
+/// The memory of a recorded place with its localiser, with the defaults of the command line
+/// program: columns rank the places, and local features only decide whether a place is known. Not
+/// copyable, because the localiser refers to the memory.
 class MemorisedPlace {
  public:
   MemorisedPlace(const simulation::PlaceRecording& place, Executor& executor)
@@ -39,7 +39,7 @@ class MemorisedPlace {
   Localiser localiser_;
 };
 
-// True if two places are at most one step of the grid apart in x and in y.
+// True if two positions are at most one grid step apart in x and in y.
 bool is_neighbour(Point2 a, Point2 b, double spacing_m) {
   return std::abs(std::lround((a.x_m - b.x_m) / spacing_m)) <= 1 &&
          std::abs(std::lround((a.y_m - b.y_m) / spacing_m)) <= 1;
@@ -64,7 +64,7 @@ std::vector<PlaceCondition> place_conditions() {
 std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& place,
                                               const std::vector<PlaceCondition>& conditions,
                                               Executor& executor) {
-  const MemorisedPlace remembered(place, executor);
+  const MemorisedPlace memorised(place, executor);
   std::vector<PlaceResult> results;
   std::uint64_t seed = place.seed * 1000003U;
   for (const PlaceCondition& condition : conditions) {
@@ -78,11 +78,11 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
           simulation::take_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
                                     frame, condition.sensor, seed + begin, here);
       const Tilt measured = condition.levelled ? sample_tilt(frame, seed + begin) : Tilt{};
-      answers[begin] = remembered.localise(level_panorama(seen, measured));
+      answers[begin] = memorised.localise(level_panorama(seen, measured));
     });
     seed += query_count;
     std::size_t nearest = 0;
-    std::size_t next = 0;
+    std::size_t nearest_or_neighbour = 0;
     std::size_t known = 0;
     std::size_t inside = 0;
     std::vector<double> heading_errors;
@@ -91,13 +91,14 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       const Pose2& truth = place.queries[i].pose;
       const Place& answer = answers[i];
       const PlaceMatch& best = answer.matches.at(0);
-      const ReferencePose& found = *remembered.memory().info(best.view).pose;
+      const ReferencePose& found = *memorised.memory().info(best.view).pose;
       const Point2 nearest_position =
           place.references[place.nearest_reference(truth.position())].pose.position();
       nearest += found.position() == nearest_position ? 1 : 0;
-      next += is_neighbour(found.position(), nearest_position, place.spacing_m) ? 1 : 0;
+      nearest_or_neighbour +=
+          is_neighbour(found.position(), nearest_position, place.spacing_m) ? 1 : 0;
       known += answer.known ? 1 : 0;
-      // A missing reading counts as the largest error.
+      // A match without heading is counted with the largest error, pi.
       heading_errors.push_back(best.heading_rad
                                    ? std::abs(angle_difference(
                                          *found.heading_rad + *best.heading_rad, truth.heading_rad))
@@ -107,15 +108,15 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       inside += position_errors.back() <= answer.position->radius_m.value_or(0.0) ? 1 : 0;
     }
     results.push_back({condition.name, success_rate(nearest, query_count),
-                       success_rate(next, query_count), success_rate(known, query_count),
-                       quantile(heading_errors, 0.5), quantile(heading_errors, 0.95),
-                       quantile(position_errors, 0.5),
+                       success_rate(nearest_or_neighbour, query_count),
+                       success_rate(known, query_count), quantile(heading_errors, 0.5),
+                       quantile(heading_errors, 0.95), quantile(position_errors, 0.5),
                        success_rate(inside, position_errors.size())});
   }
   return results;
 }
 
-std::vector<RecognitionRate> recognition_rates(
+std::vector<RecognitionRate> measure_recognition_rates(
     std::span<const simulation::PlaceRecording* const> places, Executor& executor) {
   const auto name = [](const simulation::PlaceRecording& place) {
     return place.scene.name + " " + std::to_string(place.seed);
@@ -123,11 +124,11 @@ std::vector<RecognitionRate> recognition_rates(
   std::vector<RecognitionRate> own;
   std::vector<RecognitionRate> others;
   for (const simulation::PlaceRecording* const place : places) {
-    const MemorisedPlace remembered(*place, executor);
+    const MemorisedPlace memorised(*place, executor);
     for (const simulation::PlaceRecording* const queried : places) {
       std::vector<std::uint8_t> known(queried->queries.size());
       executor.for_chunks(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-        known[i] = remembered.localise(queried->queries[i].panorama).known ? 1 : 0;
+        known[i] = memorised.localise(queried->queries[i].panorama).known ? 1 : 0;
       });
       const auto count = static_cast<std::size_t>(std::ranges::count(known, 1));
       (place == queried ? own : others)

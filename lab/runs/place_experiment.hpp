@@ -12,28 +12,28 @@
 
 namespace panonav::lab {
 
-/// Differences between memorising and localising.
+/// Change of the sensor and of the robot's tilt between memorising and localising.
 struct PlaceCondition {
   std::string name;
   simulation::SensorOptions sensor;
-  double tilt_rad = 0.0;  ///< the robot is tilted by this much, in another direction at each place
-  bool levelled = false;  ///< an inertial sensor measures it, and views are turned upright
+  double tilt_rad = 0.0;  ///< tilt of each query view, in a random direction
+  bool levelled = false;  ///< correct the tilt, as measured by an inertial sensor
 };
 
-/// Returns four conditions: as memorised; light 30 % less and 30 % more, with a tenth of the
-/// columns hidden; 5 degrees of tilt.
+/// Returns four conditions: as memorised; 30 % less light and 30 % more light, both with a tenth of
+/// the columns hidden; 5 degrees of tilt.
 [[nodiscard]] std::vector<PlaceCondition> place_conditions();
 
-/// Results of one condition.
+/// Localisation results under one condition.
 struct PlaceResult {
   std::string condition;
-  Proportion nearest;               ///< the best match is the nearest grid place
-  Proportion nearest_or_next;       ///< or one of its eight neighbours on the grid
-  Proportion known;                 ///< taken for a place of the memory
+  Proportion nearest;               ///< the best match is the nearest reference
+  Proportion nearest_or_next;       ///< the best match is that one or a grid neighbour of it
+  Proportion known;                 ///< recognised as a place of the memory
   double heading_median_rad = 0.0;  ///< absolute error by the best match, over all queries
   double heading_p95_rad = 0.0;
-  double position_median_m = 0.0;  ///< error of the interpolated position, where the place is known
-  Proportion inside;               ///< of those, within the stated 95 % radius
+  double position_median_m = 0.0;  ///< error of interpolated positions, known places only
+  Proportion inside;               ///< of these positions, share within the stated 95 % radius
 };
 
 /// Memorises the references of the place and localises the queries in all conditions. Throws as
@@ -42,16 +42,17 @@ struct PlaceResult {
     const simulation::PlaceRecording& place, const std::vector<PlaceCondition>& conditions,
     Executor& executor);
 
-/// Share of the queries of one place that the memory of a place knows.
+/// Share of the queries taken in one place that the memory of another (or the same) place
+/// recognises.
 struct RecognitionRate {
   std::string memory;
   std::string queries;
   Proportion known;
 };
 
-/// Localises the queries of all places in the memory of each place. Rates of the same place come
-/// first.
-[[nodiscard]] std::vector<RecognitionRate> recognition_rates(
+/// Localises the queries of all places in the memory of each place. Rates of a place in its own
+/// memory come first.
+[[nodiscard]] std::vector<RecognitionRate> measure_recognition_rates(
     std::span<const simulation::PlaceRecording* const> places, Executor& executor);
 
 }  // namespace panonav::lab

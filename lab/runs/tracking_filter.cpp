@@ -44,7 +44,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
         std::max(1, static_cast<int>(std::lround(particles)));
   }
   MonteCarloLocaliser filter(place.ranking(), place.model(), options, setting.assumed_odometry);
-  use_injection(filter, setting.injection, place.ranking());
+  set_injection_method(filter, setting.injection, place.ranking());
   if (setting.heading_known && !run.steps.empty()) {
     filter.start_globally(run.steps.front().truth.heading_rad);
   }

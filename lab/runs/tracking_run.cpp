@@ -16,14 +16,14 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr int memory_components = 15;    // [M04]
-constexpr std::size_t first_views = 32;  // that determine the full scale of a memory
+constexpr int memory_components = 15;         // [M04]
+constexpr std::size_t full_scale_views = 32;  // determine the full scale of a memory
 
 FourierSignature compute_default_signature(const Panorama& view) {
   return compute_signature(preprocess(view, {}), memory_components);
 }
 
-// Combines two seeds so that different pairs give different seeds, far apart.
+// Combines two seeds into one that differs from those of neighbouring pairs.
 std::uint64_t mix_seeds(std::uint64_t a, std::uint64_t b) {
   return a * 1000003U + b;
 }
@@ -53,9 +53,10 @@ VisualMemory make_memory_of_views(std::span<const ReferencePose> poses,
           static_cast<double>(views.size()), ">= 1, as many as poses");
   const auto signatures = simulation::make_each(
       executor, views.size(), [&](std::size_t i) { return compute_default_signature(*views[i]); });
-  // Same as the command: the first views, without component 0, which is the brightness.
+  // The command line program uses the same full scale: of the first views, without component 0,
+  // which is the mean brightness.
   float full_scale = 0.0F;
-  for (std::size_t i = 0; i < std::min(first_views, signatures.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(full_scale_views, signatures.size()); ++i) {
     const auto rows = static_cast<std::size_t>(signatures[i].rows());
     const auto structure = signatures[i].magnitudes().subspan(rows);
     full_scale = std::max(full_scale, *std::ranges::max_element(structure));
@@ -131,9 +132,9 @@ std::optional<TrackingRun> make_kidnapped_run(const TrackingRun& before, const T
                                               std::size_t images, double distance_m,
                                               std::size_t min_images) {
   if (before.steps.size() < images || images == 0) return std::nullopt;
-  const Point2 left = before.steps[images - 1].truth.position();
+  const Point2 last_position = before.steps[images - 1].truth.position();
   const auto found = std::ranges::find_if(after.steps, [&](const TrackingStep& step) {
-    return distance(step.truth.position(), left) >= distance_m;
+    return distance(step.truth.position(), last_position) >= distance_m;
   });
   if (after.steps.end() - found < static_cast<std::ptrdiff_t>(min_images)) return std::nullopt;
   TrackingRun run;

@@ -20,11 +20,11 @@
 
 namespace panonav::lab {
 
-/// A memory of posed views with its localisers, shared by any number of runs. Neither copied nor
-/// moved: its parts refer to the memory.
+/// A memory of posed views with its localisers, shared by any number of runs. Not copyable, because
+/// the localisers refer to the memory.
 class TrackingPlace {
  public:
-  /// Learns the models of the memory. `spacing_m`: of the grid of references, > 0. Throws
+  /// Learns the models of the memory. `spacing_m` is the spacing of the reference grid, > 0. Throws
   /// ContractError as `learn_observation_model`.
   TrackingPlace(VisualMemory memory, double spacing_m);
   TrackingPlace(const TrackingPlace&) = delete;
@@ -48,24 +48,26 @@ class TrackingPlace {
   Localiser localiser_;
 };
 
-/// Makes a memory of views by the command's defaults. Throws ContractError on different numbers of
-/// poses and views, or no view.
+/// Makes a memory of views with the defaults of the command line program. Throws ContractError if
+/// there are no views, or not as many as poses.
 [[nodiscard]] VisualMemory make_memory_of_views(std::span<const ReferencePose> poses,
                                                 std::span<const Panorama* const> views,
                                                 Executor& executor);
-/// Makes a memory of the references of a recorded place; `kept` selects some; empty: all.
+/// Makes a memory of the references of a recorded place whose positions fulfil `kept`; of all if
+/// `kept` is empty.
 [[nodiscard]] VisualMemory make_memory_of_references(
     const simulation::PlaceRecording& place, Executor& executor,
     const std::function<bool(Point2)>& kept = nullptr);
 
-/// Extracts the local features of the references in this memory.
+/// Extracts the local features of all references in `memory`.
 [[nodiscard]] FeatureSource extract_reference_features(const simulation::PlaceRecording& place,
                                                        const VisualMemory& memory,
                                                        Executor& executor);
-/// Returns the features of a query for `Localiser::localise`. The view must outlive them.
+/// Returns a function that extracts the features of a query for `Localiser::localise`. The view
+/// must outlive the function.
 [[nodiscard]] QueryFeatures make_query_features(const Panorama& view);
 
-/// Makes the place of views. `spacing_m` as TrackingPlace.
+/// Makes a tracking place from posed views. `spacing_m` as for the constructor of TrackingPlace.
 [[nodiscard]] std::shared_ptr<const TrackingPlace> make_tracking_place(
     std::span<const ReferencePose> poses, std::span<const Panorama* const> views, double spacing_m,
     Executor& executor);
@@ -74,31 +76,32 @@ class TrackingPlace {
     const simulation::PlaceRecording& place, Executor& executor,
     const std::function<bool(Point2)>& kept = nullptr);
 
-/// Computes the signature of a panorama for this memory by the command's defaults.
+/// Computes the packed signature of a panorama for `memory`, with the defaults of the command line
+/// program.
 [[nodiscard]] PackedSignature compute_packed_signature(const Panorama& panorama,
                                                        const VisualMemory& memory);
 
-/// One step of a run.
+/// One step of a run: true pose, motion and view.
 struct TrackingStep {
   Pose2 truth;  ///< world_from_robot after the step
-  /// True robot_old_from_robot_new; empty at the start, and where the robot was kidnapped to
-  /// `truth` without noticing.
+  /// True motion robot_old_from_robot_new; nullopt at the start, and where the robot was carried to
+  /// `truth` without its knowledge (kidnapped).
   std::optional<Pose2> moved;
-  std::optional<PackedSignature> view;  ///< empty: no picture was taken
+  std::optional<PackedSignature> view;  ///< nullopt if no picture was taken
 };
 
-/// True poses and views of a run. Odometry is simulated when a filter runs.
+/// True poses and views of a run. Odometry is simulated only when a filter tracks the run.
 struct TrackingRun {
   std::vector<TrackingStep> steps;
 };
 
-/// Makes a run through `poses` with one view at each.
+/// Makes a run through `poses` with one view per pose.
 [[nodiscard]] TrackingRun make_tracking_run(std::span<const Pose2> poses,
                                             std::vector<PackedSignature> views);
 
-/// Joins the first `images` steps of `before` with those of `after` from the first step of `after`
-/// that is at least `distance_m` away, and continues there. Nullopt if no such step leaves
-/// `min_images`.
+/// Appends to the first `images` steps of `before` the steps of `after`, beginning with its first
+/// one at least `distance_m` away; the robot is kidnapped between the two. Returns nullopt if fewer
+/// than `min_images` steps of `after` remain.
 [[nodiscard]] std::optional<TrackingRun> make_kidnapped_run(const TrackingRun& before,
                                                             const TrackingRun& after,
                                                             std::size_t images, double distance_m,
@@ -107,41 +110,41 @@ struct TrackingRun {
 /// Returns the run without the images of steps first .. first + count - 1.
 [[nodiscard]] TrackingRun drop_images(TrackingRun run, std::size_t first, std::size_t count);
 
-/// Differences of runs from memorising.
+/// Changes of light, objects and sensor between memorising and a run.
 struct RunCondition {
   std::string id;
   std::string name;
-  double light_change = 0.0;   ///< light is uniform in 1 +- this, drawn for each variant
-  double moved_objects = 0.0;  ///< share of them
+  double light_change = 0.0;   ///< half width of the uniform light factor around 1
+  double moved_objects = 0.0;  ///< fraction of the objects that are moved
   simulation::SensorOptions sensor;
 };
 
-/// Returns the condition of memorising.
+/// Returns the condition without any change.
 [[nodiscard]] RunCondition clean_condition();
-/// Returns light of 0.7 .. 1.3, a tenth of the objects moved, and sensor noise at which 60 to 80 %
-/// of single images are localised correctly.
+/// Returns a condition with light of 0.7 .. 1.3, a tenth of the objects moved, and sensor noise at
+/// which 60 to 80 % of single images are localised correctly.
 [[nodiscard]] RunCondition hard_condition();
 
 struct WalkOptions {
-  int variants = 3;               ///< of the scene: other light, other objects moved; >= 1
+  int variants = 3;               ///< of the scene: light, moved objects; >= 1
   int runs_each = 4;              ///< in each variant, >= 1
-  int images = 25;                ///< of a run, >= 1; fewer where the robot is boxed in
-  double step_m = 0.25;           ///< between images, > 0
-  bool constant_heading = false;  ///< heading 0 throughout, as a holonomic robot can
+  int images = 25;                ///< per run, >= 1; fewer if the robot cannot move on
+  double step_m = 0.25;           ///< distance between images, > 0
+  bool constant_heading = false;  ///< heading 0 in all poses (holonomic robot)
   std::uint64_t seed = 1;
 };
 
-/// Records random walks through the place under a condition, variant by variant; variant v of
-/// condition and seed is the same whatever the number of runs. `place.scene.name` and `place.seed`
-/// name the scene, which must be a built-in one where the condition changes it. Cost: one renderer
-/// for each variant of a scene that changes, and one view for each image.
+/// Records random walks through the place under a condition, variant by variant. Variant v depends
+/// on the condition and the seed, not on the number of runs. `place.scene.name` and `place.seed`
+/// identify the scene, which must be a built-in one if the condition changes it. Cost: one renderer
+/// per variant of a changed scene, and one rendered view per image.
 [[nodiscard]] std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
                                                     const TrackingPlace& remembered,
                                                     const RunCondition& condition,
                                                     const WalkOptions& options, Executor& executor);
 
-/// Records views along poses, all through one renderer (of the place's own or a changed scene);
-/// view i of pose list r has the noise seed `seed` + 1000 r + i.
+/// Records runs with one view per pose, all rendered by `renderer` (of the place's scene or of a
+/// changed one). View i of pose list r uses the noise seed `seed` + 1000 r + i.
 [[nodiscard]] std::vector<TrackingRun> record_runs(const std::vector<std::vector<Pose2>>& poses,
                                                    const simulation::PlaceRecording& place,
                                                    const simulation::Renderer& renderer,
@@ -149,12 +152,13 @@ struct WalkOptions {
                                                    const simulation::SensorOptions& sensor,
                                                    std::uint64_t seed, Executor& executor);
 
-/// Localisation of single images of runs.
+/// Counts of the localisation of single images, without filter.
 struct SingleImages {
   std::size_t images = 0;
   std::size_t right = 0;  ///< the best match is the reference nearest to the truth
   std::size_t near = 0;   ///< the best match is within one spacing of the truth
-  /// The reference of smallest dissimilarity is nearest to the truth: the paper's method.
+  /// The reference of smallest dissimilarity is nearest to the truth; this ranking is the paper's
+  /// method.
   std::size_t right_by_dissimilarity = 0;
   void add(const SingleImages& other);
 };

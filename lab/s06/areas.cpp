@@ -1,4 +1,4 @@
-// Catchment areas of all rules, over variants of the arena.
+// Catchment areas of all homing rules, over variants of the arena.
 
 #include <algorithm>
 #include <chrono>
@@ -16,13 +16,13 @@ namespace {
 
 const std::string coarse_to_fine = "K = 2, 4, 10";
 const std::string reversed = "K = 10, 4, 2";
-const std::string own_vector = "our home vector alone";
+const std::string own_vector_label = "our home vector alone";
 
-constexpr std::array<int, 5> single_highest{1, 2, 3, 5, 10};
+constexpr std::array<int, 5> compared_frequencies{1, 2, 3, 5, 10};
 
-double best_single(const CatchmentAreas& areas, std::size_t accepted) {
+double best_single_area(const CatchmentAreas& areas, std::size_t accepted) {
   double best = 0.0;
-  for (const int highest : single_highest) {
+  for (const int highest : compared_frequencies) {
     best = std::max(best, areas.at(published_strategy({highest}).label)[accepted]);
   }
   return best;
@@ -34,7 +34,8 @@ CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys) {
   std::vector<HomingStrategy> strategies{
       expected_image_strategy(), own_strategy(), published_strategy({2, 4, 10}),
       published_strategy({10, 4, 2}), published_strategy({1, 2, 3, 4, 6, 10})};
-  for (const int highest : single_highest) strategies.push_back(published_strategy({highest}));
+  for (const int highest : compared_frequencies)
+    strategies.push_back(published_strategy({highest}));
   CatchmentAreas areas;
   for (const auto& strategy : strategies) {
     const auto values = surveys.compute_areas(strategy, s06_accepted_m);
@@ -43,7 +44,7 @@ CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys) {
   const HomingSurvey* const alone = &surveys.survey_own(10);
   const auto values = mean_catchment_areas(surveys.compute_final_distances(std::span(&alone, 1)),
                                            alone->goals.size(), s06_accepted_m);
-  std::ranges::copy(values, areas[own_vector].begin());
+  std::ranges::copy(values, areas[own_vector_label].begin());
   return areas;
 }
 
@@ -80,13 +81,14 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Exper
     add(
         "single_against_expected_images",
         "mean catchment area of the best single K less that of expected images", "%",
-        [&](const auto& a) { return 100.0 * (best_single(a, i) / a.at(images)[i] - 1.0); },
+        [&](const auto& a) { return 100.0 * (best_single_area(a, i) / a.at(images)[i] - 1.0); },
         std::nullopt,
         s06_accepted_m[i] == 0.1 ? std::optional(std::pair(-20.0, -20.0)) : std::nullopt);
     add(
         "coarse_to_fine_against_single",
         "mean catchment area, " + coarse_to_fine + " over the best single K", "",
-        [&](const auto& a) { return a.at(coarse_to_fine)[i] / best_single(a, i); }, at_least(1.0));
+        [&](const auto& a) { return a.at(coarse_to_fine)[i] / best_single_area(a, i); },
+        at_least(1.0));
     ratio("coarse_to_fine_against_reverse",
           "mean catchment area, " + coarse_to_fine + " over " + reversed, coarse_to_fine, reversed);
     ratio("own_against_expected_images", "mean catchment area, our rule over expected images", own,
@@ -101,7 +103,7 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Exper
     add(
         "own_vector_against_expected_images",
         "mean catchment area, our home vector alone (K = 10) over expected images", "",
-        [&](const auto& a) { return a.at(own_vector)[i] / a.at(images)[i]; }, std::nullopt);
+        [&](const auto& a) { return a.at(own_vector_label)[i] / a.at(images)[i]; }, std::nullopt);
   }
 }
 
@@ -125,8 +127,8 @@ void report_variant(const std::string& id, const std::string& what, const Catchm
 void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
   const std::size_t places = surveys.arena().currents.views.size();
   constexpr float accepted_m = 0.1F + 1e-6F;
-  // Returns for each goal and place whether the place is in the goal's catchment area.
-  const auto inside = [&](const HomingStrategy& strategy) {
+  // Returns per goal and place whether the place is in the goal's catchment area.
+  const auto find_catchments = [&](const HomingStrategy& strategy) {
     const auto distances = surveys.compute_final_distances(strategy);
     std::vector<std::vector<bool>> areas(distances.size() / places, std::vector<bool>(places));
     for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -137,12 +139,12 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
   const auto size = [](const std::vector<bool>& area) {
     return static_cast<double>(std::ranges::count(area, true));
   };
-  const auto together = [](std::vector<bool> a, const std::vector<bool>& b) {
+  const auto unite = [](std::vector<bool> a, const std::vector<bool>& b) {
     for (std::size_t i = 0; i < a.size(); ++i) a[i] = a[i] || b[i];
     return a;
   };
-  const auto images = inside(expected_image_strategy());
-  const auto snapshots = inside(published_strategy({3}));
+  const auto images = find_catchments(expected_image_strategy());
+  const auto snapshots = find_catchments(published_strategy({3}));
 
   double mean_image = 0.0;
   double best_image = 0.0;
@@ -156,14 +158,14 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
   for (int i = 0; i < trials; ++i) {
     std::vector<bool> all(places);
     for (int j = 0; j < 3; ++j)
-      all = together(std::move(all), snapshots[random.index(snapshots.size())]);
+      all = unite(std::move(all), snapshots[random.index(snapshots.size())]);
     mean_three += size(all) / trials;
   }
   std::vector<bool> chosen(places);
   for (int j = 0; j < 3; ++j) {
     std::vector<bool> best = chosen;
     for (const auto& area : snapshots) {
-      auto candidate = together(chosen, area);
+      auto candidate = unite(chosen, area);
       if (size(candidate) > size(best)) best = std::move(candidate);
     }
     chosen = std::move(best);
@@ -179,8 +181,9 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
 
 void measure_homing_times(const Arena& arena, Reproduction& result) {
   using Clock = std::chrono::steady_clock;
-  // The shortest of many short measurements: what else the machine does makes them longer.
-  const auto microseconds = [](int repeats, int calls, auto&& work) {
+  // Take the shortest of many measurements, because other load of the machine only makes them
+  // longer.
+  const auto measure_microseconds = [](int repeats, int calls, auto&& work) {
     double best = std::numeric_limits<double>::infinity();
     for (int i = 0; i < repeats; ++i) {
       const auto begin = Clock::now();
@@ -193,22 +196,22 @@ void measure_homing_times(const Arena& arena, Reproduction& result) {
   const auto& homes = arena.homes;
   const auto& currents = arena.currents;
   const std::size_t count = currents.views.size();
-  double sum = 0.0;  // of what is computed, so that nothing is left out
+  double sum = 0.0;  // uses all results, so the compiler keeps the calls
   const FourierHomingOptions published = published_homing_options(5);
-  const double vector_us = microseconds(200, 200, [&](std::size_t i) {
+  const double vector_us = measure_microseconds(200, 200, [&](std::size_t i) {
     sum += home_vector_unchecked(homes.views[i % count].view, currents.views[7 * i % count].view,
                                  published)
                .xi;
   });
   const FourierHomingOptions own{.highest = 5};
-  const double own_us = microseconds(200, 200, [&](std::size_t i) {
+  const double own_us = measure_microseconds(200, 200, [&](std::size_t i) {
     sum +=
         home_vector_unchecked(homes.views[i % count].view, currents.views[7 * i % count].view, own)
             .xi;
   });
-  // The values of a row do not change the time: 72 pixels, each five times.
+  // Repeat each of the 72 pixels five times; the values do not influence the run time.
   constexpr int columns = 360;
-  const auto widened = [](const std::vector<float>& row) {
+  const auto widen = [](const std::vector<float>& row) {
     std::vector<float> wide;
     for (int c = 0; c < columns; ++c) {
       wide.push_back(row[static_cast<std::size_t>(c) * row.size() / columns]);
@@ -216,10 +219,10 @@ void measure_homing_times(const Arena& arena, Reproduction& result) {
     return wide;
   };
   const ExpectedImageHoming images(columns);
-  const auto home = widened(homes.rows[0]);
-  const auto current = widened(currents.rows[count / 2]);
-  const double images_us =
-      microseconds(20, 3, [&](std::size_t) { sum += images.home_vector(home, current).xi; });
+  const auto home = widen(homes.rows[0]);
+  const auto current = widen(currents.rows[count / 2]);
+  const double images_us = measure_microseconds(
+      20, 3, [&](std::size_t) { sum += images.home_vector(home, current).xi; });
   const bool used = std::isfinite(sum);
   const auto add = [&](const std::string& id, const std::string& what, double value,
                        const std::string& unit, std::optional<Target> target,

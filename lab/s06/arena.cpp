@@ -19,9 +19,9 @@ constexpr int camera_columns = 360;
 constexpr int camera_rows = 10;
 constexpr double half_band_rad = 5.0 * std::numbers::pi / 180.0;
 
-ArenaRecording record(const simulation::Renderer& renderer, const simulation::Scene& scene,
-                      std::span<const simulation::GridPosition> grid, const ArenaOptions& options,
-                      std::uint64_t stream, Executor& executor) {
+ArenaRecording record_views(const simulation::Renderer& renderer, const simulation::Scene& scene,
+                            std::span<const simulation::GridPosition> grid,
+                            const ArenaOptions& options, std::uint64_t stream, Executor& executor) {
   std::vector<std::optional<ArenaView>> views(grid.size());
   std::vector<std::vector<float>> rows(grid.size());
   executor.for_chunks(grid.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
@@ -74,7 +74,8 @@ std::vector<float> render_arena_row(const simulation::Renderer& renderer,
   for (int c = 0; c < s06_columns; ++c) {
     float sum = 0.0F;
     for (int y = 0; y < camera_rows; ++y) {
-      // Pixel c of both is centred on azimuth 2 pi c over its number of columns.
+      // Pixel c of both images is centred on azimuth 2 pi c / columns, so the edge pixels of the
+      // sum belong to two.
       for (int i = -ratio / 2; i <= ratio / 2; ++i) {
         sum += view.at(y, (ratio * c + i + camera_columns) % camera_columns);
       }
@@ -99,16 +100,16 @@ Arena record_arena(const ArenaOptions& options, Executor& executor) {
     }
   }
   require(!grid.empty(), "free places", 0.0, ">= 1");
-  arena.homes = record(*arena.renderer, arena.scene, grid, options, 0, executor);
+  arena.homes = record_views(*arena.renderer, arena.scene, grid, options, 0, executor);
   const simulation::Scene later =
       simulation::make_scene("arena", {.seed = options.seed, .light = options.light});
   const simulation::Renderer second(later, {}, executor);
-  arena.currents = record(second, later, grid, options, 1, executor);
+  arena.currents = record_views(second, later, grid, options, 1, executor);
   return arena;
 }
 
 HomingSurveyOptions survey_options(const Arena& arena) {
-  // The values of [S06] at 2.5 cm.
+  // Equal to the values of [S06] at a spacing of 2.5 cm.
   return {.typical_distance_m = 0.5,
           .max_step_m = 2.0 * arena.options.spacing_m,
           .obstacle_m = 0.8 * arena.options.spacing_m};

@@ -1,4 +1,4 @@
-// Routes driven again along chains of snapshots.
+// Routes repeated along chains of snapshots.
 
 #include "lab/s06/chains.hpp"
 
@@ -18,9 +18,9 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr double route_m = 30.0;
+constexpr double route_length_m = 30.0;
 constexpr double pose_spacing_m = 0.1;
-constexpr double completed_m = 0.2;
+constexpr double completion_radius_m = 0.2;
 constexpr int max_steps = 1000;
 
 }  // namespace
@@ -41,13 +41,13 @@ std::vector<std::vector<Pose2>> plan_random_routes(const simulation::FreeSpace& 
   for (int number = 0; number < count; ++number) {
     Random random(seed, static_cast<std::uint64_t>(number));
     std::vector<Pose2> corners{space.random_pose(random)};
-    double way_m = 0.0;
-    while (way_m < length_m) {
+    double path_m = 0.0;
+    while (path_m < length_m) {
       const auto leg =
           space.shortest_path(corners.back().position(), space.random_pose(random).position());
       if (!leg) continue;
       for (const Point2& place : std::span(*leg).subspan(1)) {
-        way_m += distance(corners.back().position(), place);
+        path_m += distance(corners.back().position(), place);
         corners.push_back({place.x_m, place.y_m, 0.0});
       }
     }
@@ -100,10 +100,10 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
     const auto direction_rad = robot.find_free_direction(decision.turn_rad, decision.advance_m);
     if (!direction_rad) break;
     const Pose2 true_before = robot.pose();
-    const Pose2 shown_before = wheels.pose();
+    const Pose2 odometry_before = wheels.pose();
     robot.go(*direction_rad, decision.advance_m);
     wheels.advance(inverse(true_before) * robot.pose());
-    moved = inverse(shown_before) * wheels.pose();
+    moved = inverse(odometry_before) * wheels.pose();
   }
   run.end_distance_m = distance(robot.pose().position(), end.position());
   return run;
@@ -113,25 +113,27 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
                                std::uint64_t seed, int routes, Executor& executor,
                                Reproduction& reproduction) {
   require(routes >= 1, "routes", routes, ">= 1");
-  const auto ways = plan_random_routes(*place.free_space, routes, route_m, pose_spacing_m, seed);
+  const auto random_routes =
+      plan_random_routes(*place.free_space, routes, route_length_m, pose_spacing_m, seed);
   constexpr std::size_t directions = 2;
-  std::vector<SnapshotChain> chains(ways.size());
-  std::vector<ChainRun> runs(ways.size() * directions);
-  executor.for_chunks(ways.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      chains[i] = record_chain(place, ways[i], seed + i);
-      for (const auto direction : {ChainDirection::forward, ChainDirection::back}) {
-        runs[directions * i + static_cast<std::size_t>(direction)] =
-            follow_chain(place, chains[i], ways[i], direction, seed + i);
-      }
-    }
-  });
+  std::vector<SnapshotChain> chains(random_routes.size());
+  std::vector<ChainRun> runs(random_routes.size() * directions);
+  executor.for_chunks(
+      random_routes.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          chains[i] = record_chain(place, random_routes[i], seed + i);
+          for (const auto direction : {ChainDirection::forward, ChainDirection::back}) {
+            runs[directions * i + static_cast<std::size_t>(direction)] =
+                follow_chain(place, chains[i], random_routes[i], direction, seed + i);
+          }
+        }
+      });
 
   std::size_t completed = 0;
   std::vector<double> mean_m;
   std::vector<double> worst_m;
   for (const ChainRun& run : runs) {
-    completed += run.has_completed(completed_m) ? 1 : 0;
+    completed += run.has_completed(completion_radius_m) ? 1 : 0;
     double sum_m = 0.0;
     for (const double lateral_m : run.lateral_m) sum_m += lateral_m;
     mean_m.push_back(sum_m / static_cast<double>(run.lateral_m.size()));

@@ -1,4 +1,4 @@
-// [S06] figures 9, 14, 15, 16: everything around one goal.
+// [S06] figures 9, 14, 15 and 16: maps around one goal.
 
 #include <algorithm>
 #include <array>
@@ -14,12 +14,12 @@ namespace {
 
 const std::vector<double> difference_limits{0.05, 0.1, 0.2, 0.4, 0.8};
 const std::vector<double> distance_limits{0.0126, 0.0501, 0.1001, 0.2001, 0.4001};
-constexpr double reached_m = 0.1 + 1e-6;
+constexpr double catchment_radius_m = 0.1 + 1e-6;
 
-// A goal and the data that its figures need.
-class GoalPictures {
+// One goal and the data for its figures.
+class GoalFigures {
  public:
-  GoalPictures(ArenaSurveys& surveys, std::size_t goal)
+  GoalFigures(ArenaSurveys& surveys, std::size_t goal)
       : surveys_(surveys), arena_(surveys.arena()), goal_(goal) {}
 
   [[nodiscard]] const HomingView& home() const {
@@ -56,9 +56,9 @@ class GoalPictures {
   std::size_t goal_;
 };
 
-// Returns one layer of cells for each range between limits, the highest values darkest.
-std::vector<viewer::MapLayer> GoalPictures::shade_cells(const std::vector<double>& values,
-                                                        const std::vector<double>& limits) const {
+// Returns map layers of cells, one per range between limits; the highest values are darkest.
+std::vector<viewer::MapLayer> GoalFigures::shade_cells(const std::vector<double>& values,
+                                                       const std::vector<double>& limits) const {
   constexpr std::array greys{viewer::PlotColour::yellow,     viewer::PlotColour::pale_grey,
                              viewer::PlotColour::light_grey, viewer::PlotColour::grey,
                              viewer::PlotColour::dark_grey,  viewer::PlotColour::black};
@@ -79,8 +79,8 @@ std::vector<viewer::MapLayer> GoalPictures::shade_cells(const std::vector<double
   return layers;
 }
 
-// Draws a stroke from each place towards home, a dot where it begins.
-viewer::MapLayer GoalPictures::draw_home_vectors(const FourierHomingOptions& homing) const {
+// Draws a dot at each place and a stroke in the direction of its home vector.
+viewer::MapLayer GoalFigures::draw_home_vectors(const FourierHomingOptions& homing) const {
   viewer::MapLayer layer{.colour = viewer::PlotColour::blue};
   for (const auto& placed : arena_.currents.views) {
     const HomeVector vector = home_vector(home(), placed.view, homing);
@@ -95,21 +95,21 @@ viewer::MapLayer GoalPictures::draw_home_vectors(const FourierHomingOptions& hom
   return layer;
 }
 
-// Outlines the edges between cells from which runs end within 10 cm of the goal and all others.
-viewer::MapLayer GoalPictures::outline_catchment(const std::vector<double>& ends_m) const {
+// Draws the outline of the cells from which runs end within 10 cm of the goal.
+viewer::MapLayer GoalFigures::outline_catchment(const std::vector<double>& ends_m) const {
   viewer::MapLayer layer{.colour = viewer::PlotColour::vermilion};
   const double spacing_m = arena_.options.spacing_m;
   const auto is_inside = [&](double x_m, double y_m) {
     for (std::size_t p = 0; p < ends_m.size(); ++p) {
       const Point2 at = arena_.currents.views[p].pose.position();
       if (std::abs(at.x_m - x_m) < 0.5 * spacing_m && std::abs(at.y_m - y_m) < 0.5 * spacing_m) {
-        return ends_m[p] <= reached_m;
+        return ends_m[p] <= catchment_radius_m;
       }
     }
     return false;
   };
   for (std::size_t p = 0; p < ends_m.size(); ++p) {
-    if (!(ends_m[p] <= reached_m)) continue;
+    if (!(ends_m[p] <= catchment_radius_m)) continue;
     const Point2 at = arena_.currents.views[p].pose.position();
     constexpr std::array<std::array<int, 2>, 4> sides{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
     for (const auto& [dx, dy] : sides) {
@@ -123,11 +123,11 @@ viewer::MapLayer GoalPictures::outline_catchment(const std::vector<double>& ends
   return layer;
 }
 
-viewer::MapLayer GoalPictures::mark_goal() const {
+viewer::MapLayer GoalFigures::mark_goal() const {
   return {.label = "goal", .colour = viewer::PlotColour::purple, .squares = {position()}};
 }
 
-viewer::MapLayer GoalPictures::mark_most_similar(const std::vector<double>& differences) const {
+viewer::MapLayer GoalFigures::mark_most_similar(const std::vector<double>& differences) const {
   const auto best = std::ranges::min_element(differences) - differences.begin();
   return {.label = "most similar",
           .colour = viewer::PlotColour::green,
@@ -141,15 +141,15 @@ viewer::MapPlot make_map(const std::string& title, std::vector<viewer::MapLayer>
   return {title, std::move(layers)};
 }
 
-// Differences along the line of places with the goal's y, or x.
+// Returns the differences along the line through the goal parallel to x or y.
 viewer::Series make_transect(const Arena& arena, Point2 goal,
                              const std::vector<double>& differences, bool along_x,
                              const std::string& label) {
   std::vector<std::pair<double, double>> points;
   for (std::size_t p = 0; p < differences.size(); ++p) {
     const Point2 at = arena.currents.views[p].pose.position();
-    const double aside = along_x ? at.y_m - goal.y_m : at.x_m - goal.x_m;
-    if (std::abs(aside) > 0.1 * arena.options.spacing_m) continue;
+    const double lateral_m = along_x ? at.y_m - goal.y_m : at.x_m - goal.x_m;
+    if (std::abs(lateral_m) > 0.1 * arena.options.spacing_m) continue;
     points.emplace_back(along_x ? at.x_m - goal.x_m : at.y_m - goal.y_m, differences[p]);
   }
   std::ranges::sort(points);
@@ -160,7 +160,7 @@ viewer::Series make_transect(const Arena& arena, Point2 goal,
   return series;
 }
 
-// Returns the goal nearest to the crossing of the streets left of the middle.
+// Returns the index of the goal nearest to the street crossing left of the middle.
 std::size_t choose_goal(const HomingSurvey& survey) {
   const Point2 crossing{0.5, 0.6};
   return static_cast<std::size_t>(
@@ -170,34 +170,35 @@ std::size_t choose_goal(const HomingSurvey& survey) {
       survey.goals.begin());
 }
 
-// Figure 9.
-void draw_vectors(GoalPictures& of, Reproduction& result) {
-  const auto differences = of.differences(5);
-  const auto ends = of.compute_final_distances(published_strategy({5}));
+// Draws figure 9.
+void draw_vectors(GoalFigures& figures, Reproduction& result) {
+  const auto differences = figures.differences(5);
+  const auto ends = figures.compute_final_distances(published_strategy({5}));
   add_plot(result, "figure_09_vectors.svg",
            "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
            "similar "
            "the views. Other valleys lead astray.",
            make_map("Home vectors, K = 5; orange: catchment area at 10 cm",
-                    of.shade_cells(differences, difference_limits),
-                    of.draw_home_vectors(published_homing_options(5, s06_iterations)),
-                    of.outline_catchment(ends), of.mark_goal(), of.mark_most_similar(differences)));
+                    figures.shade_cells(differences, difference_limits),
+                    figures.draw_home_vectors(published_homing_options(5, s06_iterations)),
+                    figures.outline_catchment(ends), figures.mark_goal(),
+                    figures.mark_most_similar(differences)));
 }
 
-// Figure 14.
-void draw_stages(GoalPictures& of, Reproduction& result) {
+// Draws figure 14.
+void draw_stages(GoalFigures& figures, Reproduction& result) {
   std::vector<viewer::MapPlot> panels;
   for (const int highest : {2, 4, 10}) {
     const std::string k = "K = " + std::to_string(highest);
-    const auto differences = of.differences(highest);
-    const auto ends = of.compute_final_distances(published_strategy({highest}));
+    const auto differences = figures.differences(highest);
+    const auto ends = figures.compute_final_distances(published_strategy({highest}));
     panels.push_back(make_map(
-        k + ": image difference, home vectors", of.shade_cells(differences, difference_limits),
-        of.draw_home_vectors(published_homing_options(highest, s06_iterations)), of.mark_goal(),
-        of.mark_most_similar(differences)));
+        k + ": image difference, home vectors", figures.shade_cells(differences, difference_limits),
+        figures.draw_home_vectors(published_homing_options(highest, s06_iterations)),
+        figures.mark_goal(), figures.mark_most_similar(differences)));
     panels.push_back(make_map(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
-                              of.shade_cells(ends, distance_limits), of.outline_catchment(ends),
-                              of.mark_goal()));
+                              figures.shade_cells(ends, distance_limits),
+                              figures.outline_catchment(ends), figures.mark_goal()));
   }
   add_plot(result, "figure_14_stages.svg",
            "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
@@ -205,14 +206,14 @@ void draw_stages(GoalPictures& of, Reproduction& result) {
            panels, 2);
 }
 
-// Figure 15.
-void draw_areas_of_rules(GoalPictures& of, Reproduction& result) {
+// Draws figure 15.
+void draw_catchments_by_rule(GoalFigures& figures, Reproduction& result) {
   std::vector<viewer::MapPlot> panels;
   for (const HomingStrategy& strategy :
        {published_strategy({2, 4, 10}), own_strategy(), expected_image_strategy()}) {
-    const auto ends = of.compute_final_distances(strategy);
-    panels.push_back(make_map(strategy.label, of.shade_cells(ends, distance_limits),
-                              of.outline_catchment(ends), of.mark_goal()));
+    const auto ends = figures.compute_final_distances(strategy);
+    panels.push_back(make_map(strategy.label, figures.shade_cells(ends, distance_limits),
+                              figures.outline_catchment(ends), figures.mark_goal()));
   }
   add_plot(
       result, "figure_15_areas.svg",
@@ -221,15 +222,15 @@ void draw_areas_of_rules(GoalPictures& of, Reproduction& result) {
       panels, 3);
 }
 
-// Figure 16, left.
-void draw_transects(const Arena& arena, const GoalPictures& of, Reproduction& result) {
+// Draws figure 16, left.
+void draw_transects(const Arena& arena, const GoalFigures& figures, Reproduction& result) {
   const auto plot = [&](const std::string& axis, bool along_x) {
     viewer::LinePlot lines{.title = "Image difference along " + axis + " through the goal",
                            .x_label = "distance from the goal [m]",
                            .y_label = "share of the energy of both views"};
     for (const int highest : {2, 4, 10}) {
-      lines.series.push_back(make_transect(arena, of.position(), of.differences(highest), along_x,
-                                           "K = " + std::to_string(highest)));
+      lines.series.push_back(make_transect(arena, figures.position(), figures.differences(highest),
+                                           along_x, "K = " + std::to_string(highest)));
     }
     return lines;
   };
@@ -240,14 +241,14 @@ void draw_transects(const Arena& arena, const GoalPictures& of, Reproduction& re
   add_plot(result, "figure_16_transect_y.svg", "The same across.", plot("y", false));
 }
 
-// Figure 16, right.
-void draw_surface(const Arena& arena, const GoalPictures& of, Reproduction& result) {
-  const auto surface = of.differences(10);
+// Draws figure 16, right.
+void draw_surface(const Arena& arena, const GoalFigures& figures, Reproduction& result) {
+  const auto surface = figures.differences(10);
   viewer::HeatMap map{.title = "Image difference to the goal (cross), K = 10",
                       .value_label = "share of the energy of both views",
                       .first_cell = {0.0, 0.0},
                       .spacing_m = arena.options.spacing_m,
-                      .crosses = {of.position()}};
+                      .crosses = {figures.position()}};
   map.columns = static_cast<int>(std::lround(arena.scene.floor_high.x_m / map.spacing_m)) + 1;
   map.rows = static_cast<int>(std::lround(arena.scene.floor_high.y_m / map.spacing_m)) + 1;
   map.values.assign(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows),
@@ -265,12 +266,12 @@ void draw_surface(const Arena& arena, const GoalPictures& of, Reproduction& resu
 }  // namespace
 
 void reproduce_goal_figures(ArenaSurveys& surveys, Reproduction& result) {
-  GoalPictures of(surveys, choose_goal(surveys.survey_published(2)));
-  draw_vectors(of, result);
-  draw_stages(of, result);
-  draw_areas_of_rules(of, result);
-  draw_transects(surveys.arena(), of, result);
-  draw_surface(surveys.arena(), of, result);
+  GoalFigures figures(surveys, choose_goal(surveys.survey_published(2)));
+  draw_vectors(figures, result);
+  draw_stages(figures, result);
+  draw_catchments_by_rule(figures, result);
+  draw_transects(surveys.arena(), figures, result);
+  draw_surface(surveys.arena(), figures, result);
 }
 
 }  // namespace panonav::lab

@@ -1,4 +1,4 @@
-// [S06] figures 10 to 13: homeward component and catchment areas.
+// [S06] figures 10 to 13: homeward component of home vectors, and catchment areas.
 
 #include <array>
 #include <cmath>
@@ -28,7 +28,7 @@ viewer::LinePlot make_homeward_plot(const std::string& title) {
           .y_range = std::pair(0.0, 1.0)};
 }
 
-// Figure 10.
+// Draws figure 10.
 void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& result) {
   const double spacing_m = surveys.arena().options.spacing_m;
   viewer::LinePlot by_highest = make_homeward_plot("One home vector, no iteration");
@@ -99,7 +99,8 @@ viewer::LinePlot make_area_plot(const std::string& title) {
           .x_range = std::pair(0.0, 0.5)};
 }
 
-// Places that are near the goal without any run.
+// Returns the mean number of places within each accepted distance of the goal, as if no run took
+// place.
 viewer::Series make_no_run_series(const HomingSurvey& survey) {
   viewer::Series series{.label = "no run", .style = viewer::SeriesStyle::lines};
   for (const double accepted : accepted_distances()) {
@@ -114,7 +115,7 @@ viewer::Series make_no_run_series(const HomingSurvey& survey) {
   return series;
 }
 
-// Figures 11 and 13.
+// Draws figures 11 and 13.
 void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
   viewer::LinePlot single = make_area_plot("Catchment area, one K, 3 solutions a vector");
   for (const int highest : {1, 2, 3, 5, 10}) {
@@ -138,7 +139,7 @@ void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
            staged);
 }
 
-// Figure 12.
+// Draws figure 12.
 void draw_iterations(ArenaSurveys& surveys, Executor& executor, Reproduction& result) {
   constexpr std::array<double, 1> accepted{0.1};
   viewer::LinePlot plot{.title = "Iterations; runs that end within 10 cm",

@@ -14,36 +14,37 @@ namespace panonav::lab {
 
 namespace {
 
-/// The arenas of a run, one after the other; what is known of them and not yet reported.
+/// Experiments over the arenas, run one after the other. Holds the first arena while it is needed,
+/// and the results of all arenas until they are compared.
 struct ArenaExperiments : Experiments {
-  std::optional<Arena> first{};
-  std::unique_ptr<ArenaSurveys> surveys{};  ///< of the first
+  std::optional<Arena> first_arena{};
+  std::unique_ptr<ArenaSurveys> first_surveys{};  ///< surveys of the first arena
   std::vector<CatchmentAreas> areas{};
 
   void record_first() {
-    first = record_arena({.seed = options.seed, .spacing_m = options.spacing_m}, executor);
-    surveys = std::make_unique<ArenaSurveys>(*first, static_cast<std::size_t>(options.goals_every),
-                                             executor);
+    first_arena = record_arena({.seed = options.seed, .spacing_m = options.spacing_m}, executor);
+    first_surveys = std::make_unique<ArenaSurveys>(
+        *first_arena, static_cast<std::size_t>(options.goals_every), executor);
     add_row(result, "s06.places", "free places of the first arena",
-            static_cast<double>(first->homes.views.size()), "places", std::nullopt,
+            static_cast<double>(first_arena->homes.views.size()), "places", std::nullopt,
             std::pair(1250.0, 1250.0));
-    measure_homing_times(*first, result);
+    measure_homing_times(*first_arena, result);
   }
 
   void finish_first() {
-    reproduce_goal_figures(*surveys, result);
-    reproduce_snapshot_bytes(*surveys, result);
-    surveys.reset();
-    first.reset();
+    reproduce_goal_figures(*first_surveys, result);
+    reproduce_snapshot_bytes(*first_surveys, result);
+    first_surveys.reset();
+    first_arena.reset();
   }
 
-  CatchmentAreas survey_further(const Arena& arena) const {
+  CatchmentAreas measure_further_arena(const Arena& arena) const {
     ArenaSurveys of_arena(arena, static_cast<std::size_t>(options.goals_every_further), executor);
     return measure_catchment_areas(of_arena);
   }
 
   void add_variant(int number) {
-    areas.push_back(survey_further(record_arena(
+    areas.push_back(measure_further_arena(record_arena(
         {.seed = options.seed + static_cast<std::uint64_t>(number), .spacing_m = options.spacing_m},
         executor)));
   }
@@ -54,7 +55,7 @@ struct ArenaExperiments : Experiments {
                                       .heading_noise_rad = radians(2.0),
                                       .spacing_m = options.spacing_m},
                                      executor);
-    const CatchmentAreas noisy = survey_further(arena);
+    const CatchmentAreas noisy = measure_further_arena(arena);
     reproduce_heading_with_pose_noise(arena, result);
     report_variant("pose_noise", "with the tracker's noise (3 mm, 2 degrees)", noisy, result);
   }
@@ -63,7 +64,8 @@ struct ArenaExperiments : Experiments {
     const Arena arena = record_arena(
         {.seed = options.seed, .heading = ArenaHeading::fixed, .spacing_m = options.spacing_m},
         executor);
-    report_variant("fixed_heading", "all views at one heading", survey_further(arena), result);
+    report_variant("fixed_heading", "all views at one heading", measure_further_arena(arena),
+                   result);
   }
 };
 
@@ -82,11 +84,11 @@ ReproductionPlan plan_s06(const Experiments& context) {
   const double further = 6.0 + 100.0 / options.goals_every_further;
   ReproductionPlan plan{
       {6.0, [=] { arenas->record_first(); }},
-      {4.0, [=] { reproduce_view_figures(*arenas->first, context); }},
-      {60.0 * all_goals, [=] { (void)arenas->surveys->survey_expected_images(); }},
+      {4.0, [=] { reproduce_view_figures(*arenas->first_arena, context); }},
+      {60.0 * all_goals, [=] { (void)arenas->first_surveys->survey_expected_images(); }},
       {40.0 * all_goals,
-       [=] { arenas->areas.push_back(measure_catchment_areas(*arenas->surveys)); }},
-      {60.0 * all_goals, [=] { reproduce_homing_figures(*arenas->surveys, context); }},
+       [=] { arenas->areas.push_back(measure_catchment_areas(*arenas->first_surveys)); }},
+      {60.0 * all_goals, [=] { reproduce_homing_figures(*arenas->first_surveys, context); }},
       {4.0, [=] { arenas->finish_first(); }}};
   for (int scene = 1; scene < options.scenes; ++scene) {
     plan.push_back({further, [=] { arenas->add_variant(scene); }});

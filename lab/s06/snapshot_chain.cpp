@@ -12,38 +12,41 @@ namespace panonav::lab {
 
 namespace {
 
-// Recorder: vectors between a candidate and the last snapshot may be off by this much.
+// Recorder: largest deviation of home vectors between a candidate and the last snapshot from
+// odometry.
 constexpr double direction_tolerance_rad = 0.6;
-// Share of the distance over which homing worked at which the next snapshot is taken, so that a
-// robot off the route or in other light still reaches it.
-constexpr double margin = 0.7;
+// Spacing of snapshots as a fraction of the distance over which homing worked, so that a robot off
+// the route or in other light still reaches the next snapshot.
+constexpr double spacing_factor = 0.7;
 constexpr double min_spacing_m = 0.3;
-// Views nearer to a snapshot are not used for its direction, which is dominated by noise there.
-constexpr double too_near_to_compare_m = 0.15;
-// Between the views that are compared; a view nearer to the one before is skipped.
+// Smaller distances to a snapshot are not compared with odometry, because noise dominates the
+// direction of the home vector there.
+constexpr double min_compared_distance_m = 0.15;
+// Smallest distance between two stored views; views in between are skipped.
 constexpr double view_spacing_m = 0.1;
 
-// Follower: it continues to the next snapshot where the vector to the present one is shorter
-// than this, in units of R.
-constexpr double switch_length = 0.1;
-// A vector that points farther from where odometry expects the snapshot is not followed.
-constexpr double mistrust_rad = 1.0;
-// Largest difference between the compass heading and odometry, at any distance: odometry drifts
-// less between two snapshots.
-constexpr double mistrust_heading_rad = 0.5;
-// Nearer than this to where odometry expects the snapshot, vectors are followed in any direction,
-// because the drift of odometry dominates there.
+// Follower: length of the home vector, in units of R, below which it continues to the next
+// snapshot.
+constexpr double max_near_vector_length = 0.1;
+// Largest accepted angle between a home vector and the direction of the snapshot by odometry.
+constexpr double max_direction_deviation_rad = 1.0;
+// Largest accepted difference between the headings by compass and by odometry, at any distance: the
+// drift of odometry between two snapshots is smaller.
+constexpr double max_heading_deviation_rad = 0.5;
+// Distance to the expected snapshot below which the direction of vectors is not checked, because
+// the drift of odometry dominates there.
 constexpr double near_m = 0.4;
-// The robot is lost after this distance without reaching a snapshot.
-constexpr double max_unseen_m = 10.0;
+// Distance without reaching a snapshot after which the robot reports lost.
+constexpr double max_unseen_distance_m = 10.0;
 
 double length(const Pose2& step) {
   return std::hypot(step.x_m, step.y_m);
 }
 
-// True if the home vector from one view to another agrees with odometry.
+// True if the home vector from one view to another points in the direction that odometry states, or
+// if they are too near to compare.
 bool agrees_with_odometry(const HomingView& from, const HomingView& to, const Pose2& from_to) {
-  if (length(from_to) < too_near_to_compare_m) return true;
+  if (length(from_to) < min_compared_distance_m) return true;
   const HomeVector vector = home_vector(to, from);
   if (vector.length() == 0.0) return false;
   const double error_rad = vector.direction_rad() - std::atan2(from_to.y_m, from_to.x_m);
@@ -69,48 +72,52 @@ double bytes_per_metre(const SnapshotChain& chain) noexcept {
 
 ChainRecorder::ChainRecorder(double max_spacing_m) : max_spacing_m_(max_spacing_m) {}
 
-// True if homing works between the last snapshot and `candidate`, the last of the views passed.
-bool ChainRecorder::is_reachable(const Passed& candidate) const {
-  const auto points_from_to = [](const Passed& from, const Passed& to) {
+// True if homing works between the last snapshot and `candidate`, the most recent stored view.
+bool ChainRecorder::can_home_between(const StoredView& candidate) const {
+  const auto agrees = [](const StoredView& from, const StoredView& to) {
     return agrees_with_odometry(from.view, to.view,
                                 inverse(from.snapshot_from_this) * to.snapshot_from_this);
   };
-  if (!points_from_to(candidate, passed_.front())) return false;
-  return std::all_of(passed_.begin(), passed_.end(), [&](const Passed& view) {
-    return &view == &candidate || points_from_to(view, candidate);
+  if (!agrees(candidate, stored_views_.front())) return false;
+  return std::all_of(stored_views_.begin(), stored_views_.end(), [&](const StoredView& view) {
+    return &view == &candidate || agrees(view, candidate);
   });
 }
 
 std::size_t ChainRecorder::add(const HomingView& view, const Pose2& moved) {
   if (chain_.empty()) {
     chain_.push_back({view, 0.0, {}});
-    passed_.push_back({view, {}, 0.0});
+    stored_views_.push_back({view, {}, 0.0});
     return 1;
   }
   snapshot_from_robot_ = snapshot_from_robot_ * moved;
   way_m_ += length(moved);
-  if (way_m_ - passed_.back().way_m < view_spacing_m) return chain_.size();
+  if (way_m_ - stored_views_.back().way_m < view_spacing_m) return chain_.size();
 
-  passed_.push_back({view, snapshot_from_robot_, way_m_});
+  stored_views_.push_back({view, snapshot_from_robot_, way_m_});
   const bool too_far = way_m_ > max_spacing_m_;
-  if (!too_far && is_reachable(passed_.back())) return chain_.size();
-  // The last view that is not too far: a share of the way that worked, and at least the shortest.
-  const double worked_m = passed_[passed_.size() - 2].way_m;
-  const double max_way_m = std::max(too_far ? worked_m : margin * worked_m, min_spacing_m);
+  if (!too_far && can_home_between(stored_views_.back())) return chain_.size();
+  // Take the farthest stored view within a fraction of the distance over which homing worked, but
+  // at least `min_spacing_m`.
+  const double reachable_m = stored_views_[stored_views_.size() - 2].way_m;
+  const double max_way_m =
+      std::max(too_far ? reachable_m : spacing_factor * reachable_m, min_spacing_m);
   std::size_t chosen = 0;
-  for (std::size_t i = 1; i < passed_.size() && passed_[i].way_m <= max_way_m; ++i) chosen = i;
+  for (std::size_t i = 1; i < stored_views_.size() && stored_views_[i].way_m <= max_way_m; ++i)
+    chosen = i;
   if (chosen == 0 && way_m_ >= min_spacing_m) chosen = 1;
   if (chosen > 0) take_snapshot(chosen);
   return chain_.size();
 }
 
 void ChainRecorder::take_snapshot(std::size_t index) {
-  const Pose2 old_from_new = passed_[index].snapshot_from_this;
-  const double way_m = passed_[index].way_m;
-  chain_.push_back({passed_[index].view, chain_.back().travelled_m + way_m, old_from_new});
-  passed_.erase(passed_.begin(), passed_.begin() + static_cast<std::ptrdiff_t>(index));
+  const Pose2 old_from_new = stored_views_[index].snapshot_from_this;
+  const double way_m = stored_views_[index].way_m;
+  chain_.push_back({stored_views_[index].view, chain_.back().travelled_m + way_m, old_from_new});
+  stored_views_.erase(stored_views_.begin(),
+                      stored_views_.begin() + static_cast<std::ptrdiff_t>(index));
   const Pose2 new_from_old = inverse(old_from_new);
-  for (Passed& view : passed_) {
+  for (StoredView& view : stored_views_) {
     view.snapshot_from_this = new_from_old * view.snapshot_from_this;
     view.way_m -= way_m;
   }
@@ -120,8 +127,8 @@ void ChainRecorder::take_snapshot(std::size_t index) {
 
 SnapshotChain ChainRecorder::finish() const {
   SnapshotChain chain = chain_;
-  if (passed_.size() > 1) {
-    const Passed& last = passed_.back();
+  if (stored_views_.size() > 1) {
+    const StoredView& last = stored_views_.back();
     chain.push_back({last.view, chain.back().travelled_m + last.way_m, last.snapshot_from_this});
   }
   return chain;
@@ -156,7 +163,7 @@ void ChainFollower::aim_at_next(const Pose2& target_from_robot) {
 bool ChainFollower::contradicts_odometry(const HomeVector& vector) const noexcept {
   if (!target_from_robot_) return false;
   const double drift_rad = wrap_angle(-vector.heading_rad - target_from_robot_->heading_rad);
-  return std::abs(drift_rad) > mistrust_heading_rad;
+  return std::abs(drift_rad) > max_heading_deviation_rad;
 }
 
 ChainDecision ChainFollower::approach_last(const HomingView& current) {
@@ -171,7 +178,7 @@ ChainDecision ChainFollower::approach_last(const HomingView& current) {
   return decision;
 }
 
-void ChainFollower::start_at_nearest_snapshot(const HomingView& current) {
+void ChainFollower::start_at_most_similar_snapshot(const HomingView& current) {
   double min_difference = 3.0;
   target_ = 0;
   for (std::size_t i = 0; i < chain_.size(); ++i) {
@@ -183,24 +190,26 @@ void ChainFollower::start_at_nearest_snapshot(const HomingView& current) {
   max_steps_to_target_ = pursuit_options_.max_steps;
 }
 
-// Trusts the views where odometry does not exclude them.
+// Returns true and chooses the next snapshot as target if the present one is reached, passed or
+// skipped. Views decide, unless odometry contradicts them.
 bool ChainFollower::aim_at_next_if_reached(const HomingView& current, const HomeVector& vector) {
   const double r_m = pursuit_options_.typical_distance_m;
   const bool contradicts = contradicts_odometry(vector);
   const bool plausible =
       !target_from_robot_ ||
       (!contradicts && length(*target_from_robot_) <= std::max(near_m, 0.5 * way_m_));
-  const bool is_near = plausible && vector.length() < switch_length;
+  const bool is_near = plausible && vector.length() < max_near_vector_length;
   const bool passed = plausible && !is_near &&
                       image_difference(chain_[next_snapshot(*target_)].view, current) <
                           image_difference(chain_[*target_].view, current);
   const bool is_there_by_odometry =
-      contradicts && length(*target_from_robot_) < r_m * switch_length;
+      contradicts && length(*target_from_robot_) < r_m * max_near_vector_length;
   const bool skipped =
       !is_near && !passed && (is_there_by_odometry || steps_to_target_ >= max_steps_to_target_);
-  if (is_near || passed) unseen_m_ = 0.0;
+  if (is_near || passed) unseen_distance_m_ = 0.0;
   if (!is_near && !passed && !skipped) return false;
-  // Heading by the compass. Position by the vector where it is short, else by odometry.
+  // Take the heading from the compass, and the position from the vector if it is short, else from
+  // odometry.
   Pose2 target_from_robot = target_from_robot_.value_or(Pose2{});
   if (is_near || !target_from_robot_) {
     target_from_robot =
@@ -218,21 +227,22 @@ std::optional<ChainDecision> ChainFollower::follow_odometry_if_needed(const Home
   const double expected_rad = std::atan2(expected.y_m, expected.x_m);
   const double off_rad = std::abs(wrap_angle(vector.direction_rad() - expected_rad));
   const bool at_last = near && is_last(*target_);
-  if (!at_last && (contradicts || vector.length() == 0.0 || (!near && off_rad > mistrust_rad))) {
+  if (!at_last &&
+      (contradicts || vector.length() == 0.0 || (!near && off_rad > max_direction_deviation_rad))) {
     return ChainDecision{ChainState::following, *target_, expected_rad,
                          std::min(pursuit_options_.max_step_m, length(expected))};
   }
-  // The compass does not drift.
+  // Replace the heading by that of the compass, which does not drift.
   if (!contradicts) target_from_robot_->heading_rad = wrap_angle(-vector.heading_rad);
   return std::nullopt;
 }
 
 ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& moved) {
   if (!target_) {
-    start_at_nearest_snapshot(current);
+    start_at_most_similar_snapshot(current);
   } else if (target_from_robot_) {
     target_from_robot_ = *target_from_robot_ * moved;
-    unseen_m_ += length(moved);
+    unseen_distance_m_ += length(moved);
   }
   if (pursuit_) return approach_last(current);
   HomeVector vector = home_vector(chain_[*target_].view, current);
@@ -240,7 +250,7 @@ ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& move
     vector = home_vector(chain_[*target_].view, current);
   }
   ++steps_to_target_;
-  if (unseen_m_ > max_unseen_m) return {ChainState::lost, *target_, 0.0, 0.0};
+  if (unseen_distance_m_ > max_unseen_distance_m) return {ChainState::lost, *target_, 0.0, 0.0};
   if (const auto decision = follow_odometry_if_needed(vector)) return *decision;
   if (is_last(*target_)) return approach_last(current);
   return {

@@ -10,64 +10,66 @@
 
 namespace panonav::lab {
 
-/// A view remembered along a route.
+/// A view memorised along a route.
 struct Snapshot {
   HomingView view;
-  /// Distance from the start of the route to here, by the odometry of the recording.
+  /// Distance from the start of the route, by the odometry of the recording.
   double travelled_m = 0.0;
-  /// Pose of the robot here in the frame of the robot at the snapshot before, by the same odometry;
-  /// the first snapshot's is zero. It only hints where the next snapshot is.
+  /// Pose of the robot at this snapshot in the frame of the robot at the previous one, by the same
+  /// odometry; identity for the first snapshot. Only an approximate hint of where the next snapshot
+  /// is.
   Pose2 previous_from_this;
   friend bool operator==(const Snapshot&, const Snapshot&) = default;
 };
 
-/// A route as a few snapshots in the order in which they were taken. Homing reaches each from its
+/// A route as a few snapshots in the order of recording. Homing reaches each snapshot from its
 /// neighbours, in both directions.
 using SnapshotChain = std::vector<Snapshot>;
 
-/// Returns the distance along the route from the first snapshot to the last; 0 for fewer than two.
+/// Returns the distance along the route from the first to the last snapshot; 0 for fewer than two
+/// snapshots.
 [[nodiscard]] double chain_length_m(const SnapshotChain& chain) noexcept;
 
-/// Returns the size of the chain over its length; 0 where it has no length. A snapshot takes two
-/// floats for each row and frequency of its view, without the mean [S06 section 4.4], and four for
-/// the odometry.
+/// Returns the size of the chain in bytes divided by its length; 0 if the length is 0. A snapshot
+/// takes two floats per row and frequency of its view, without the mean [S06 section 4.4], and four
+/// floats for odometry.
 [[nodiscard]] double bytes_per_metre(const SnapshotChain& chain) noexcept;
 
-/// Memorises a route while the robot drives it, and takes the next snapshot where homing between
-/// the two would begin to fail. A candidate is good as long as, from each view on the way to it,
-/// the home vector to the last snapshot points back along the path and the one to the candidate
-/// points forward, both within a tolerance around odometry. The spacing therefore follows the
+/// Memorises a route while the robot drives it, and takes the next snapshot before homing between
+/// it and the last one would fail. A candidate view is accepted if its home vector to the last
+/// snapshot points back along the path, and the home vectors to it from all views in between point
+/// forward, each within a tolerance of the direction by odometry. The spacing thus adapts to the
 /// catchment areas: wide in a hall, narrow in a doorway.
 ///
-/// Holds the views since the last snapshot, one each 0.1 m. A view costs two home vectors for each
-/// of these.
+/// Memory: the views since the last snapshot, one per 0.1 m. Cost per view: one home vector for
+/// each of these.
 class ChainRecorder {
  public:
-  /// Sets the largest distance of snapshots along the path.
+  /// Sets the largest distance between snapshots along the path.
   explicit ChainRecorder(double max_spacing_m = 5.0);
 
-  /// Adds a view after the motion `moved` (robot_old_from_robot_new, by its odometry; of no meaning
-  /// for the first view). Returns the number of snapshots in the chain. Throws ContractError on a
-  /// view of another shape than those before.
+  /// Adds a view after the motion `moved` (robot_old_from_robot_new, by its odometry; ignored for
+  /// the first view). Returns the number of snapshots in the chain. Throws ContractError on a view
+  /// whose shape differs from that of the previous views.
   std::size_t add(const HomingView& view, const Pose2& moved);
 
-  /// Returns the chain so far, with the last view as its end. Empty without any view.
+  /// Returns the chain recorded so far, ending with the last view; empty if there was no view.
   [[nodiscard]] SnapshotChain finish() const;
 
  private:
-  // View since the last snapshot, in the frame of the robot there.
-  struct Passed {
+  // A view since the last snapshot, with its pose in the frame of the robot at that snapshot.
+  struct StoredView {
     HomingView view;
     Pose2 snapshot_from_this;
-    double way_m = 0.0;  // since the snapshot
+    double way_m = 0.0;  // distance driven since the snapshot
   };
-  [[nodiscard]] bool is_reachable(const Passed& candidate) const;
+  [[nodiscard]] bool can_home_between(const StoredView& candidate) const;
   void take_snapshot(std::size_t index);
 
   double max_spacing_m_;
   SnapshotChain chain_;
-  std::vector<Passed> passed_;  // first: the last snapshot itself
-  // Pose and way of the last view, where it was passed over, too.
+  std::vector<StoredView> stored_views_;  // the first element is the last snapshot itself
+  // Pose and distance driven since the last snapshot, also after views that are not stored.
   Pose2 snapshot_from_robot_;
   double way_m_ = 0.0;
 };
@@ -76,26 +78,27 @@ enum class ChainDirection { forward, back };
 
 enum class ChainState {
   following,
-  finished,  ///< homing stopped at the last snapshot, and the place looks like it
-  lost,      ///< it stopped elsewhere, or reached no snapshot for too long a way
+  finished,  ///< homing stopped at the last snapshot, whose view is similar
+  lost,      ///< homing stopped elsewhere, or no snapshot was reached for too long
 };
 
 /// The next motion of the robot after a view.
 struct ChainDecision {
   ChainState state = ChainState::following;
-  std::size_t target = 0;  ///< snapshot that is homed to
-  double turn_rad = 0.0;   ///< direction in which to go, in the current robot frame
-  double advance_m = 0.0;  ///< how far; 0 unless following
+  std::size_t target = 0;  ///< snapshot to which the robot is homing
+  double turn_rad = 0.0;   ///< direction of motion in the current robot frame
+  double advance_m = 0.0;  ///< distance of motion; 0 unless following
 };
 
 /// Repeats a route: homes to one snapshot after the other, in the order of recording or back. It
-/// begins with the snapshot that is most similar to the first view. It continues to the next one
-/// where the present one is near (by the vector's length) or less similar than the next one.
+/// begins with the snapshot that is most similar to the first view. It continues to the next one if
+/// the present one is near (by the vector's length) or is less similar to the current view than the
+/// next one.
 ///
-/// Odometry since the last snapshot is the second opinion: a vector that contradicts it is not
-/// followed, a snapshot is not near while odometry expects more than half of the distance still to
-/// go, and a snapshot that is not found within three times the expected steps is skipped. The last
-/// snapshot is reached by a `HomingPursuit`.
+/// Odometry since the last snapshot checks the views: a vector that contradicts it is not followed,
+/// a snapshot is not accepted as near while odometry expects more than half of the distance to
+/// remain, and a snapshot that is not found within three times the expected steps is skipped. A
+/// `HomingPursuit` approaches the last snapshot.
 class ChainFollower {
  public:
   /// Throws OptionError, and ContractError on an empty chain.
@@ -103,14 +106,14 @@ class ChainFollower {
                 const HomingPursuitOptions& pursuit = {});
 
   /// Decides the next motion after the motion `moved` since the last view
-  /// (robot_old_from_robot_new, by its odometry; of no meaning for the first view). Throws
-  /// ContractError as `home_vector`.
+  /// (robot_old_from_robot_new, by its odometry; ignored for the first view). Throws ContractError
+  /// as `home_vector`.
   [[nodiscard]] ChainDecision decide(const HomingView& current, const Pose2& moved);
 
  private:
   [[nodiscard]] bool is_last(std::size_t target) const noexcept;
   [[nodiscard]] std::size_t next_snapshot(std::size_t target) const noexcept;
-  void start_at_nearest_snapshot(const HomingView& current);
+  void start_at_most_similar_snapshot(const HomingView& current);
   bool aim_at_next_if_reached(const HomingView& current, const HomeVector& vector);
   std::optional<ChainDecision> follow_odometry_if_needed(const HomeVector& vector);
   [[nodiscard]] bool contradicts_odometry(const HomeVector& vector) const noexcept;
@@ -120,12 +123,12 @@ class ChainFollower {
   SnapshotChain chain_;
   ChainDirection direction_;
   HomingPursuitOptions pursuit_options_;
-  std::optional<std::size_t> target_;       // empty: no view yet
-  std::optional<Pose2> target_from_robot_;  // by odometry; unknown on the way to the first
-  double way_m_ = 0.0;                      // to the target, when it became the target
+  std::optional<std::size_t> target_;       // nullopt before the first view
+  std::optional<Pose2> target_from_robot_;  // by odometry; nullopt until a snapshot is reached
+  double way_m_ = 0.0;                      // distance to the target when it was chosen
   int steps_to_target_ = 0;
   int max_steps_to_target_ = 0;
-  double unseen_m_ = 0.0;  // since the last snapshot that was reached
+  double unseen_distance_m_ = 0.0;  // distance driven since the last snapshot that was reached
   std::optional<HomingPursuit> pursuit_;
 };
 

@@ -33,7 +33,7 @@ HomingStrategy expected_image_strategy() {
 
 ArenaSurveys::ArenaSurveys(const Arena& arena, std::size_t goals_every, Executor& executor)
     : arena_(arena),
-      every_(goals_every),
+      goal_stride_(goals_every),
       executor_(executor),
       expected_image_homing_(s06_columns) {}
 
@@ -41,7 +41,7 @@ template <typename Rule>
 const HomingSurvey& ArenaSurveys::survey(const std::string& key, const Rule& rule) {
   const auto at = surveys_.find(key);
   if (at != surveys_.end()) return at->second;
-  return surveys_.emplace(key, survey_arena(arena_, rule, executor_, every_)).first->second;
+  return surveys_.emplace(key, survey_arena(arena_, rule, executor_, goal_stride_)).first->second;
 }
 
 const HomingSurvey& ArenaSurveys::survey_published(int highest, int iterations) {
@@ -59,8 +59,8 @@ const HomingSurvey& ArenaSurveys::survey_own_without_search(int highest) {
   const auto rule = [&](std::size_t goal, std::size_t place) {
     const HomingView& home = arena_.homes.views[goal].view;
     const HomingView& current = arena_.currents.views[place].view;
-    const bool alike = image_difference(home, current, own_highest) < s06_alike;
-    return home_vector_unchecked(home, current, alike ? fine : coarse);
+    const bool is_similar = image_difference(home, current, own_highest) < s06_similar_difference;
+    return home_vector_unchecked(home, current, is_similar ? fine : coarse);
   };
   return survey("own again " + std::to_string(highest), HomingRule(rule));
 }
@@ -94,9 +94,9 @@ std::vector<float> ArenaSurveys::compute_final_distances(
 
 std::vector<double> ArenaSurveys::compute_areas(const HomingStrategy& strategy,
                                                 std::span<const double> accepted_m) {
-  const auto stages_of_it = survey_stages(strategy);
-  return mean_catchment_areas(final_distances(stages_of_it, survey_options(arena_), executor_),
-                              stages_of_it[0]->goals.size(), accepted_m);
+  const auto stages = survey_stages(strategy);
+  return mean_catchment_areas(final_distances(stages, survey_options(arena_), executor_),
+                              stages[0]->goals.size(), accepted_m);
 }
 
 }  // namespace panonav::lab

@@ -1,4 +1,4 @@
-// [S06] figures 3, 6, 7, 8: what views are like and how they change with the distance.
+// [S06] figures 3, 6, 7 and 8: spectra of views, and how views change with distance.
 
 #include <algorithm>
 #include <array>
@@ -18,7 +18,7 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr int top = s06_components - 1;  // highest frequency of a view of 72 pixels
+constexpr int max_frequency = s06_components - 1;  // highest frequency of 72 pixels
 
 TurnCorrelation correlate_views(const HomingView& home, const HomingView& current, int highest) {
   TurnCorrelation correlation;
@@ -33,24 +33,25 @@ TurnCorrelation correlate_views(const HomingView& home, const HomingView& curren
 
 double energy(const HomingView& view) {
   double sum = 0.0;
-  for (int k = 1; k <= top; ++k) {
+  for (int k = 1; k <= max_frequency; ++k) {
     sum += static_cast<double>(view.a(0, k) * view.a(0, k) + view.b(0, k) * view.b(0, k));
   }
   return sum;
 }
 
-double true_turn(const Arena& arena, std::size_t goal, std::size_t place) {
+double true_turn_rad(const Arena& arena, std::size_t goal, std::size_t place) {
   return wrap_angle(arena.homes.views[goal].pose.heading_rad -
                     arena.currents.views[place].pose.heading_rad);
 }
 
-// Figure 3.
+// Draws figure 3.
 void draw_correlation(const Arena& arena, Reproduction& result) {
-  // The place where the headings differ most nearly by 120 degrees, as in the paper.
+  // Choose the place whose two headings differ by nearly 120 degrees, as in the paper.
   std::size_t shown = 0;
   double min_difference = 10.0;
   for (std::size_t i = 0; i < arena.homes.views.size(); ++i) {
-    const double off = std::abs(std::abs(true_turn(arena, i, i)) - 2.0 * std::numbers::pi / 3.0);
+    const double off =
+        std::abs(std::abs(true_turn_rad(arena, i, i)) - 2.0 * std::numbers::pi / 3.0);
     if (off < min_difference) {
       min_difference = off;
       shown = i;
@@ -59,8 +60,8 @@ void draw_correlation(const Arena& arena, Reproduction& result) {
   const HomingView& home = arena.homes.views[shown].view;
   const HomingView& current = arena.currents.views[shown].view;
   const double max_correlation = std::sqrt(energy(home) * energy(current));
-  const TurnCorrelation all = correlate_views(home, current, top);
-  const double truth = true_turn(arena, shown, shown);
+  const TurnCorrelation all = correlate_views(home, current, max_frequency);
+  const double truth = true_turn_rad(arena, shown, shown);
 
   viewer::LinePlot terms{.title = "Terms of the correlation; true turn " +
                                   std::to_string(std::lround(degrees(truth))) + " degrees",
@@ -72,7 +73,7 @@ void draw_correlation(const Arena& arena, Reproduction& result) {
     for (int step = -180; step <= 180; step += 2) {
       const double turn_rad = radians(step);
       TurnCorrelation one = all;
-      for (int other = 1; k > 0 && other <= top; ++other) {
+      for (int other = 1; k > 0 && other <= max_frequency; ++other) {
         if (other != k) one.real[other] = one.imaginary[other] = 0.0F;
       }
       series.add(step, static_cast<double>(one.at(static_cast<float>(turn_rad))) / max_correlation);
@@ -100,12 +101,12 @@ void draw_correlation(const Arena& arena, Reproduction& result) {
            maxima);
 }
 
-// Figure 6.
+// Draws figure 6.
 void draw_spectrum(const Arena& arena, Reproduction& result) {
   viewer::Series series{.style = viewer::SeriesStyle::lines_and_points};
   std::vector<double> log_k;
   std::vector<double> log_power;
-  for (int k = 1; k <= top; ++k) {
+  for (int k = 1; k <= max_frequency; ++k) {
     std::vector<double> powers;
     for (const auto* const recording : {&arena.homes, &arena.currents}) {
       for (const auto& placed : recording->views) {
@@ -119,10 +120,11 @@ void draw_spectrum(const Arena& arena, Reproduction& result) {
     for (const double power : powers) square += (power - mean_power) * (power - mean_power);
     const double deviation = std::sqrt(square / static_cast<double>(powers.size()));
     series.add(k, mean_power);
-    // A logarithmic axis has no 0 at which a bar could begin.
+    // End the bar above 0, which a logarithmic axis cannot show.
     series.y_low.push_back(std::max(mean_power - deviation, 0.1 * mean_power));
     series.y_high.push_back(mean_power + deviation);
-    // Above, pixels of 5 degrees blur the view: they keep 77 % of the power at k = 20.
+    // Fit only k <= 15: pixels of 5 degrees blur higher frequencies (77 % of the power remains at k
+    // = 20).
     if (k <= 15) {
       log_k.push_back(std::log(k));
       log_power.push_back(std::log(mean_power));
@@ -143,7 +145,7 @@ void draw_spectrum(const Arena& arena, Reproduction& result) {
   viewer::Series line{
       .label = "slope " + to_fixed_text(std::round(100.0 * slope) / 100.0, 6).substr(0, 4),
       .style = viewer::SeriesStyle::lines};
-  for (int k = 1; k <= top; ++k) {
+  for (int k = 1; k <= max_frequency; ++k) {
     line.add(k, std::exp(mean_log - slope * (std::log(k) - mean_k)));
   }
   series.label = "mean and standard deviation";
@@ -157,15 +159,15 @@ void draw_spectrum(const Arena& arena, Reproduction& result) {
                             .log_y = true});
 }
 
-// Two numbers for each of several curves.
-using Values = std::vector<std::pair<double, double>>;
+// Two values per curve, for one pair of places or summed over pairs.
+using CurveValues = std::vector<std::pair<double, double>>;
 
-// Sums of values over all pairs of places, by their distance.
+// Sums of values over all pairs of places, binned by distance.
 struct PairSums {
-  std::vector<Values> sums;   // of each bin
-  std::vector<double> pairs;  // in each bin
+  std::vector<CurveValues> sums;  // per distance bin
+  std::vector<double> pairs;      // number of pairs per distance bin
 
-  explicit PairSums(std::size_t curves) : sums(bins, Values(curves)), pairs(bins) {}
+  explicit PairSums(std::size_t curves) : sums(bins, CurveValues(curves)), pairs(bins) {}
   void add(const PairSums& other) {
     for (std::size_t i = 0; i < bins; ++i) {
       pairs[i] += other.pairs[i];
@@ -178,7 +180,8 @@ struct PairSums {
   static constexpr std::size_t bins = 62;
 };
 
-// `fill` sets the values of a pair of places. The same on any number of threads.
+// Sums the values that `fill` computes for each pair of places. The result is the same on any
+// number of threads.
 template <typename Fill>
 PairSums sum_pairs(const Arena& arena, std::size_t curves, Executor& executor, Fill fill) {
   const auto& homes = arena.homes.views;
@@ -188,17 +191,17 @@ PairSums sum_pairs(const Arena& arena, std::size_t curves, Executor& executor, F
   executor.for_chunks(
       homes.size(), chunk, [&](std::size_t begin, std::size_t end, std::size_t number) {
         PairSums& part = parts[number];
-        Values of_pair(curves);
+        CurveValues pair_values(curves);
         for (std::size_t g = begin; g < end; ++g) {
           for (std::size_t p = 0; p < currents.size(); ++p) {
             const double away_m = distance(homes[g].pose.position(), currents[p].pose.position());
             const auto bin = static_cast<std::size_t>(away_m / arena.options.spacing_m + 0.5);
             if (bin >= PairSums::bins) continue;
-            fill(g, p, of_pair);
+            fill(g, p, pair_values);
             part.pairs[bin] += 1.0;
             for (std::size_t s = 0; s < curves; ++s) {
-              part.sums[bin][s].first += of_pair[s].first;
-              part.sums[bin][s].second += of_pair[s].second;
+              part.sums[bin][s].first += pair_values[s].first;
+              part.sums[bin][s].second += pair_values[s].second;
             }
           }
         }
@@ -208,10 +211,10 @@ PairSums sum_pairs(const Arena& arena, std::size_t curves, Executor& executor, F
   return all;
 }
 
-// A curve over the distance, where there are pairs enough for a mean.
+// Makes a curve against the distance, from bins with at least 100 pairs.
 template <typename Value>
-viewer::Series curve_by_distance(const Arena& arena, const PairSums& sums, double farthest_m,
-                                 const Value& value) {
+viewer::Series make_curve_by_distance(const Arena& arena, const PairSums& sums, double farthest_m,
+                                      const Value& value) {
   viewer::Series series;
   for (std::size_t i = 0; i < PairSums::bins; ++i) {
     if (sums.pairs[i] < 100.0) continue;
@@ -222,7 +225,7 @@ viewer::Series curve_by_distance(const Arena& arena, const PairSums& sums, doubl
   return series;
 }
 
-// Rotates all views to one heading, as in the paper.
+// Rotates all views to heading 0, as in the paper.
 std::vector<HomingView> rotate_to_north(const ArenaRecording& recording) {
   std::vector<HomingView> views;
   for (const auto& placed : recording.views) {
@@ -231,15 +234,15 @@ std::vector<HomingView> rotate_to_north(const ArenaRecording& recording) {
   return views;
 }
 
-// Figure 7.
+// Draws figure 7.
 void draw_changes(const Arena& arena, Executor& executor, Reproduction& result) {
   constexpr std::array<int, 6> shown{1, 2, 3, 5, 10, 20};
   const auto homes = rotate_to_north(arena.homes);
   const auto currents = rotate_to_north(arena.currents);
   const auto sums = sum_pairs(
-      arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, Values& values) {
+      arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, CurveValues& values) {
         double all = 0.0;
-        for (int k = 1; k <= top; ++k) {
+        for (int k = 1; k <= max_frequency; ++k) {
           const double da = static_cast<double>(homes[g].a(0, k) - currents[p].a(0, k));
           const double db = static_cast<double>(homes[g].b(0, k) - currents[p].b(0, k));
           all += da * da + db * db;
@@ -263,7 +266,7 @@ void draw_changes(const Arena& arena, Executor& executor, Reproduction& result) 
                           .y_label = "mean of 2 (1 - cos(change))"};
   for (std::size_t s = 0; s <= shown.size(); ++s) {
     const auto add = [&](viewer::LinePlot& plot, double std::pair<double, double>::*value) {
-      plot.series.push_back(curve_by_distance(arena, sums, 1.0, [&](std::size_t bin) {
+      plot.series.push_back(make_curve_by_distance(arena, sums, 1.0, [&](std::size_t bin) {
         return sums.sums[bin][s].*value / sums.pairs[bin];
       }));
       plot.series.back().style = viewer::SeriesStyle::lines;
@@ -283,7 +286,8 @@ void draw_changes(const Arena& arena, Executor& executor, Reproduction& result) 
            phases);
 }
 
-// Returns for each home and current view the shift by whole pixels of highest correlation.
+// Returns for each pair of home and current view the shift by whole pixels with the highest
+// correlation.
 std::vector<std::vector<std::uint8_t>> find_best_shifts(const Arena& arena, Executor& executor) {
   const auto& currents = arena.currents.rows;
   std::vector<float> rows;
@@ -313,20 +317,20 @@ std::vector<std::vector<std::uint8_t>> find_best_shifts(const Arena& arena, Exec
   return shifts;
 }
 
-// Returns the circular standard deviation of `count` errors whose cosines and sines have these
-// sums.
-double deviation_deg(const std::pair<double, double>& sums, double count) {
+// Returns the circular standard deviation, in degrees, of `count` errors, given the sums of their
+// cosines and sines.
+double circular_deviation_deg(const std::pair<double, double>& sums, double count) {
   const double length = std::hypot(sums.first, sums.second) / count;
   return degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length))));
 }
 
-// Figure 8.
+// Draws figure 8.
 void draw_headings(const Arena& arena, Executor& executor, Reproduction& result) {
   constexpr std::array<int, 5> shown{1, 2, 3, 5, 15};
   const auto shifts = find_best_shifts(arena, executor);
   const auto sums = sum_pairs(
-      arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, Values& values) {
-        const double truth = true_turn(arena, g, p);
+      arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, CurveValues& values) {
+        const double truth = true_turn_rad(arena, g, p);
         TurnCorrelation correlation =
             correlate_views(arena.homes.views[g].view, arena.currents.views[p].view, shown.back());
         for (std::size_t s = 0; s < shown.size(); ++s) {
@@ -338,14 +342,14 @@ void draw_headings(const Arena& arena, Executor& executor, Reproduction& result)
         values[shown.size()] = {std::cos(error), std::sin(error)};
       });
   const auto deviation = [&](std::size_t curve, std::size_t bin) {
-    return deviation_deg(sums.sums[bin][curve], sums.pairs[bin]);
+    return circular_deviation_deg(sums.sums[bin][curve], sums.pairs[bin]);
   };
   viewer::LinePlot plot{.title = "Error of the heading",
                         .x_label = "distance [m]",
                         .y_label = "circular standard deviation [degrees]"};
   for (std::size_t s = 0; s <= shown.size(); ++s) {
-    plot.series.push_back(
-        curve_by_distance(arena, sums, 0.6, [&](std::size_t bin) { return deviation(s, bin); }));
+    plot.series.push_back(make_curve_by_distance(
+        arena, sums, 0.6, [&](std::size_t bin) { return deviation(s, bin); }));
     plot.series.back().label =
         s < shown.size() ? "K = " + std::to_string(shown[s]) : "all shifts by whole pixels";
     if (s == shown.size()) plot.series.back().style = viewer::SeriesStyle::lines;
@@ -377,15 +381,15 @@ void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result)
   for (std::size_t i = 0; i < places; ++i) {
     const double turned = static_cast<double>(sequential_heading(
         correlate_views(arena.homes.views[i].view, arena.currents.views[i].view, 15)));
-    const double error = turned - true_turn(arena, i, i);
+    const double error = turned - true_turn_rad(arena, i, i);
     cosines += std::cos(error);
     sines += std::sin(error);
   }
   add_row(result, "s06.heading.at_goal_pose_noise",
           "error of the heading at no distance with the tracker's noise (3 mm, 2 degrees in each "
           "recording)",
-          deviation_deg({cosines, sines}, static_cast<double>(places)), "deg", std::nullopt,
-          std::pair(1.5, 1.5));
+          circular_deviation_deg({cosines, sines}, static_cast<double>(places)), "deg",
+          std::nullopt, std::pair(1.5, 1.5));
 }
 
 }  // namespace panonav::lab

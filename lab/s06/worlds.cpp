@@ -1,4 +1,4 @@
-// Runs home in Gazebo worlds and built-in scenes.
+// Homing runs in Gazebo worlds and built-in scenes.
 
 #include "lab/s06/worlds.hpp"
 
@@ -66,9 +66,9 @@ viewer::MapPlot draw_all_runs(const HomingPlace& place, const std::vector<Homing
   return map;
 }
 
-// Adds the rate at which robots that ended elsewhere report it.
-void add_noticed(Reproduction& result, const std::string& id, const std::string& what,
-                 const std::vector<HomingRun>& runs) {
+// Adds the rate at which robots that ended elsewhere report that they are not at home.
+void add_rate_of_noticed_failures(Reproduction& result, const std::string& id,
+                                  const std::string& what, const std::vector<HomingRun>& runs) {
   std::size_t elsewhere = 0;
   std::size_t noticed = 0;
   for (const HomingRun& run : runs) {
@@ -82,7 +82,7 @@ void add_noticed(Reproduction& result, const std::string& id, const std::string&
            elsewhere);
 }
 
-struct Ends {
+struct EndDifferences {
   std::vector<double> at_home;
   std::vector<double> elsewhere;
   void add(const std::vector<HomingRun>& runs) {
@@ -119,7 +119,7 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   const auto& [options, executor, reproduction] = context;
   const std::uint64_t seed = options.seed;
   const HomingPlace place =
-      make_homing_place(simulation::read_world(options.data, name), {}, executor);
+      make_homing_place(simulation::read_gazebo_world(options.data, name), {}, executor);
   const auto tasks = sample_homing_tasks(place, options.starts, homing_start_radius_m, seed);
   const auto runs = run_home(place, tasks, {}, seed, executor);
 
@@ -140,7 +140,7 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
              what + ", the straight line free: home within 10 cm", count_successes(in_sight),
              in_sight.size());
   }
-  add_noticed(reproduction, id + ".noticed", what, runs);
+  add_rate_of_noticed_failures(reproduction, id + ".noticed", what, runs);
   add_median(reproduction, id + ".steps", what + ": steps of a run", "steps", steps);
 
   const auto add_other = [&](const std::string& key, const std::string& text,
@@ -178,13 +178,13 @@ void reproduce_homing_in_scenes(int starts, const Experiments& context) {
   const std::uint64_t seed = options.seed;
   constexpr std::array<const char*, 5> scenes{"office", "lab", "hall", "loop", "garden"};
   constexpr double tilt_rad = 3.0 * std::numbers::pi / 180.0;
-  const std::uint64_t seeds_each = starts > 1 ? 2 : 1;
-  Ends ends;
+  const std::uint64_t seeds_per_scene = starts > 1 ? 2 : 1;
+  EndDifferences ends;
   for (const char* const name : scenes) {
     std::vector<HomingRun> flat;
     std::vector<HomingRun> tilted;
-    std::vector<HomingRun> sideways;
-    for (std::uint64_t variant = 0; variant < seeds_each; ++variant) {
+    std::vector<HomingRun> holonomic_runs;
+    for (std::uint64_t variant = 0; variant < seeds_per_scene; ++variant) {
       const std::uint64_t number = seed + variant;
       HomingPlace place =
           make_homing_place(simulation::make_scene(name, {.seed = number}), {}, executor);
@@ -197,7 +197,7 @@ void reproduce_homing_in_scenes(int starts, const Experiments& context) {
       append(flat, {});
       HomingRunOptions holonomic;
       holonomic.motion.drive = DriveKind::holonomic;
-      append(sideways, holonomic);
+      append(holonomic_runs, holonomic);
       place.camera.frame.tilt_rad = tilt_rad;
       append(tilted, {});
     }
@@ -206,7 +206,7 @@ void reproduce_homing_in_scenes(int starts, const Experiments& context) {
     add_rate(reproduction, id + ".success", what + ": home within 10 cm", count_successes(flat),
              flat.size());
     add_rate(reproduction, id + ".holonomic", what + ", a holonomic robot: home within 10 cm",
-             count_successes(sideways), sideways.size());
+             count_successes(holonomic_runs), holonomic_runs.size());
     add_rate(reproduction, id + ".tilt",
              what + ", tilted by 3 degrees in a random direction at each view: home within 10 cm",
              count_successes(tilted), tilted.size());

@@ -10,26 +10,26 @@
 
 namespace panonav::lab {
 
-/// A run home counts as a success when the robot says that it arrived, this near.
+/// Distance from the goal within which a reported arrival is a success.
 inline constexpr double homing_success_m = 0.1;
-/// Starts lie within this distance of their goal.
+/// Largest distance of starts from their goals.
 inline constexpr double homing_start_radius_m = 1.5;
 
-/// Returns why a run home failed, for people: "an obstacle stopped it", "stopped at another local
-/// minimum and says so". Empty for a success.
+/// Returns in words why a homing run failed: "an obstacle stopped it", "another local minimum and
+/// says so", ... with the distance; empty for a success.
 [[nodiscard]] std::string explain_failure(const HomingRun& run);
 
-/// Measures runs home in the Gazebo world `name`, from `context.options.starts` random starts
+/// Measures homing runs in the Gazebo world `name` from `context.options.starts` random starts
 /// around random goals. Adds rows "s06.world.NAME.*": success from all starts and from those in
-/// sight of the goal, wrong arrivals that were noticed, and success of the published rule. Draws a
+/// sight of the goal, ends elsewhere that the robot reported, and success of other rules. Draws a
 /// map of all runs, and one of each failure with its reason. Same arguments: same rows and images
 /// on any number of threads. Throws FileError, ContractError.
 void reproduce_homing_in_world(const std::string& name, const Experiments& context);
 
-/// Measures the same over built-in scenes of several seeds: office, lab, hall, loop and garden, the
-/// robot on flat ground and tilted by up to 3 degrees in a random direction at each view, and a
-/// holonomic robot; and how much views differ where runs end at home and where they end elsewhere:
-/// `HomingPursuitOptions::arrived_difference` is to stand between.
+/// Measures homing runs in the built-in scenes office, lab, hall, loop and garden, with one or two
+/// seeds each: robot on flat ground, tilted by 3 degrees in a random direction per view, and
+/// holonomic. Also measures image differences where runs end at home and where they end elsewhere;
+/// `HomingPursuitOptions::arrived_difference` must be between the two.
 void reproduce_homing_in_scenes(int starts, const Experiments& context);
 
 }  // namespace panonav::lab

@@ -1,4 +1,4 @@
-// [Y03] section 5: drives across a straight path, and sweeps.
+// [Y03] section 5: drives across a straight path, and parameter sweeps.
 
 #include <algorithm>
 #include <chrono>
@@ -26,15 +26,15 @@ namespace {
 
 const std::vector<double> lateral_offsets_m{0.0, 0.1, 0.25, 0.5, 0.75, 1.0};
 const std::vector<std::size_t> thinnings{1, 2, 5, 10, 15, 25};
-// Index of the drive with lateral offset from which a view is synthesised.
-constexpr std::size_t shown_offset = 3;
+// Index of the drive at a lateral offset for which a view is synthesised.
+constexpr std::size_t synthesised_offset_index = 3;
 const std::vector<double> margins_m{0.04, 0.08, 0.14, 0.24, 0.34};
 
-// Errors of one method of localising, over all variants.
-struct Errors {
-  std::vector<double> mean_cm;                 // one a variant
-  std::vector<std::vector<double>> images_cm;  // of each variant
-  std::vector<double> heading_deg;             // means
+// Errors of one localisation method over all variants.
+struct MethodErrors {
+  std::vector<double> mean_cm;                 // per variant
+  std::vector<std::vector<double>> images_cm;  // per variant and image
+  std::vector<double> heading_deg;             // mean per variant
   std::size_t missed = 0;
   std::size_t changed = 0;
 
@@ -60,9 +60,9 @@ struct Errors {
   }
 };
 
-// Returns the standard deviation over the images of the chosen variants.
-double deviation(const std::vector<std::vector<double>>& images,
-                 const std::vector<std::size_t>& chosen) {
+// Returns the standard deviation over all images of the variants with the indices `chosen`.
+double image_deviation(const std::vector<std::vector<double>>& images,
+                       const std::vector<std::size_t>& chosen) {
   double n = 0.0;
   double sum = 0.0;
   double squares = 0.0;
@@ -76,7 +76,7 @@ double deviation(const std::vector<std::vector<double>>& images,
   return std::sqrt(std::max(0.0, squares / n - sum * sum / (n * n)));
 }
 
-// Returns the 95 % bootstrap interval over variants.
+// Returns the 95 % bootstrap interval of this deviation, resampling variants.
 std::pair<double, double> deviation_interval(const std::vector<std::vector<double>>& images,
                                              std::uint64_t seed) {
   constexpr int samples = 400;
@@ -85,19 +85,20 @@ std::pair<double, double> deviation_interval(const std::vector<std::vector<doubl
   std::vector<std::size_t> chosen(images.size());
   for (int sample = 0; sample < samples; ++sample) {
     for (std::size_t& one : chosen) one = random.index(images.size());
-    values.push_back(deviation(images, chosen));
+    values.push_back(image_deviation(images, chosen));
   }
   return {quantile(values, 0.025), quantile(values, 0.975)};
 }
 
-// Localised drives of a variant, by the ids of their rows, and sweeps.
-struct Variant {
+// Results of one variant: localised drives by the ids of their rows, and sweeps.
+struct VariantResults {
   std::map<std::string, DriveErrors> drives;
   std::map<std::string, std::vector<DriveErrors>> sweeps;
   GoalRun goal;
 };
 
-// Returns the median over the lines of a drive, each predicted by odometry.
+// Returns the median time of localising one line of a drive, in ms; each starts from the pose
+// predicted by odometry.
 template <typename Fit>
 double measure_fit_ms(const LineDrive& drive, const Fit& fit) {
   std::vector<double> times_ms;
@@ -114,8 +115,8 @@ double measure_fit_ms(const LineDrive& drive, const Fit& fit) {
   return times_ms.empty() ? 0.0 : median(times_ms);
 }
 
-Variant localise_drives(const LabRoute& lab, bool sweeps) {
-  Variant variant;
+VariantResults localise_drives(const LabRoute& lab, bool sweeps) {
+  VariantResults variant;
   const RouteLines lines(lab.route);
   const RouteContours contours(lab.route);
   variant.drives = {
@@ -133,7 +134,7 @@ Variant localise_drives(const LabRoute& lab, bool sweeps) {
     variant.sweeps["spacing"].push_back(
         follow_by_fit(RouteLines(thin_route(lab.route, every)), lab.across));
   }
-  for (const LineDrive& drive : lab.beside) {
+  for (const LineDrive& drive : lab.lateral_drives) {
     variant.sweeps["offset"].push_back(follow_by_fit(lines, drive));
   }
   for (const double margin_m : margins_m) {
@@ -143,13 +144,13 @@ Variant localise_drives(const LabRoute& lab, bool sweeps) {
   return variant;
 }
 
-// Measures over all variants.
-class LabMeasures {
+// Collects and reports the results of all variants.
+class LabResults {
  public:
-  LabMeasures(const ReproductionOptions& options, Reproduction& result)
+  LabResults(const ReproductionOptions& options, Reproduction& result)
       : options_(options), result_(result) {}
 
-  void add(const LabRoute& lab, const Variant& variant) {
+  void add(const LabRoute& lab, const VariantResults& variant) {
     for (const auto& [id, drive] : variant.drives) errors_[id].add(drive);
     for (const auto& [id, drives] : variant.sweeps) {
       sweeps_[id].resize(drives.size());
@@ -171,20 +172,24 @@ class LabMeasures {
   void report() const {
     const std::string drive = "5 m route, a line every 2 cm, driven at 30 degrees to it";
     const std::string moved = "the same with things moved, a tenth of what is seen";
-    report_method("straight.fit", drive + ", direct fit", at_most(0.5), straight_, at_most(0.3));
+    report_method("straight.fit", drive + ", direct fit", at_most(0.5), published_straight_,
+                  at_most(0.3));
     add_row(result_, "y03.straight.fit.heading", drive + ", direct fit: mean error of the heading",
             mean_figure(errors_.at("straight.fit").heading_deg, options_.seed), "deg",
             at_most(0.1));
     report_method("straight.contours", drive + ", dual contours as published", std::nullopt,
-                  straight_);
+                  published_straight_);
     add_mean(result_, "y03.changed.share", "directions that show something else after things moved",
              "%", changed_percent_);
-    report_method("changed.fit", moved + ", direct fit with masking", at_most(0.8), moved_);
-    report_named("before", "scene as memorised", errors_.at("straight.fit"));
-    report_named("after", "things moved; the first four of a drive cannot be",
-                 errors_.at("changed.fit"));
-    report_method("changed.plain", moved + ", direct fit without masking", std::nullopt, moved_);
-    report_method("changed.contours", moved + ", dual contours as published", std::nullopt, moved_);
+    report_method("changed.fit", moved + ", direct fit with masking", at_most(0.8),
+                  published_moved_);
+    report_change_reports("before", "scene as memorised", errors_.at("straight.fit"));
+    report_change_reports("after", "things moved; the first four of a drive cannot be",
+                          errors_.at("changed.fit"));
+    report_method("changed.plain", moved + ", direct fit without masking", std::nullopt,
+                  published_moved_);
+    report_method("changed.contours", moved + ", dual contours as published", std::nullopt,
+                  published_moved_);
     report_method("sparse.fit", "the same with a line every 10 cm, direct fit", at_most(0.8));
     report_method("scale.fit", "recorded with 1 % error of the odometry's scale, direct fit",
                   at_most(3.0));
@@ -216,15 +221,15 @@ class LabMeasures {
   }
 
  private:
-  // Published mean and standard deviation of the error.
+  // Published mean and standard deviation of the error, in cm.
   using Published = std::pair<double, double>;
-  static constexpr Published straight_{1.98, 1.0};
-  static constexpr Published moved_{3.46, 0.56};
+  static constexpr Published published_straight_{1.98, 1.0};
+  static constexpr Published published_moved_{3.46, 0.56};
 
   void report_method(const std::string& id, const std::string& what, std::optional<Target> target,
                      std::optional<Published> published = std::nullopt,
                      std::optional<Target> sigma_target = std::nullopt) const {
-    const Errors& errors = errors_.at(id);
+    const MethodErrors& errors = errors_.at(id);
     const auto range = [&](double Published::*value) {
       return published ? std::optional(std::pair((*published).*value, (*published).*value))
                        : std::nullopt;
@@ -235,14 +240,15 @@ class LabMeasures {
             mean_figure(errors.mean_cm, options_.seed), "cm", target, range(&Published::first))
         .over = "mean of " + std::to_string(errors.mean_cm.size()) + " variants";
     add_row(result_, "y03." + id + ".sigma", what + ": standard deviation of the error, all images",
-            Figure(deviation(errors.images_cm, all),
+            Figure(image_deviation(errors.images_cm, all),
                    deviation_interval(errors.images_cm, options_.seed)),
             "cm", sigma_target, range(&Published::second));
     add_rate(result_, "y03." + id + ".missed", what + ": images without an answer", errors.missed,
              errors.images());
   }
 
-  void report_named(const std::string& id, const std::string& scene, const Errors& errors) const {
+  void report_change_reports(const std::string& id, const std::string& scene,
+                             const MethodErrors& errors) const {
     add_rate(result_, "y03.changed.named." + id,
              "images in which something is named as changed, " + scene, errors.changed,
              errors.images());
@@ -251,7 +257,7 @@ class LabMeasures {
   void draw_sweep(const std::string& id, const std::vector<double>& x_m, const std::string& title,
                   const std::string& x_label, const std::string& label,
                   const std::string& caption) const {
-    const std::vector<Errors>& errors = sweeps_.at(id);
+    const std::vector<MethodErrors>& errors = sweeps_.at(id);
     viewer::Series series{.label = label};
     for (std::size_t i = 0; i < x_m.size(); ++i) {
       add_point(series, 100.0 * x_m[i], mean_figure(errors[i].mean_cm, options_.seed));
@@ -269,8 +275,8 @@ class LabMeasures {
 
   const ReproductionOptions& options_;
   Reproduction& result_;
-  std::map<std::string, Errors> errors_;
-  std::map<std::string, std::vector<Errors>> sweeps_;
+  std::map<std::string, MethodErrors> errors_;
+  std::map<std::string, std::vector<MethodErrors>> sweeps_;
   std::vector<double> goal_cm_;
   std::vector<double> fit_ms_;
   std::vector<double> contours_ms_;
@@ -281,8 +287,9 @@ class LabMeasures {
 }  // namespace
 
 void RouteExperiments::reproduce_lab_drives() const {
-  LabMeasures measures(options, result);
-  // A few variants at a time: each renders on all threads, then all are examined side by side.
+  LabResults measures(options, result);
+  // Process a few variants at a time: all threads render each variant, then variants are evaluated
+  // in parallel.
   constexpr int batch = 4;
   for (int begin = 0; begin < options.scenes; begin += batch) {
     std::vector<LabRoute> labs;
@@ -294,12 +301,12 @@ void RouteExperiments::reproduce_lab_drives() const {
     const auto variants = simulation::make_each(executor, labs.size(), [&](std::size_t i) {
       return localise_drives(labs[i], begin + static_cast<int>(i) < options.swept);
     });
-    // One after the other, so that nothing else works while fits are timed.
+    // Add results sequentially, because `add` measures run times.
     for (std::size_t i = 0; i < labs.size(); ++i) measures.add(labs[i], variants[i]);
     if (begin > 0) continue;
     const auto& drives = variants[0].drives;
     draw_route_panorama(labs[0], result);
-    draw_virtual_view(labs[0], labs[0].beside[shown_offset], result);
+    draw_virtual_view(labs[0], labs[0].lateral_drives[synthesised_offset_index], result);
     draw_drives(labs[0],
                 {drives.at("straight.fit"), drives.at("straight.contours"),
                  drives.at("changed.fit"), drives.at("changed.contours")},

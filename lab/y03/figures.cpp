@@ -35,7 +35,7 @@ viewer::MapLayer make_path_layer(const LabRoute& lab) {
                          to_path_frame(lab, {lab.route.poses().begin(), lab.route.poses().end()}));
 }
 
-// Returns the layers with the memorised lab below them, in the frame of the path.
+// Returns the layers above the map of the memorised lab, in the frame of the path.
 std::vector<viewer::MapLayer> prepend_room(const LabRoute& lab,
                                            std::vector<viewer::MapLayer> layers) {
   std::vector<viewer::MapLayer> all =
@@ -52,7 +52,8 @@ std::vector<viewer::MapLayer> prepend_room(const LabRoute& lab,
   return all;
 }
 
-// Returns the column of a line shown at place i from the left: clockwise, forward in the middle.
+// Returns the column of a line that is shown at position i from the left: azimuth decreases to the
+// right, and straight ahead is in the middle.
 std::size_t shown_column(std::size_t i, std::size_t columns) {
   return (2 * columns + columns / 2 - i) % columns;
 }
@@ -73,7 +74,7 @@ viewer::PicturePlot make_panorama_plot(const LabRoute& lab, const std::string& t
       plot.values.push_back(static_cast<float>(line[shown_column(i, columns)]));
     }
   }
-  // From black to white, for people.
+  // Scale brightness to black .. white, for readers.
   const float max_value = std::max(1.0F, std::ranges::max(plot.values));
   for (float& value : plot.values) value /= max_value;
   return plot;
@@ -98,7 +99,8 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproductio
   find_crossings(lab.route.poses(), 0, pose.position(), equal_directions(columns), crossings);
   viewer::PicturePlot plot =
       make_panorama_plot(lab, "Light blue: where a viewpoint beside the path finds what it sees");
-  // Directions in the world; the path is straight, so that its heading turns all lines alike.
+  // The directions of crossings are in the world frame. The path is straight, so one shift by its
+  // heading applies to all lines.
   const double turn =
       lab.world_from_path.heading_rad * static_cast<double>(columns) / radians(360.0);
   const auto rows = static_cast<int>(lab.route.size());
@@ -122,14 +124,14 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproductio
            plot);
   const auto shown = RouteLines(lab.route).synthesise(pose);
   viewer::Series truth{.label = "seen there", .style = viewer::SeriesStyle::lines};
-  viewer::Series made{.label = "synthesised from the route panorama",
-                      .style = viewer::SeriesStyle::points};
+  viewer::Series synthesised{.label = "synthesised from the route panorama",
+                             .style = viewer::SeriesStyle::points};
   for (std::size_t i = 0; i < columns; ++i) {
     const std::size_t c = shown_column(i, columns);
     const double azimuth = 180.0 - 360.0 * static_cast<double>(i) / static_cast<double>(columns);
     truth.add(azimuth, static_cast<double>(beside.lines[middle][c]));
     if (!std::isfinite(shown[c])) continue;
-    made.add(azimuth, static_cast<double>(shown[c]));
+    synthesised.add(azimuth, static_cast<double>(shown[c]));
   }
   add_plot(result, "figure_05_lines.svg",
            "The line synthesised at that viewpoint, where no picture was taken, and the one that a "
@@ -137,7 +139,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproductio
            viewer::LinePlot{.title = "The horizon " + where,
                             .x_label = "azimuth from straight ahead [degrees], left positive",
                             .y_label = "brightness",
-                            .series = {truth, made},
+                            .series = {truth, synthesised},
                             .x_range = std::pair(-180.0, 180.0)});
 }
 

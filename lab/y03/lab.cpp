@@ -23,11 +23,12 @@ namespace panonav::lab {
 namespace {
 
 constexpr double drive_step_m = 0.05;
-// Share of the movable objects that are moved, and bounds of the changed share of the view.
-constexpr double moved_share = 0.1;
-constexpr double min_changed = 0.05;
-constexpr double max_changed = 0.15;
-constexpr double target_changed = 0.1;
+// Fraction of the movable objects that are moved per trial; bounds and target of the changed
+// fraction of the view.
+constexpr double moved_object_fraction = 0.1;
+constexpr double min_changed_fraction = 0.05;
+constexpr double max_changed_fraction = 0.15;
+constexpr double target_changed_fraction = 0.1;
 
 std::vector<std::vector<float>> take_lines(const simulation::Renderer& renderer,
                                            const std::vector<Pose2>& poses,
@@ -58,7 +59,8 @@ std::vector<Pose2> make_straight_path(const Pose2& start, double length_m, doubl
   return poses;
 }
 
-// Returns the start of a path along the room, as near to its middle as the robot can drive.
+// Returns the start of a free path along the room, as near to the room's middle as possible;
+// nullopt if there is none.
 std::optional<Pose2> find_path_start(const simulation::FreeSpace& space) {
   const double x_m = 0.5 * (space.low().x_m + space.high().x_m) - 0.5 * lab_path_m;
   const double middle_m = 0.5 * (space.low().y_m + space.high().y_m);
@@ -73,7 +75,7 @@ std::optional<Pose2> find_path_start(const simulation::FreeSpace& space) {
   return std::nullopt;
 }
 
-// Returns the first prediction, off by 5 cm and 2 degrees.
+// Returns the prediction for the first line, off by 5 cm and 2 degrees.
 Pose2 perturb_pose(const Pose2& truth) {
   return truth * Pose2{0.03, -0.04, radians(2.0)};
 }
@@ -103,44 +105,46 @@ struct ChangedLab {
   double share = 0.0;
 };
 
-// Returns the share of the directions in which two scenes differ by more than noise makes of one,
-// as seen from start, middle and end of a drive.
+// Returns the fraction of the directions in which two scenes differ by more than 5 of 255 grey
+// levels without noise, at start, middle and end of a drive.
 double changed_share(const simulation::Renderer& before, const simulation::Renderer& after,
                      const std::vector<Pose2>& drive, simulation::LineCamera camera) {
   camera.sensor.read_noise = 0.0;
   camera.sensor.full_well = 1e9;
-  constexpr float grey_levels = 5.0F / 255.0F;
+  constexpr float max_unchanged_difference = 5.0F / 255.0F;
   std::size_t changed = 0;
   std::size_t all = 0;
   for (const std::size_t i : {std::size_t{0}, drive.size() / 2, drive.size() - 1}) {
     const auto a = simulation::take_line(before, drive[i], camera, 0);
     const auto b = simulation::take_line(after, drive[i], camera, 0);
     for (std::size_t c = 0; c < a.size(); ++c) {
-      changed += std::abs(a[c] - b[c]) > grey_levels ? 1 : 0;
+      changed += std::abs(a[c] - b[c]) > max_unchanged_difference ? 1 : 0;
       ++all;
     }
   }
   return static_cast<double>(changed) / static_cast<double>(all);
 }
 
-// Moves objects until about a tenth of the view differs [Y03 section 5.1]: a tenth of the objects
-// moved at random may change nothing, or a wardrobe's width of everything.
+// Moves objects until about a tenth of the view differs [Y03 section 5.1]. Several trials are
+// needed, because a random tenth of the objects may change nothing or a large part of the view.
 ChangedLab change_lab(std::uint64_t seed, const simulation::Renderer& before,
                       const std::vector<Pose2>& drive, const simulation::LineCamera& camera,
                       Executor& executor) {
   ChangedLab best;
   constexpr std::uint64_t max_trials = 30;
   for (std::uint64_t trial = 0; trial < max_trials; ++trial) {
-    const simulation::Scene scene = simulation::make_scene(
-        "lab", {.seed = seed, .moved_objects = moved_share, .moved_seed = seed + 1 + 1000 * trial});
+    const simulation::Scene scene =
+        simulation::make_scene("lab", {.seed = seed,
+                                       .moved_objects = moved_object_fraction,
+                                       .moved_seed = seed + 1 + 1000 * trial});
     auto after =
         std::make_unique<simulation::Renderer>(scene, simulation::RendererOptions{}, executor);
     const double share = changed_share(before, *after, drive, camera);
-    if (!best.renderer ||
-        std::abs(share - target_changed) < std::abs(best.share - target_changed)) {
+    if (!best.renderer || std::abs(share - target_changed_fraction) <
+                              std::abs(best.share - target_changed_fraction)) {
       best = {std::move(after), share};
     }
-    if (best.share >= min_changed && best.share <= max_changed) break;
+    if (best.share >= min_changed_fraction && best.share <= max_changed_fraction) break;
   }
   return best;
 }
@@ -158,15 +162,15 @@ LabRoute record_lab_route(std::uint64_t seed, const std::vector<double>& lateral
   lab.camera_height_m = scene.camera_height_m;
   const simulation::Renderer& renderer = *lab.renderer;
   const simulation::LineCamera camera = simulation::make_line_camera(lab.camera_height_m);
-  // Without a free path the camera passes above the objects.
+  // If no path is free, the robot's camera passes above the objects.
   const double middle_m = 0.5 * (space.low().y_m + space.high().y_m);
-  const double begin_m = 0.5 * (space.low().x_m + space.high().x_m) - 0.5 * lab_path_m;
-  lab.world_from_path = find_path_start(space).value_or(Pose2{begin_m, middle_m, 0.0});
+  const double fallback_x_m = 0.5 * (space.low().x_m + space.high().x_m) - 0.5 * lab_path_m;
+  lab.world_from_path = find_path_start(space).value_or(Pose2{fallback_x_m, middle_m, 0.0});
   const auto path = make_straight_path(lab.world_from_path, lab_path_m, lab_spacing_m);
   const auto lines = take_lines(renderer, path, camera, seed * 7 + 1, executor);
   for (std::size_t i = 0; i < path.size(); ++i) lab.route.append(path[i], lines[i]);
 
-  // Two metres, crossing the path in its middle.
+  // The drive is 2 m long and crosses the path in its middle.
   const double turn = radians(30.0);
   const Pose2 start =
       lab.world_from_path * Pose2{0.5 * lab_path_m, 0.0, turn} * Pose2{-1.0, 0.0, 0.0};
@@ -177,8 +181,8 @@ LabRoute record_lab_route(std::uint64_t seed, const std::vector<double>& lateral
   lab.changed_share = changed.share;
   for (std::size_t i = 0; i < lateral_m.size(); ++i) {
     const Pose2 begin = lab.world_from_path * Pose2{0.3 * lab_path_m, lateral_m[i], 0.0};
-    lab.beside.push_back(take_drive(renderer, make_straight_path(begin, 1.8, 0.2), camera,
-                                    seed * 7 + 4 + i, executor));
+    lab.lateral_drives.push_back(take_drive(renderer, make_straight_path(begin, 1.8, 0.2), camera,
+                                            seed * 7 + 4 + i, executor));
   }
   return lab;
 }
@@ -239,7 +243,7 @@ GoalRun run_to_goals(const LabRoute& lab, const RouteLines& lines, std::uint64_t
   Pose2 robot{goals[0].x_m, goals[0].y_m, lab.world_from_path.heading_rad};
   Pose2 estimate = perturb_pose(robot);
   GoalRun run;
-  constexpr double arrived_m = 0.005;
+  constexpr double arrival_radius_m = 0.005;
   constexpr int max_steps = 200;
   std::size_t next = 1;
   Pose2 step;
@@ -249,7 +253,7 @@ GoalRun run_to_goals(const LabRoute& lab, const RouteLines& lines, std::uint64_t
     if (const auto fix = lines.fit(line, estimate)) estimate = fix->pose;
     run.truth.push_back(robot);
     run.estimate.push_back(estimate);
-    if (distance(estimate.position(), goals[next]) < arrived_m && ++next == goals.size()) {
+    if (distance(estimate.position(), goals[next]) < arrival_radius_m && ++next == goals.size()) {
       run.arrived = true;
       break;
     }

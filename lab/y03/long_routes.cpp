@@ -1,4 +1,4 @@
-// Repeats routes of 60 m in closed loop, measures their size in a file, and repeats a real route.
+// Routes of 60 m repeated in closed loop, their size in a file, and localisation on a real route.
 
 #include <algorithm>
 #include <cmath>
@@ -34,11 +34,11 @@ namespace panonav::lab {
 namespace {
 
 constexpr double long_route_m = 60.0;
-// The way between lines that the paper counts its bytes for [Y03 section 2.2].
+// Distance between lines for which the paper states its bytes [Y03 section 2.2].
 constexpr double spacing_m = 0.1;
-constexpr int runs_each = 10;  // of a route, half of them back
+constexpr int runs_per_route = 10;  // per route, every second one backwards
 
-// One route and the robots that repeated it.
+// A route, its panorama and the runs that repeated it.
 struct RepeatedRoute {
   std::vector<Pose2> way;
   RoutePanorama panorama;
@@ -58,58 +58,59 @@ RepeatedRoute record_and_repeat_route(const RouteScene& place, int runs, std::ui
   return repeated;
 }
 
-// Measures of the runs along some routes.
-struct RouteMeasures {
+// Measurements of all runs along several routes.
+struct RouteResults {
   std::vector<double> lateral_cm;
   std::vector<double> lateral_back_cm;
-  std::vector<double> worst_cm;
+  std::vector<double> p95_cm;
   std::vector<double> fix_cm;
   std::size_t completed = 0;
   std::size_t lines = 0;
   std::size_t off_route = 0;
-  std::size_t turned_aside = 0;
+  std::size_t obstacle_steps = 0;
 
   void add(const RouteRun& run, bool is_back) {
     const double mean_cm = 100.0 * mean(run.lateral_m);
     lateral_cm.push_back(mean_cm);
     if (is_back) lateral_back_cm.push_back(mean_cm);
-    worst_cm.push_back(100.0 * quantile(run.lateral_m, 0.95));
+    p95_cm.push_back(100.0 * quantile(run.lateral_m, 0.95));
     if (!run.position_m.empty()) fix_cm.push_back(100.0 * median(run.position_m));
     completed += run.has_completed() ? 1 : 0;
     lines += run.truth.size();
     off_route += run.off_route;
-    turned_aside += run.turned_aside;
+    obstacle_steps += run.obstacle_steps;
   }
 };
 
 void report_routes(const ReproductionOptions& options, const std::string& name,
                    const RouteScene& first_place, const std::vector<RepeatedRoute>& routes,
                    Reproduction& result) {
-  RouteMeasures of;
+  RouteResults results;
   for (const RepeatedRoute& route : routes) {
-    for (std::size_t i = 0; i < route.runs.size(); ++i) of.add(route.runs[i], i % 2 == 1);
+    for (std::size_t i = 0; i < route.runs.size(); ++i) results.add(route.runs[i], i % 2 == 1);
   }
-  const std::size_t runs = of.lateral_cm.size();
+  const std::size_t runs = results.lateral_cm.size();
   const std::string id = "y03.route." + name;
   const std::string what = name + ", 60 m route repeated with wheels 5 % wrong, start 0.3 m off";
   add_row(result, id + ".lateral", what + ": distance from the route",
-          mean_figure(of.lateral_cm, options.seed), "cm", at_most(5.0))
+          mean_figure(results.lateral_cm, options.seed), "cm", at_most(5.0))
       .over = "mean of " + std::to_string(runs) + " runs";
-  add_rate(result, id + ".completed", what + ": runs that reach the end, none lost", of.completed,
-           runs, at_least(1.0));
-  if (!of.lateral_back_cm.empty()) {
+  add_rate(result, id + ".completed", what + ": runs that reach the end, none lost",
+           results.completed, runs, at_least(1.0));
+  if (!results.lateral_back_cm.empty()) {
     add_mean(result, id + ".lateral_back", what + ": distance from the route, runs back alone",
-             "cm", of.lateral_back_cm);
+             "cm", results.lateral_back_cm);
   }
   add_mean(result, id + ".lateral_95", what + ": distance that 95 % of a run keep within", "cm",
-           of.worst_cm);
-  if (!of.fix_cm.empty()) {
-    add_median(result, id + ".fix", what + ": error of a fix, median of a run", "cm", of.fix_cm);
+           results.p95_cm);
+  if (!results.fix_cm.empty()) {
+    add_median(result, id + ".fix", what + ": error of a fix, median of a run", "cm",
+               results.fix_cm);
   }
-  add_rate(result, id + ".off_route", what + ": lines reported as off the route", of.off_route,
-           of.lines);
+  add_rate(result, id + ".off_route", what + ": lines reported as off the route", results.off_route,
+           results.lines);
   add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
-           of.turned_aside, of.lines);
+           results.obstacle_steps, results.lines);
   viewer::MapPlot map{.title = first_place.name, .layers = viewer::scene_layers(first_place.scene)};
   std::ranges::move(make_route_layers(routes.front().way, routes.front().runs),
                     std::back_inserter(map.layers));
@@ -119,7 +120,7 @@ void report_routes(const ReproductionOptions& options, const std::string& name,
            map);
 }
 
-// Returns the size on the disk, with the write-ahead log.
+// Returns the size of a memory file on disk, including the write-ahead log.
 std::uint64_t file_bytes(const std::filesystem::path& path) {
   std::uint64_t bytes = std::filesystem::file_size(path);
   const std::filesystem::path log = path.string() + "-wal";
@@ -134,13 +135,13 @@ void measure_file(const std::vector<RepeatedRoute>& routes, Reproduction& result
   header.shape = {1, 1};
   std::uint64_t empty = 0;
   double length_m = 0.0;
-  std::uint64_t stored = 0;
+  std::uint64_t packed_bytes = 0;
   {
     MemoryFile file = MemoryFile::create(path, header);
-    // The first route makes the tables.
-    RoutePanorama none(routes.front().panorama.columns());
-    none.append({0.0, 0.0, 0.0}, routes.front().panorama.line(0));
-    static_cast<void>(file.append_route("none", none));
+    // Add an unmeasured route first, because it creates the tables.
+    RoutePanorama unmeasured_route(routes.front().panorama.columns());
+    unmeasured_route.append({0.0, 0.0, 0.0}, routes.front().panorama.line(0));
+    static_cast<void>(file.append_route("none", unmeasured_route));
   }
   empty = file_bytes(path);
   {
@@ -150,22 +151,22 @@ void measure_file(const std::vector<RepeatedRoute>& routes, Reproduction& result
       static_cast<void>(file.append_route(name, routes[i].panorama));
       require(file.route(name) == routes[i].panorama, "route read back", 0.0, "the one written");
       length_m += routes[i].panorama.length_m();
-      stored += file.route_bytes(name);
+      packed_bytes += file.route_bytes(name);
     }
   }
-  const std::uint64_t whole = file_bytes(path);
+  const std::uint64_t full_bytes = file_bytes(path);
   std::filesystem::remove(path);
   const double megabytes_per_km = 1e-3 / length_m;
   const std::string what = "memory of routes through loop, a line every 10 cm, ";
   add_row(result, "y03.memory.file", what + "by what a memory file grows, a kilometre",
-          megabytes_per_km * static_cast<double>(whole - empty), "MB", at_most(3.6),
+          megabytes_per_km * static_cast<double>(full_bytes - empty), "MB", at_most(3.6),
           std::pair(3.6, 3.6));
   add_row(result, "y03.memory.packed", what + "packed lines and poses alone, a kilometre",
-          megabytes_per_km * static_cast<double>(stored), "MB");
+          megabytes_per_km * static_cast<double>(packed_bytes), "MB");
 }
 
 int count_routes(const ReproductionOptions& options) {
-  return std::max(1, options.runs / runs_each);
+  return std::max(1, options.runs / runs_per_route);
 }
 
 }  // namespace
@@ -178,7 +179,7 @@ void RouteExperiments::reproduce_loop_routes() const {
     RouteScene place =
         make_route_scene(simulation::make_scene("loop", {.seed = seed}), "loop", executor);
     routes.push_back(
-        record_and_repeat_route(place, std::min(runs_each, options.runs), seed, executor));
+        record_and_repeat_route(place, std::min(runs_per_route, options.runs), seed, executor));
     if (!first) first = std::move(place);
   }
   report_routes(options, "loop", *first, routes, result);
@@ -187,10 +188,10 @@ void RouteExperiments::reproduce_loop_routes() const {
 
 void RouteExperiments::reproduce_world_routes(const std::string& name) const {
   const RouteScene place =
-      make_route_scene(simulation::read_world(options.data, name), name, executor);
+      make_route_scene(simulation::read_gazebo_world(options.data, name), name, executor);
   std::vector<RepeatedRoute> routes;
   for (int i = 0; i < count_routes(options); ++i) {
-    routes.push_back(record_and_repeat_route(place, std::min(runs_each, options.runs),
+    routes.push_back(record_and_repeat_route(place, std::min(runs_per_route, options.runs),
                                              options.seed + static_cast<std::uint64_t>(i),
                                              executor));
   }
@@ -218,8 +219,8 @@ void RouteExperiments::reproduce_real_route() const {
   const auto found = simulation::make_each(executor, way.size(), [&](std::size_t i) {
     return i % every != 0 ? tracker.search(lines[i]) : std::nullopt;
   });
-  std::vector<double> along_cm;
-  std::vector<double> beside_cm;
+  std::vector<double> along_error_cm;
+  std::vector<double> lateral_error_cm;
   std::size_t queries = 0;
   viewer::MapLayer right{.label = "fixes", .colour = viewer::PlotColour::blue};
   viewer::MapLayer remembered{.label = "remembered lines", .colour = viewer::PlotColour::black};
@@ -231,17 +232,18 @@ void RouteExperiments::reproduce_real_route() const {
     ++queries;
     if (!found[i]) continue;
     const RoutePosition truth = project_onto_route(route.poses(), places[i]);
-    along_cm.push_back(100.0 * std::abs(found[i]->along_m - truth.along_m));
-    beside_cm.push_back(100.0 * std::abs(found[i]->lateral_m - truth.lateral_m));
+    along_error_cm.push_back(100.0 * std::abs(found[i]->along_m - truth.along_m));
+    lateral_error_cm.push_back(100.0 * std::abs(found[i]->lateral_m - truth.lateral_m));
     right.dots.push_back(found[i]->pose.position());
   }
   const std::string what =
       "sussex_route, outdoors, every 10th line remembered, the others each searched alone";
-  add_median(result, "y03.sussex.along", what + ": error along the route, median", "cm", along_cm,
-             at_most(3.0));
+  add_median(result, "y03.sussex.along", what + ": error along the route, median", "cm",
+             along_error_cm, at_most(3.0));
   add_median(result, "y03.sussex.lateral", what + ": error beside the route, median", "cm",
-             beside_cm);
-  add_rate(result, "y03.sussex.found", what + ": found on the route", along_cm.size(), queries);
+             lateral_error_cm);
+  add_rate(result, "y03.sussex.found", what + ": found on the route", along_error_cm.size(),
+           queries);
   viewer::MapLayer driven{
       .label = "driven way", .colour = viewer::PlotColour::grey, .lines = {places}};
   add_plot(

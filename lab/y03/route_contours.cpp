@@ -25,7 +25,8 @@ std::vector<float> compute_slopes(std::span<const float> line) {
   return result;
 }
 
-// Returns local maxima of the slope's size that exceed its mean; the strongest `max_count`.
+// Returns the columns of local maxima of the absolute slope above its mean; at most the `max_count`
+// strongest.
 std::vector<int> find_edge_columns(std::span<const float> edges, int max_count) {
   double mean = 0.0;
   for (const float edge : edges)
@@ -47,21 +48,22 @@ std::vector<int> find_edge_columns(std::span<const float> edges, int max_count) 
   return columns;
 }
 
-// Energies of the dual active contour models [Y03 eq. 6-11]. The paper prints no weights; these
-// were chosen on lab scenes of seeds 701 to 704 (docs/decisions.md). Lengths along the path are
-// counted in lines, azimuths in columns, intensities from 0 to 1.
+// Energies of the dual active contour models [Y03 eq. 6-11]. The paper states no weights; these
+// were chosen on lab scenes of seeds 701 to 704 (docs/decisions.md). Units: lines along the path,
+// columns of azimuth, intensities 0 to 1.
 constexpr double tension = 0.002;        // w_alpha, eq. 7
 constexpr double rigidity = 0.002;       // w_beta, eq. 7
 constexpr double image_weight = 1.0;     // w_diff, eq. 8
 constexpr double contour_pull = 0.002;   // w_pull, eq. 10
-constexpr double stretch_weight = 0.5;   // w_const, eq. 11 squared
-constexpr double smoothing_deg = 1.0;    // of the lines before they are differentiated
-constexpr int max_control_points = 120;  // control points, at the strongest edges of the line
-constexpr int max_contour_moves = 200;   // moves of the contours
+constexpr double stretch_weight = 0.5;   // w_const, of the squared eq. 11
+constexpr double smoothing_deg = 1.0;    // of the lines, before the slopes
+constexpr int max_control_points = 120;  // at the strongest edges of the line
+constexpr int max_contour_moves = 200;   // iterations of both contours
 
-// Fewest control points that determine a pose.
+// Smallest number of control points that determines a pose.
 constexpr std::size_t min_points = 8;
-// Damping of the steps that fit a pose: what no control point determines stays.
+// Relative damping of the pose fit, so that a direction that no control point determines does not
+// change.
 constexpr double pose_damping = 1e-6;
 
 using Vector = Eigen::Vector3d;
@@ -109,9 +111,10 @@ std::vector<RouteCrossing> RouteContours::predict_curve(Point2 viewpoint) const 
   return crossings;
 }
 
-// Returns the energy that two neighbours share [Y03 eq. 7 and 11], `interval` columns apart in the
-// line. Contours are drawn over azimuth: per column, so that close points do not count more.
-// `next_slope`: to the point after them, NaN where it is not joined.
+// Returns the energy of two neighbouring control points [Y03 eq. 7 and 11], which are `interval`
+// columns apart in the line. Energies are integrated over azimuth, so that dense control points do
+// not weigh more. `next_slope` is the slope to the following control point, NaN if the two are not
+// joined.
 double RouteContours::pair_energy(const ContourPoint& before, const ContourPoint& at,
                                   double interval, bool joined, double next_slope) const {
   const double slope = (at.along - before.along) / interval;
@@ -125,9 +128,9 @@ double RouteContours::pair_energy(const ContourPoint& before, const ContourPoint
   return energy;
 }
 
-// Moves the contour by dynamic programming: each control point stays or goes to one of its eight
-// neighbours, and pairs of neighbours share eq. 7 and 11. The second derivative takes the point
-// after next from the last iteration.
+// Moves the contour by dynamic programming: each control point stays or moves to one of its eight
+// neighbours; eq. 7 and 11 couple neighbouring control points. The second derivative uses the next
+// but one point's position of the last iteration.
 void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<ContourPoint>& other,
                          const std::vector<int>& columns, std::span<const float> edges,
                          const std::vector<bool>& joined, double step) const {
@@ -180,15 +183,15 @@ void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<C
   contour = std::move(moved);
 }
 
-// One equation of the least squares of eq. 5.
+// One equation of the least squares fit of eq. 5: its difference, weight and gradient.
 struct RouteContours::Term {
   double difference, weight;
   Vector slope;
-  double deviations = 0.0;  // size of the difference, in deviations
+  double deviations = 0.0;  // absolute difference in standard deviations
 };
 
-// Returns the equations of the contours along the path [Y03 eq. 5], weighted by how well an azimuth
-// determines the place.
+// Returns the equations of the contours' positions along the path [Y03 eq. 5], weighted by the
+// accuracy with which an azimuth determines the position.
 std::vector<RouteContours::Term> RouteContours::make_path_terms(const RouteContourFix& fix) const {
   const auto size = static_cast<long long>(columns_);
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
@@ -203,12 +206,12 @@ std::vector<RouteContours::Term> RouteContours::make_path_terms(const RouteConto
     const RouteCrossing& a = crossings[c0];
     const RouteCrossing& b = crossings[(c0 + 1) % static_cast<std::size_t>(size)];
     if (a.along < 0.0F || b.along < 0.0F) continue;
-    const auto turn = static_cast<double>(b.along - a.along);  // lines a column
-    // A jump from one part of the path to another, or next to a pole.
+    const auto turn = static_cast<double>(b.along - a.along);  // lines per column
+    // Skip jumps from one part of the path to another, and azimuths next to a pole.
     if (std::abs(turn) * spacing_m_ > 1.0) continue;
     const double along = static_cast<double>(a.along) + f * turn;
     const double middle = 0.5 * (fix.first[i].along + fix.second[i].along);
-    // Half a line along the path, half a column of azimuth.
+    // Standard deviations: half a line along the path, half a column of azimuth.
     const double variance = 0.25 + 0.25 * turn * turn;
     terms.push_back({middle - along, 1.0 / variance,
                      Vector(static_cast<double>(a.along_by_x), static_cast<double>(a.along_by_y),
@@ -218,8 +221,9 @@ std::vector<RouteContours::Term> RouteContours::make_path_terms(const RouteConto
   return terms;
 }
 
-// Adds the equations of the contours' azimuths for the heading, to a column each. On the path
-// itself all lines of sight start at one place, and eq. 5 does not determine it.
+// Adds the equations of the contours' azimuths for the heading, with a deviation of one column.
+// They determine the heading on the path itself, where all lines of sight start at one position and
+// eq. 5 does not depend on it.
 void RouteContours::add_heading_terms(const RouteContourFix& fix, std::vector<Term>& terms) const {
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
   for (std::size_t i = 0; i < fix.columns.size(); ++i) {
@@ -232,10 +236,11 @@ void RouteContours::add_heading_terms(const RouteContourFix& fix, std::vector<Te
   }
 }
 
-// Fills the equations with Cauchy's weights, and sets the residual and the covariance of the fix;
-// false where the terms determine none.
-bool RouteContours::fill_equations(const std::vector<Term>& terms, std::size_t along_terms,
-                                   RouteContourFix& fix, DenseEquations<3>& equations) const {
+// Fills the equations with Cauchy weights and sets residual and covariance of the fix; returns
+// false if the terms do not determine a pose.
+bool RouteContours::fill_weighted_equations(const std::vector<Term>& terms, std::size_t along_terms,
+                                            RouteContourFix& fix,
+                                            DenseEquations<3>& equations) const {
   std::vector<double> sizes;
   for (const Term& term : std::span(terms).first(along_terms)) sizes.push_back(term.deviations);
   const double noise = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
@@ -278,7 +283,7 @@ bool RouteContours::fit_pose(RouteContourFix& fix) const {
       const std::size_t along_terms = terms.size();
       if (along_terms < min_points) return false;
       contours.add_heading_terms(fix, terms);
-      return contours.fill_equations(terms, along_terms, fix, equations);
+      return contours.fill_weighted_equations(terms, along_terms, fix, equations);
     }
     bool move(const Vector& change) {
       const double length_m = std::hypot(change[0], change[1]);
@@ -303,7 +308,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
   }
   const auto edges = compute_slopes(smooth_line(line, smoothing_deg * columns_ / 360.0));
   std::vector<bool> joined;
-  RouteContourFix fix = start(edges, predicted, joined);
+  RouteContourFix fix = place_contours(edges, predicted, joined);
   if (fix.columns.size() < min_points) return std::nullopt;
   converge(fix, edges, joined);
   std::size_t met = 0;
@@ -315,10 +320,11 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
   return fix;
 }
 
-// Places the control points of both contours, `margin_m` before and behind the predicted curve.
-// `joined`: whether a control point and the one before lie on the same side of the path.
-RouteContourFix RouteContours::start(std::span<const float> edges, const Pose2& predicted,
-                                     std::vector<bool>& joined) const {
+// Places the control points of both contours, `margin_m` ahead of and behind the predicted curve.
+// `joined` states for each control point whether it is on the same side of the path as the previous
+// one.
+RouteContourFix RouteContours::place_contours(std::span<const float> edges, const Pose2& predicted,
+                                              std::vector<bool>& joined) const {
   const auto crossings = predict_curve(predicted.position());
   const double turn = predicted.heading_rad * columns_ / (2.0 * std::numbers::pi);
   const auto size = static_cast<long long>(columns_);
@@ -332,9 +338,10 @@ RouteContourFix RouteContours::start(std::span<const float> edges, const Pose2& 
     const RouteCrossing& crossing = crossings[c];
     if (crossing.along < 0.0F) continue;
     // Sine of the angle between the line of sight and the path.
-    const double across = 1.0 / (spacing_m_ * std::hypot(static_cast<double>(crossing.along_by_x),
-                                                         static_cast<double>(crossing.along_by_y)));
-    if (across < std::sin(radians(10.0))) continue;
+    const double sine_to_path =
+        1.0 / (spacing_m_ * std::hypot(static_cast<double>(crossing.along_by_x),
+                                       static_cast<double>(crossing.along_by_y)));
+    if (sine_to_path < std::sin(radians(10.0))) continue;
     const auto along = static_cast<double>(crossing.along);
     const Direction2& direction = directions_[c];
     const bool to_the_left = direction.y * static_cast<double>(crossing.along_by_x) >
@@ -350,20 +357,21 @@ RouteContourFix RouteContours::start(std::span<const float> edges, const Pose2& 
 
 void RouteContours::converge(RouteContourFix& fix, std::span<const float> edges,
                              const std::vector<bool>& joined) const {
-  // Steps of a line and a column first, then of half, until nothing moves.
+  // Move by one line and column at first, then halve the step whenever nothing moves.
   double step = 1.0;
   for (; fix.iterations < max_contour_moves; ++fix.iterations) {
     const auto first = fix.first;
     const auto second = fix.second;
     move(fix.first, fix.second, fix.columns, edges, joined, step);
     move(fix.second, fix.first, fix.columns, edges, joined, step);
-    bool still = true;
+    bool is_unchanged = true;
     for (std::size_t i = 0; i < first.size(); ++i) {
-      still = still && first[i].along == fix.first[i].along &&
-              first[i].azimuth == fix.first[i].azimuth && second[i].along == fix.second[i].along &&
-              second[i].azimuth == fix.second[i].azimuth;
+      is_unchanged = is_unchanged && first[i].along == fix.first[i].along &&
+                     first[i].azimuth == fix.first[i].azimuth &&
+                     second[i].along == fix.second[i].along &&
+                     second[i].azimuth == fix.second[i].azimuth;
     }
-    if (!still) continue;
+    if (!is_unchanged) continue;
     if (step < 0.3) break;
     step *= 0.5;
   }

@@ -22,12 +22,13 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr double side_room_m = 0.1;
+constexpr double side_clearance_m = 0.1;
 
-// Returns the space where the robot has room on both sides; without any, all free space.
+// Returns the free space with clearance on both sides of the robot; all free space if there is
+// none.
 simulation::FreeSpace make_wide_free_space(const RouteScene& place) {
   simulation::FreeSpaceOptions options = simulation::free_space_options(place.scene);
-  options.robot_radius_m += side_room_m;
+  options.robot_radius_m += side_clearance_m;
   try {
     return simulation::FreeSpace(place.scene, options);
   } catch (const ContractError&) {
@@ -35,7 +36,7 @@ simulation::FreeSpace make_wide_free_space(const RouteScene& place) {
   }
 }
 
-// Returns the path with each position the mean of those within `reach` on both sides.
+// Returns the path with each position replaced by the mean of up to `reach` positions on each side.
 std::vector<Pose2> smooth_path(const std::vector<Pose2>& way, std::size_t reach) {
   std::vector<Pose2> result = way;
   for (std::size_t i = 0; i < way.size(); ++i) {
@@ -52,15 +53,15 @@ std::vector<Pose2> smooth_path(const std::vector<Pose2>& way, std::size_t reach)
   return result;
 }
 
-// True if the robot touches nothing on the straight line.
+// True if the robot can drive the straight line without contact.
 bool has_clear_line(const RouteScene& place, Point2 from, Point2 to) {
-  constexpr double fine_m = 0.025;
+  constexpr double fine_spacing_m = 0.025;
   return place.free_space->clearance_m(from) >= place.scene.robot_radius_m &&
          simulation::has_room_between(*place.free_space, place.scene.robot_radius_m, from, to,
-                                      fine_m);
+                                      fine_spacing_m);
 }
 
-// Returns the smallest clearance along a path.
+// Returns the smallest clearance of the poses of a path.
 double min_clearance_m(const RouteScene& place, const std::vector<Pose2>& way) {
   double min_m = std::numeric_limits<double>::infinity();
   for (const Pose2& pose : way) {
@@ -73,17 +74,17 @@ double direction(Point2 from, Point2 to) {
   return std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
 }
 
-// Returns the distance from the part of the path within 1.5 m of the estimated path length: a route
-// may pass by itself.
+// Returns the distance from the part of the path within 1.5 m of the path length `along_m`; other
+// parts of the route may pass nearby and must not count.
 double distance_from_expected_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
   constexpr double reach_m = 1.5;
   std::size_t begin = 0;
   std::size_t end = way.size();
-  double way_m = 0.0;
+  double path_m = 0.0;
   for (std::size_t i = 1; i < way.size(); ++i) {
-    way_m += distance(way[i - 1].position(), way[i].position());
-    if (way_m < along_m - reach_m) begin = i;
-    if (way_m > along_m + reach_m) {
+    path_m += distance(way[i - 1].position(), way[i].position());
+    if (path_m < along_m - reach_m) begin = i;
+    if (path_m > along_m + reach_m) {
       end = i + 1;
       break;
     }
@@ -91,18 +92,18 @@ double distance_from_expected_part_m(Point2 robot, std::span<const Pose2> way, d
   return simulation::distance_from_route_m(robot, way.subspan(begin, end - begin));
 }
 
-// Samples a start beside the route with a clear straight line onto it; the start itself if there is
-// none.
+// Samples a start at a lateral offset from the route's start, with a clear straight line to the
+// route; the route's start if there is none.
 Pose2 sample_start_with_offset(const RouteScene& place, std::span<const Point2> path,
-                               const Pose2& start, double off_m, Random& random) {
+                               const Pose2& start, double lateral_offset_m, Random& random) {
   const std::size_t ahead = std::min<std::size_t>(3, path.size() - 1);
   const double side = random.uniform() < 0.5 ? 1.0 : -1.0;
   for (const double angle :
        {0.5 * std::numbers::pi, -0.5 * std::numbers::pi, 0.75 * std::numbers::pi,
         -0.75 * std::numbers::pi, 0.25 * std::numbers::pi, -0.25 * std::numbers::pi}) {
     const Pose2 there =
-        start * Pose2{off_m * std::cos(side * angle), off_m * std::sin(side * angle),
-                      random.normal(0.0, radians(5.0))};
+        start * Pose2{lateral_offset_m * std::cos(side * angle),
+                      lateral_offset_m * std::sin(side * angle), random.normal(0.0, radians(5.0))};
     if (has_clear_line(place, there.position(), path.front()) &&
         has_clear_line(place, there.position(), path[ahead])) {
       return there;
@@ -111,25 +112,27 @@ Pose2 sample_start_with_offset(const RouteScene& place, std::span<const Point2> 
   return start;
 }
 
-// Returns a step past an obstacle: the nearest direction to the planned one, 15 degrees apart, in
-// which half of the step is free; nullopt if there is none.
+// Returns a step around an obstacle: half of the planned length, in the direction nearest to the
+// planned one (15 degrees apart) that is free; nullopt if there is none. Without obstacle returns
+// `planned`.
 std::optional<Pose2> find_step_past_obstacle(const RouteScene& place, const Pose2& robot,
                                              const Pose2& planned) {
   if (has_clear_line(place, robot.position(), (robot * planned).position())) return planned;
   const double half_m = 0.5 * std::hypot(planned.x_m, planned.y_m);
-  constexpr int feelers_each_side = 11;
+  constexpr int directions_per_side = 11;
   const auto step_along = [&](double direction_rad) {
     return Pose2{0.0, 0.0, direction_rad} * Pose2{half_m, 0.0, 0.0};
   };
-  const auto aside =
-      simulation::find_open_direction(0.0, feelers_each_side, 0, [&](double direction_rad) {
+  const auto free_direction =
+      simulation::find_open_direction(0.0, directions_per_side, 0, [&](double direction_rad) {
         return has_clear_line(place, robot.position(),
                               (robot * step_along(direction_rad)).position());
       });
-  return aside ? std::optional(step_along(aside->direction_rad)) : std::nullopt;
+  return free_direction ? std::optional(step_along(free_direction->direction_rad)) : std::nullopt;
 }
 
-// Returns a step of a widening spiral in search of the route, 0.5 m wide after some 25 steps.
+// Returns a step of a widening spiral that searches for the route; it is 0.5 m wide after about 25
+// steps.
 Pose2 spiral_step(int step) {
   const double turn = 1.0 / (1.0 + 0.15 * step);
   constexpr double step_m = 0.1;
@@ -152,33 +155,36 @@ std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m, d
   Random random(seed, 1);
   std::vector<Pose2> corners{space.random_pose(random)};
   double heading = corners.front().heading_rad;
-  double way_m = 0.0;
-  int refused = 0;
-  while (way_m < length_m) {
+  double path_m = 0.0;
+  int sharp_turn_trials = 0;
+  while (path_m < length_m) {
     const auto leg =
         space.shortest_path(corners.back().position(), space.random_pose(random).position());
     if (!leg || leg->size() < 2 || distance(leg->front(), leg->back()) < 0.5) continue;
-    // At most 100 degrees at once, if there is such a way.
-    constexpr int max_refused = 50;
+    // Avoid turns of more than 100 degrees, for at most 50 trials.
+    constexpr int max_sharp_turn_trials = 50;
     const double turn = angle_difference(direction((*leg)[0], (*leg)[1]), heading);
-    if (corners.size() > 1 && std::abs(turn) > radians(100.0) && ++refused < max_refused) continue;
-    refused = 0;
+    if (corners.size() > 1 && std::abs(turn) > radians(100.0) &&
+        ++sharp_turn_trials < max_sharp_turn_trials)
+      continue;
+    sharp_turn_trials = 0;
     for (std::size_t i = 1; i < leg->size(); ++i) {
-      way_m += distance((*leg)[i - 1], (*leg)[i]);
+      path_m += distance((*leg)[i - 1], (*leg)[i]);
       corners.push_back({(*leg)[i].x_m, (*leg)[i].y_m, 0.0});
     }
     heading = direction((*leg)[leg->size() - 2], leg->back());
   }
-  constexpr double fine_m = 0.05;
-  const std::vector<Pose2> sharp = simulation::resample(corners, fine_m);
-  // Rounds the corners as far as the free space allows, with a margin of one map cell.
+  constexpr double fine_spacing_m = 0.05;
+  const std::vector<Pose2> sharp = simulation::resample(corners, fine_spacing_m);
+  // Round the corners as far as the free space allows, with a margin of one map cell.
   constexpr double cell_m = 0.025;
-  const double room_kept_m = std::min(min_clearance_m(place, sharp) - cell_m,
-                                      place.scene.robot_radius_m + side_room_m - cell_m);
+  const double min_kept_clearance_m =
+      std::min(min_clearance_m(place, sharp) - cell_m,
+               place.scene.robot_radius_m + side_clearance_m - cell_m);
   std::vector<Pose2> way = sharp;
   for (const std::size_t reach : {10U, 7U, 5U, 3U, 2U}) {
     std::vector<Pose2> round = smooth_path(smooth_path(sharp, reach), reach);
-    if (min_clearance_m(place, round) < room_kept_m) continue;
+    if (min_clearance_m(place, round) < min_kept_clearance_m) continue;
     way = std::move(round);
     break;
   }
@@ -201,7 +207,7 @@ RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& wa
   return route;
 }
 
-Pose2 DriftingWheels::execute(const Pose2& commanded, Random& random) const {
+Pose2 ScaleErrorWheels::execute(const Pose2& commanded, Random& random) const {
   const double travel_m = travel * std::hypot(commanded.x_m, commanded.y_m);
   const double turned = turn * commanded.heading_rad;
   const Pose2 step{travel_m * std::cos(0.5 * turned), travel_m * std::sin(0.5 * turned), turned};
@@ -220,18 +226,18 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   Random random(seed, 1);
   Random noise_of_lines(seed, 2);
   const auto scale = [&] { return 1.0 + (random.uniform() < 0.5 ? -1.0 : 1.0) * options.drift; };
-  DriftingWheels wheels;
+  ScaleErrorWheels wheels;
   wheels.travel = scale();
   wheels.turn = scale();
-  Pose2 robot = sample_start_with_offset(place, path, start, options.start_off_m, random);
+  Pose2 robot = sample_start_with_offset(place, path, start, options.start_offset_m, random);
   tracker.set_pose(start);
   PathFollower follower(path);
   const auto max_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
   RouteRun run;
   Pose2 commanded;
-  // Odometry bridges a few lines without a fix; then the robot searches for the route.
-  constexpr int patience = 4;
-  int unknown = 0;
+  // Odometry bridges up to three lines without a fix; then the robot searches for the route.
+  constexpr int max_lines_without_fix = 4;
+  int lines_without_fix = 0;
   for (int step = 0; step < max_steps; ++step) {
     const auto line =
         simulation::take_line(*place.renderer, robot, place.camera, noise_of_lines.next());
@@ -239,10 +245,10 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     run.truth.push_back(robot);
     run.lateral_m.push_back(
         distance_from_expected_part_m(robot.position(), way, follower.along_m()));
-    unknown = found ? 0 : unknown + 1;
-    run.sightings.emplace_back();
+    lines_without_fix = found ? 0 : lines_without_fix + 1;
+    run.line_fixes.emplace_back();
     if (found) {
-      run.sightings.back() = RouteSighting{found->pose, found->along_m};
+      run.line_fixes.back() = RouteLineFix{found->pose, found->along_m};
       run.position_m.push_back(distance(found->pose.position(), robot.position()));
     } else {
       ++run.off_route;
@@ -253,23 +259,23 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
       run.arrived = true;
       break;
     }
-    const Pose2 planned = unknown < patience
+    const Pose2 planned = lines_without_fix < max_lines_without_fix
                               ? steer_to(estimate, *target, {.step_m = options.step_m})
-                              : spiral_step(unknown - patience);
+                              : spiral_step(lines_without_fix - max_lines_without_fix);
     const auto free_step = find_step_past_obstacle(place, robot, planned);
     if (!free_step) {
       run.blocked = true;
       break;
     }
     commanded = *free_step;
-    run.turned_aside += static_cast<std::size_t>(commanded != planned);
+    run.obstacle_steps += static_cast<std::size_t>(commanded != planned);
     const Pose2 there = robot * wheels.execute(commanded, random);
-    // A robot that its wheels led astray touches something: it turns, but does not move.
+    // Wheel errors may lead the robot into an obstacle: then it turns, but does not move.
     if (has_clear_line(place, robot.position(), there.position())) {
       robot = there;
     } else {
       robot.heading_rad = there.heading_rad;
-      ++run.turned_aside;
+      ++run.obstacle_steps;
     }
   }
   run.end_distance_m = distance(robot.position(), path.back());

@@ -10,19 +10,19 @@ namespace panonav::lab {
 
 /// Proportional control of a robot with differential drive [Y03 section 5.2].
 struct SteeringOptions {
-  double turn_gain = 0.8;     ///< share of the heading error turned in one step
+  double turn_gain = 0.8;     ///< fraction of the heading error that one step corrects
   double max_turn_rad = 0.5;  ///< in one step
-  double travel_gain = 0.8;   ///< share of the remaining distance driven in one step
-  double step_m = 0.05;       ///< longest step, > 0
-  /// With a larger heading error the robot turns on the spot. It then comes no nearer to obstacles
-  /// along its path than the path does.
+  double travel_gain = 0.8;   ///< fraction of the remaining distance that one step drives
+  double step_m = 0.05;       ///< largest distance of one step, > 0
+  /// Heading error above which the robot turns on the spot, so that it comes no nearer to obstacles
+  /// than its path does.
   double on_spot_rad = 0.5;
 };
 
 /// Returns the next step towards a goal, as an odometry step [Y03 section 5.2]. The robot turns by
-/// a share of its heading error and drives a share of the remaining distance. It drives less the
-/// farther the goal is off to the side, and not at all beyond `on_spot_rad`. Throws ContractError
-/// unless step_m > 0.
+/// a fraction of its heading error and drives a fraction of the remaining distance, times the
+/// cosine of the heading error; beyond `on_spot_rad` it only turns. Throws ContractError unless
+/// step_m > 0.
 [[nodiscard]] inline Pose2 steer_to(const Pose2& robot, Point2 goal,
                                     const SteeringOptions& options = {}) {
   require(options.step_m > 0.0, "step_m", options.step_m, "> 0");
@@ -35,7 +35,7 @@ struct SteeringOptions {
       std::abs(off) > options.on_spot_rad
           ? 0.0
           : std::min(options.step_m, options.travel_gain * std::hypot(dx, dy)) * std::cos(off);
-  // Wheels without slip: the chord of the step points along the heading at its middle.
+  // Without wheel slip the chord of the step points along the heading at half the turn.
   return {travel_m * std::cos(0.5 * turn), travel_m * std::sin(0.5 * turn), turn};
 }
 

@@ -30,9 +30,9 @@ py::array as_array(const py::handle& value, const char* what) {
   return py::reinterpret_borrow<py::array>(value);
 }
 
-/// In the byte order of this machine.
+/// True if the array has this type, in the byte order of this machine.
 template <class Value>
-bool has_type(const py::array& array) {
+bool has_dtype(const py::array& array) {
   return py::isinstance<py::array_t<Value>>(array);
 }
 
@@ -44,7 +44,7 @@ std::string dtype_text(const py::array& array) {
 
 PictureArray::PictureArray(const py::handle& value, const char* what)
     : array_(as_array(value, what)) {
-  if (!has_type<std::uint8_t>(array_)) {
+  if (!has_dtype<std::uint8_t>(array_)) {
     throw ContractError(std::string("dtype of ") + what, dtype_text(array_), "uint8");
   }
   const auto dimensions = array_.ndim();
@@ -83,17 +83,17 @@ Panorama panorama_from_array(const py::handle& value,
   }
   std::vector<float> values;
   values.reserve(static_cast<std::size_t>(array.size()));
-  const auto take = [&](const auto& numbers, float unit) {
+  const auto append_values = [&](const auto& numbers, float unit) {
     for (py::ssize_t y = 0; y < numbers.shape(0); ++y) {
       for (py::ssize_t c = 0; c < numbers.shape(1); ++c) {
         values.push_back(static_cast<float>(numbers(y, c)) / unit);
       }
     }
   };
-  if (has_type<float>(array)) {
-    take(py::array_t<float>(array).unchecked<2>(), 1.0F);
-  } else if (has_type<std::uint8_t>(array)) {
-    take(py::array_t<std::uint8_t>(array).unchecked<2>(), 255.0F);
+  if (has_dtype<float>(array)) {
+    append_values(py::array_t<float>(array).unchecked<2>(), 1.0F);
+  } else if (has_dtype<std::uint8_t>(array)) {
+    append_values(py::array_t<std::uint8_t>(array).unchecked<2>(), 255.0F);
   } else {
     throw ContractError("dtype of values", dtype_text(array), "float32, or uint8 for 0 to 1");
   }
@@ -102,10 +102,11 @@ Panorama panorama_from_array(const py::handle& value,
 }
 
 template <class Value>
-py::array_t<Value, py::array::c_style> exact_array(const py::handle& value, const char* what,
-                                                   std::vector<py::ssize_t> shape) {
+py::array_t<Value, py::array::c_style> require_exact_array(const py::handle& value,
+                                                           const char* what,
+                                                           std::vector<py::ssize_t> shape) {
   const py::array array = as_array(value, what);
-  if (!has_type<Value>(array)) {
+  if (!has_dtype<Value>(array)) {
     throw ContractError(std::string("dtype of ") + what, dtype_text(array),
                         std::string(py::str(py::dtype::of<Value>())));
   }
@@ -118,10 +119,10 @@ py::array_t<Value, py::array::c_style> exact_array(const py::handle& value, cons
   }
   return py::array_t<Value, py::array::c_style>::ensure(array);
 }
-template py::array_t<std::uint8_t, py::array::c_style> exact_array(const py::handle&, const char*,
-                                                                   std::vector<py::ssize_t>);
-template py::array_t<float, py::array::c_style> exact_array(const py::handle&, const char*,
-                                                            std::vector<py::ssize_t>);
+template py::array_t<std::uint8_t, py::array::c_style> require_exact_array(
+    const py::handle&, const char*, std::vector<py::ssize_t>);
+template py::array_t<float, py::array::c_style> require_exact_array(const py::handle&, const char*,
+                                                                    std::vector<py::ssize_t>);
 
 namespace {
 
@@ -135,8 +136,8 @@ py::list field_names(py::ssize_t columns) {
   return names;
 }
 
-/// The fields of structured poses side by side; another array is handed through.
-py::object without_structure(const py::handle& value, const char* what, py::ssize_t columns) {
+/// Converts structured poses to an array of columns; returns other arrays unchanged.
+py::object to_unstructured_array(const py::handle& value, const char* what, py::ssize_t columns) {
   auto array = py::reinterpret_borrow<py::object>(value);
   if (!py::isinstance<py::array>(value) || array.attr("dtype").attr("names").is_none())
     return array;
@@ -153,10 +154,10 @@ py::object without_structure(const py::handle& value, const char* what, py::ssiz
 
 }  // namespace
 
-py::array_t<double, py::array::c_style> number_rows(const py::handle& value, const char* what,
-                                                    py::ssize_t columns) {
+py::array_t<double, py::array::c_style> to_number_rows(const py::handle& value, const char* what,
+                                                       py::ssize_t columns) {
   const auto numbers = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
-      without_structure(value, what, columns));
+      to_unstructured_array(value, what, columns));
   if (!numbers) {
     PyErr_Clear();
     throw ContractError(what, std::string(py::str(py::type::of(value).attr("__name__"))),
@@ -169,13 +170,13 @@ py::array_t<double, py::array::c_style> number_rows(const py::handle& value, con
   return numbers;
 }
 
-py::array_t<std::uint8_t> array_of(const Image& image) {
+py::array_t<std::uint8_t> to_array(const Image& image) {
   std::vector<py::ssize_t> shape{image.height(), image.width()};
   if (image.channels() == 3) shape.push_back(3);
   return py::array_t<std::uint8_t>(shape, image.pixels().data());
 }
 
-py::array_t<double> pose_rows(std::span<const Pose2> poses) {
+py::array_t<double> to_pose_rows(std::span<const Pose2> poses) {
   py::array_t<double> rows({static_cast<py::ssize_t>(poses.size()), py::ssize_t{3}});
   auto row = rows.mutable_unchecked<2>();
   for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
@@ -187,7 +188,7 @@ py::array_t<double> pose_rows(std::span<const Pose2> poses) {
   return rows;
 }
 
-Observation observation_from(const py::handle& seen) {
+Observation to_observation(const py::handle& seen) {
   if (py::isinstance<Observation>(seen)) return seen.cast<const Observation&>();
   if (py::isinstance<Panorama>(seen)) return Observation(seen.cast<const Panorama&>());
   const bool is_path = py::isinstance<py::str>(seen) || py::hasattr(seen, "__fspath__");
@@ -214,9 +215,9 @@ void bind_arrays(py::module_& m) {
         return py::array(rows.attr("view")(fields).attr("reshape")(-1));
       },
       py::arg("rows"),
-      "An array of (n, 2), (n, 3) or (n, 4) as a structured one of n poses with the fields x_m, "
-      "y_m, heading_rad and, of four, stamp_s first; it looks at the same numbers where they are "
-      "float64 side by side. Functions that take rows of poses take such arrays, too.");
+      "Converts an array of (n, 2), (n, 3) or (n, 4) to a structured array of n poses, fields x_m, "
+      "y_m, heading_rad and, for 4 columns, stamp_s first; shares the memory of C-contiguous "
+      "float64 arrays. Functions that take rows of poses also take such arrays.");
 }
 
 }  // namespace panonav::python

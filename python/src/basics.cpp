@@ -20,11 +20,11 @@ void check_signals() {
 
 namespace {
 
-py::object plain(const py::handle& value) {
+py::object to_plain_value(const py::handle& value) {
   if (py::hasattr(value, "_fields")) return record_to_dict(value);
   if (!py::isinstance<py::list>(value)) return py::reinterpret_borrow<py::object>(value);
   py::list all;
-  for (const auto& one : value) all.append(plain(one));
+  for (const auto& one : value) all.append(to_plain_value(one));
   return all;
 }
 
@@ -50,7 +50,7 @@ std::string short_text(const py::handle& value) {
 
 py::dict record_to_dict(const py::handle& record) {
   py::dict all;
-  for (const auto& name : record.attr("_fields")) all[name] = plain(record.attr(name));
+  for (const auto& name : record.attr("_fields")) all[name] = to_plain_value(record.attr(name));
   return all;
 }
 
@@ -65,7 +65,7 @@ std::string record_text(const py::handle& record) {
 
 namespace {
 
-/// The exception class `name` of the package with these bases.
+/// Creates the exception class `name` with these bases and adds it to the module.
 py::object make_error(py::module_& m, const char* name, const py::tuple& bases, const char* doc) {
   const std::string full = std::string("panonav.") + name;
   auto type = py::reinterpret_steal<py::object>(
@@ -85,13 +85,13 @@ PyObject* file_error_type = nullptr;
 void bind_basics(py::module_& m) {
   const auto builtin = [](PyObject* type) { return py::reinterpret_borrow<py::object>(type); };
   const auto error = make_error(m, "Error", py::make_tuple(builtin(PyExc_Exception)),
-                                "Base of everything that panonav raises; one line says what is "
+                                "Base class of all exceptions of panonav; one line says what is "
                                 "wrong, where, which value was found and which are allowed.");
-  // Held for ever: translators may run until the interpreter ends.
+  // Never released, as translators may run until the interpreter ends.
   error_type = error.inc_ref().ptr();
   contract_error_type =
       make_error(m, "ContractError", py::make_tuple(error, builtin(PyExc_ValueError)),
-                 "A value that a function does not take.")
+                 "A value that a function does not accept.")
           .release()
           .ptr();
   option_error_type = make_error(m, "OptionError", py::make_tuple(error, builtin(PyExc_ValueError)),
@@ -119,7 +119,7 @@ void bind_basics(py::module_& m) {
 
   py::class_<Pose2> pose(m, "Pose2",
                          "Position and heading in the plane: x forward, y left, heading "
-                         "counter-clockwise; a tuple of three numbers counts as one.");
+                         "counter-clockwise. A tuple of three numbers is accepted, too.");
   pose.def(py::init<double, double, double>(), py::arg("x_m") = 0.0, py::arg("y_m") = 0.0,
            py::arg("heading_rad") = 0.0, "Lengths in metres, heading in radians.")
       .def(py::init([](const std::tuple<double, double, double>& numbers) {
@@ -127,12 +127,12 @@ void bind_basics(py::module_& m) {
            }),
            "Of (x_m, y_m, heading_rad).")
       .def_readonly("x_m", &Pose2::x_m, "Position along the frame's x axis.")
-      .def_readonly("y_m", &Pose2::y_m, "Position along its y axis.")
+      .def_readonly("y_m", &Pose2::y_m, "Position along the frame's y axis.")
       .def_readonly("heading_rad", &Pose2::heading_rad,
                     "In [-pi, pi) for every pose that panonav makes.")
       .def(
           "inverse", [](const Pose2& p) { return inverse(p); },
-          "Of the pose of b in the frame of a: the pose of a in the frame of b.")
+          "For the pose of b in the frame of a, returns the pose of a in the frame of b.")
       .def("__mul__", [](const Pose2& a, const Pose2& b) { return a * b; })
       .def("__eq__", [](const Pose2& a, const Pose2& b) { return a == b; })
       .def("__iter__",
@@ -146,8 +146,8 @@ void bind_basics(py::module_& m) {
   py::implicitly_convertible<py::list, Pose2>();
 
   py::class_<ReferencePose> reference(m, "ReferencePose",
-                                      "Where a view was taken; the heading may be unknown (None). "
-                                      "A tuple of two or three values counts as one.");
+                                      "Pose of a view; the heading may be unknown (None). "
+                                      "A tuple of two or three values is accepted, too.");
   reference
       .def(py::init<double, double, std::optional<double>>(), py::arg("x_m"), py::arg("y_m"),
            py::arg("heading_rad") = py::none(), "Lengths in metres, heading in radians.")

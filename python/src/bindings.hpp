@@ -23,16 +23,16 @@
 #include "panonav/panorama/picture.hpp"
 #include "panonav/pipeline/observation.hpp"
 
-/// Shared by the sources of the Python module: conversion of arrays, options, records and errors.
-/// All functions only call the library.
+/// Conversions of arrays, options, records and errors for all sources of the Python module. The
+/// bindings only call the library.
 namespace panonav::python {
 
 namespace py = pybind11;
 
 // Arrays. A wrong dtype, shape or kind throws ContractError that names the argument `what`.
 
-/// uint8 pixels of shape (rows, columns) or (rows, columns, 3), looked at in place wherever whole
-/// pixels lie side by side; else copied first. Rows may lie in any order.
+/// Views uint8 pixels of shape (rows, columns) or (rows, columns, 3) without a copy if the pixels
+/// of each row are contiguous; otherwise copies the array. Any row stride is allowed.
 class PictureArray {
  public:
   PictureArray(const py::handle& array, const char* what);
@@ -43,43 +43,44 @@ class PictureArray {
   py::array array_;
   ImageView view_;
 };
-/// float32, or uint8 (0 .. 255 as 0 .. 1), of shape (rows, columns) and with any strides.
+/// Makes a panorama of an array of float32, or uint8 scaled to 0 .. 1, of shape (rows, columns)
+/// with any strides.
 [[nodiscard]] Panorama panorama_from_array(const py::handle& array,
                                            const std::optional<ElevationBand>& elevations);
-/// Returns an array of exactly this dtype and shape (-1: any size): the same if it is C-contiguous,
-/// else a copy that is.
+/// Requires an array of exactly this dtype and shape (-1: any size). Returns the array if it is
+/// C-contiguous, otherwise a C-contiguous copy.
 template <class Value>
-[[nodiscard]] py::array_t<Value, py::array::c_style> exact_array(const py::handle& array,
-                                                                 const char* what,
-                                                                 std::vector<py::ssize_t> shape);
-/// Numbers of any type as float64 of shape (n, columns).
-[[nodiscard]] py::array_t<double, py::array::c_style> number_rows(const py::handle& array,
-                                                                  const char* what,
-                                                                  py::ssize_t columns);
-/// Makes a trajectory of rows of stamp_s, x_m, y_m, heading_rad. Throws ContractError.
-[[nodiscard]] Trajectory trajectory_of(const py::array_t<double, py::array::c_style>& rows);
-/// A read-only array of what `owner` holds; it keeps the owner alive.
+[[nodiscard]] py::array_t<Value, py::array::c_style> require_exact_array(
+    const py::handle& array, const char* what, std::vector<py::ssize_t> shape);
+/// Converts numbers of any type to float64 of shape (n, columns).
+[[nodiscard]] py::array_t<double, py::array::c_style> to_number_rows(const py::handle& array,
+                                                                     const char* what,
+                                                                     py::ssize_t columns);
+/// Makes a trajectory from rows of stamp_s, x_m, y_m, heading_rad. Throws ContractError.
+[[nodiscard]] Trajectory to_trajectory(const py::array_t<double, py::array::c_style>& rows);
+/// Returns a read-only array of data that `owner` holds; the array keeps the owner alive.
 template <class Value>
-[[nodiscard]] py::array_t<Value> read_only(std::vector<py::ssize_t> shape, const Value* data,
-                                           const py::handle& owner) {
+[[nodiscard]] py::array_t<Value> make_read_only_array(std::vector<py::ssize_t> shape,
+                                                      const Value* data, const py::handle& owner) {
   py::array_t<Value> array(std::move(shape), data, owner);
   py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
   return array;
 }
-[[nodiscard]] py::array_t<std::uint8_t> array_of(const Image& image);
-/// (n, 3) of x_m, y_m, heading_rad.
-[[nodiscard]] py::array_t<double> pose_rows(std::span<const Pose2> poses);
+[[nodiscard]] py::array_t<std::uint8_t> to_array(const Image& image);
+/// Returns an array of (n, 3) with columns x_m, y_m, heading_rad.
+[[nodiscard]] py::array_t<double> to_pose_rows(std::span<const Pose2> poses);
 
-/// The model of that name with these parameters, all of which must be its own.
-[[nodiscard]] CameraModel camera_model_from(const std::string& name, const py::dict& parameters);
-[[nodiscard]] ColumnDirection direction_of(const std::string& name);
+/// Makes the camera model of this name. Throws if it does not have one of the parameters.
+[[nodiscard]] CameraModel make_camera_model(const std::string& name, const py::dict& parameters);
+[[nodiscard]] ColumnDirection parse_direction(const std::string& name);
 
-/// An `Observation`, a `Panorama`, an array of pixels, or the path of a picture.
-[[nodiscard]] Observation observation_from(const py::handle& seen);
+/// Converts an `Observation`, a `Panorama`, an array of pixels, or the path of an image.
+[[nodiscard]] Observation to_observation(const py::handle& seen);
 
 // Options.
 
-/// Reads the keyword arguments of a call, each once; those left over are no options.
+/// Reads options from the keyword arguments of a call. Arguments that nothing has read are reported
+/// by `finish`.
 class Keywords {
  public:
   explicit Keywords(const py::kwargs& arguments);
@@ -93,7 +94,7 @@ class Keywords {
   }
   /// True if the caller passed this argument, read or not.
   [[nodiscard]] bool has(const std::string& name) const { return all_.contains(name); }
-  /// Throws OptionError on arguments that were not read, with the nearest name.
+  /// Throws OptionError, which proposes the most similar name, if an argument was not read.
   void finish() const;
 
  private:
@@ -116,16 +117,16 @@ template <class Options>
           },
           std::move(prefix)};
 }
-/// `text`, and a line for each option: name, type, default, range, meaning.
-[[nodiscard]] std::string with_options(const std::string& text,
-                                       const std::vector<ListedOptions>& listed);
+/// Returns `text` followed by a line for each option: name, type, default, range, meaning.
+[[nodiscard]] std::string append_option_list(const std::string& text,
+                                             const std::vector<ListedOptions>& listed);
 
 // Long work.
 
-/// Raises what a signal handler of Python asks for, such as KeyboardInterrupt; looks at most every
-/// 20 ms. Called without the GIL.
+/// Throws the exception of a pending Python signal handler, such as KeyboardInterrupt. Checks at
+/// most every 20 ms. Called without the GIL.
 void check_signals();
-/// An executor whose loops end when the user interrupts. 0 threads: one for each core.
+/// An executor whose loops end when the user interrupts. `threads` 0: one thread per core.
 class InterruptibleExecutor {
  public:
   explicit InterruptibleExecutor(int threads) : executor_(threads, check_signals) {}
@@ -135,8 +136,8 @@ class InterruptibleExecutor {
   Executor executor_;
 };
 
-/// A value shared by threads of Python: any number read at a time, one changes. The GIL is released
-/// meanwhile, so the result of `use` must hold nothing of Python.
+/// A value that Python threads share: several may read at the same time, or one may change it. The
+/// GIL is released during the access, so `use` must not touch Python objects or return them.
 template <class T>
 class Shared {
  public:
@@ -170,14 +171,15 @@ template <class T>
 class Record {
  public:
   Record(py::module_& m, const char* name, const char* doc) : class_(m, name, doc) {
-    class_.def("to_dict", &record_to_dict, "All fields; records within become dictionaries, too.");
+    class_.def("to_dict", &record_to_dict,
+               "Returns all fields; nested records also become dictionaries.");
     class_.def("__repr__", &record_text);
   }
   ~Record() { class_.attr("_fields") = py::tuple(names_); }
   Record(const Record&) = delete;
   Record& operator=(const Record&) = delete;
 
-  /// `member`: of the struct, or a function of it.
+  /// Adds a read-only field. `member` is a member of the struct or a function that takes it.
   template <class Member>
   Record& field(const char* name, const Member& member, const char* doc) {
     names_.append(name);
@@ -199,7 +201,7 @@ class Record {
 
 namespace pybind11::detail {
 
-/// Ids are numbers in Python.
+/// Converts ids to and from int in Python.
 template <class Tag>
 struct type_caster<panonav::Id<Tag>> {
   PYBIND11_TYPE_CASTER(panonav::Id<Tag>, const_name("int"));
@@ -214,7 +216,7 @@ struct type_caster<panonav::Id<Tag>> {
   }
 };
 
-/// Structs of two numbers are tuples in Python.
+/// Converts structs of two numbers to and from tuples in Python.
 template <class T, auto first, auto second>
 struct PairCaster {
   using Number = std::remove_cvref_t<decltype(std::declval<T>().*first)>;

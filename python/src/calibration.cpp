@@ -8,7 +8,7 @@ namespace panonav::python {
 
 namespace {
 
-/// Arrays of pixels, held as long as they are looked at.
+/// Pixel arrays and their views; keeps the arrays alive.
 class Pictures {
  public:
   explicit Pictures(const py::iterable& pictures) {
@@ -22,13 +22,13 @@ class Pictures {
   std::vector<ImageView> views_;
 };
 
-std::pair<double, double> pixel(const PixelPoint& point) {
+std::pair<double, double> to_pair(const PixelPoint& point) {
   return {point.u_px, point.v_px};
 }
 
-CameraModel mirror_model(const std::string& name, const py::dict& parameters,
-                         std::optional<double> rim_elevation_rad, double rim_radius_px) {
-  CameraModel model = camera_model_from(name, parameters);
+CameraModel make_mirror_model(const std::string& name, const py::dict& parameters,
+                              std::optional<double> rim_elevation_rad, double rim_radius_px) {
+  CameraModel model = make_camera_model(name, parameters);
   if (!rim_elevation_rad) return model;
   if (const auto* hyperboloid = std::get_if<HyperboloidalModel>(&model)) {
     return fit_focal_length(*hyperboloid, rim_radius_px, *rim_elevation_rad);
@@ -43,26 +43,26 @@ CameraModel mirror_model(const std::string& name, const py::dict& parameters,
 void bind_mirrors(py::module_& m) {
   Record<MirrorCircle::Circle>(m, "FoundCircle", "A circle found in an image.")
       .field(
-          "centre", [](const MirrorCircle::Circle& c) { return pixel(c.centre); }, "(u, v)")
-      .field("radius_px", &MirrorCircle::Circle::radius_px, "Of the circle, > 0.")
+          "centre", [](const MirrorCircle::Circle& c) { return to_pair(c.centre); }, "(u, v)")
+      .field("radius_px", &MirrorCircle::Circle::radius_px, "Radius of the circle, > 0.")
       .field("quality", &MirrorCircle::Circle::quality,
              "Part of the circumference with an edge, 0 to 1.")
       .field("residual_px", &MirrorCircle::Circle::residual_px,
-             "Of the edge points, across the circle.");
-  Record<MirrorCircle>(m, "MirrorCircle", "Where a mirror lies in the pictures of its camera.")
+             "Deviation of edge points from the circle.");
+  Record<MirrorCircle>(m, "MirrorCircle", "Position of a mirror in the images of its camera.")
       .field(
           "image_size",
           [](const MirrorCircle& c) { return std::pair(c.image_size.width, c.image_size.height); },
           "(width, height)")
       .field(
-          "centre", [](const MirrorCircle& c) { return pixel(c.centre); }, "(u, v) of the rim.")
-      .field("rim_radius_px", &MirrorCircle::rim_radius_px, "Where the mirrored scene ends.")
+          "centre", [](const MirrorCircle& c) { return to_pair(c.centre); }, "(u, v) of the rim.")
+      .field("rim_radius_px", &MirrorCircle::rim_radius_px, "Radius of the mirror's rim.")
       .field("inner_radius_px", &MirrorCircle::inner_radius_px,
-             "What the camera's own reflection covers, or None.")
-      .field("quality", &MirrorCircle::quality, "Of the rim, 0 to 1.")
-      .field("residual_px", &MirrorCircle::residual_px, "Of the rim.")
+             "Radius of the camera's own reflection, or None.")
+      .field("quality", &MirrorCircle::quality, "Part of the rim with an edge, 0 to 1.")
+      .field("residual_px", &MirrorCircle::residual_px, "Deviation of edge points from the rim.")
       .field("rim_per_image", &MirrorCircle::rim_per_image,
-             "As each image alone shows it; None where it does not.");
+             "Rim found in each image alone; None if it shows no rim.");
   m.def(
       "find_mirror",
       [](const py::iterable& pictures, const py::kwargs& keywords) {
@@ -73,9 +73,10 @@ void bind_mirrors(py::module_& m) {
         return find_mirror(all.views(), options);
       },
       py::arg("pictures"),
-      with_options("Finds the mirror in raw pictures of one camera, a list of uint8 arrays; more "
-                   "are better. None where no rim stands out.",
-                   {options_of<MirrorCircle::SearchOptions>()})
+      append_option_list(
+          "Finds the mirror in raw images of one camera, a list of uint8 arrays; more "
+          "images are better. None if no rim is visible.",
+          {options_of<MirrorCircle::SearchOptions>()})
           .c_str());
   m.def(
       "camera_from_mirror",
@@ -84,45 +85,48 @@ void bind_mirrors(py::module_& m) {
          const std::string& direction, double forward_angle_rad) {
         return camera_from_mirror(
             mirror,
-            {.model = mirror_model(model, parameters, rim_elevation_rad, mirror.rim_radius_px),
+            {.model = make_mirror_model(model, parameters, rim_elevation_rad, mirror.rim_radius_px),
              .inner_radius_px = inner_radius_px,
-             .direction = direction_of(direction),
+             .direction = parse_direction(direction),
              .forward_angle_rad = forward_angle_rad});
       },
       py::arg("mirror"), py::arg("model") = "equiangular", py::arg("parameters") = py::dict(),
       py::kw_only(), py::arg("rim_elevation_rad") = py::none(),
       py::arg("inner_radius_px") = py::none(), py::arg("direction") = "clockwise",
       py::arg("forward_angle_rad") = 0.0,
-      "The camera of a mirror that `find_mirror` found, by what no picture shows: the mirror's "
-      "shape, and where forward lies. `rim_elevation_rad` gives the focal length of hyperboloidal "
-      "and unified mirrors. `direction`: how a turn to the left runs, 'clockwise' where the camera "
-      "looks up into the mirror.");
+      "Makes the camera of a mirror that `find_mirror` found. Images do not show the mirror's "
+      "shape and the forward direction. `rim_elevation_rad` sets the focal length of hyperboloidal "
+      "and unified mirrors. `direction`: how the image moves in a turn to the left, 'clockwise' if "
+      "the camera looks up into the mirror.");
   m.def(
       "draw_mirror",
       [](const py::object& picture, const MirrorCircle& mirror,
          std::optional<double> forward_angle_rad) {
         const PictureArray pixels(picture, "picture");
-        return array_of(draw_mirror(pixels.view(), mirror, forward_angle_rad));
+        return to_array(draw_mirror(pixels.view(), mirror, forward_angle_rad));
       },
       py::arg("picture"), py::arg("mirror"), py::arg("forward_angle_rad") = py::none(),
-      "A colour copy for a person to check: rim, inner radius, centre and forward direction.");
+      "Returns a colour copy with rim, inner radius, centre and forward direction drawn, to "
+      "check.");
 }
 
 }  // namespace
 
 void bind_calibration(py::module_& m) {
   bind_mirrors(m);
-  Record<DualFisheyeCalibration>(m, "DualFisheyeCalibration", "Two lenses, as they were found.")
+  Record<DualFisheyeCalibration>(m, "DualFisheyeCalibration", "Calibration of two lenses.")
       .field("camera", &DualFisheyeCalibration::camera,
-             "Of the model 'dual-fisheye'; its axis of turns is the vertical.")
-      .field("matches", &DualFisheyeCalibration::matches, "Points found twice, no outliers.")
+             "Has the model 'dual-fisheye'; the camera was turned about its vertical.")
+      .field("matches", &DualFisheyeCalibration::matches,
+             "Number of matched points, without outliers.")
       .field("inlier_share", &DualFisheyeCalibration::inlier_share,
-             "Of the textured places looked at; some 0.1 by chance.")
+             "Share of textured points that match; about 0.1 by chance.")
       .field("residual_rad", &DualFisheyeCalibration::residual_rad,
              "Standard deviation of a match.")
       .field("azimuth_deviation_rad", &DualFisheyeCalibration::azimuth_deviation_rad,
              "Largest standard deviation of an azimuth on the horizon.")
-      .field("turns_rad", &DualFisheyeCalibration::turns_rad, "Of each picture against the first.");
+      .field("turns_rad", &DualFisheyeCalibration::turns_rad,
+             "Turn of each image since the first.");
   m.def(
       "calibrate_dual_fisheye",
       [](const py::iterable& pictures, double left_roll_rad, double right_roll_rad,
@@ -130,7 +134,7 @@ void bind_calibration(py::module_& m) {
          std::optional<double> turn_rad, const std::string& direction, int threads) {
         const DualFisheyeCalibration::Knowledge known{left_roll_rad,    right_roll_rad,
                                                       left_azimuth_rad, field_of_view_rad,
-                                                      turn_rad,         direction_of(direction)};
+                                                      turn_rad,         parse_direction(direction)};
         const Pictures all(pictures);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
@@ -144,9 +148,9 @@ void bind_calibration(py::module_& m) {
       py::arg("right_roll_rad") = 0.0, py::arg("left_azimuth_rad") = 0.0,
       py::arg("field_of_view_rad") = py::none(), py::arg("turn_rad") = py::none(),
       py::arg("direction") = "clockwise", py::arg("threads") = 0,
-      "Finds the two lenses of a 360 degree camera in pictures of one place, between which it was "
-      "turned about its vertical axis. Rolls: how what is above lies in each circle, to about 3 "
-      "degrees. None: found. Raises Error with the reason where the pictures do not determine it.");
+      "Finds the two lenses of a 360 degree camera in images of one place, between which it was "
+      "turned about its vertical axis. Rolls: direction of the sky in each circle, within about 3 "
+      "degrees. None: estimated. Raises Error with the reason if the images are not sufficient.");
 }
 
 }  // namespace panonav::python

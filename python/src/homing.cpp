@@ -11,29 +11,29 @@ namespace panonav::python {
 
 namespace {
 
-/// An answer and what was asked.
-struct NamedWay : HomingResult {
+/// A homing result with the name of its image.
+struct NamedHomingResult : HomingResult {
   std::string name;
 };
 
 void bind_vectors(py::module_& m) {
   Record<HomeVector>(m, "HomeVector", "The displacement and turn between two views.")
-      .field("xi", &HomeVector::xi, "Towards home, ahead of the robot, in units of R.")
-      .field("eta", &HomeVector::eta, "The same to its left.")
-      .field("heading_rad", &HomeVector::heading_rad, "Heading of home minus the current one.")
+      .field("xi", &HomeVector::xi, "Displacement home along the robot's heading, in units of R.")
+      .field("eta", &HomeVector::eta, "Displacement home to the robot's left, in units of R.")
+      .field("heading_rad", &HomeVector::heading_rad, "Heading at home minus the current heading.")
       .field("correlation", &HomeVector::correlation, "Similarity of the views, -1 to 1.")
-      .field("residual", &HomeVector::residual, "Share of the energy that is left unexplained.")
+      .field("residual", &HomeVector::residual, "Share of the energy that stays unexplained.")
       .field("confidence", &HomeVector::confidence, "0 to 1; near 0 at home.")
-      .field("frequencies", &HomeVector::frequencies, "Effective number of them.")
+      .field("frequencies", &HomeVector::frequencies, "Effective number of frequencies.")
       .field("length", &HomeVector::length, "In units of R.")
       .field("direction_rad", &HomeVector::direction_rad, "In the current robot frame.");
-  Record<ChanceMatch>(m, "ChanceMatch", "How well two views match, beside noise.")
-      .field("match", &ChanceMatch::match,
-             "Sum of the correlations of the home vectors there and back, -2 to 2.")
+  Record<ChanceMatch>(m, "ChanceMatch", "Match of two views, compared with noise.")
+      .field("match", &ChanceMatch::match, "Sum of the correlations of both home vectors, -2 to 2.")
       .field("chance", &ChanceMatch::chance,
-             "Mean of the same over noise with the spectrum of the current view.")
-      .field("deviation", &ChanceMatch::deviation, "Standard deviation of that.")
-      .field("beyond_chance", &ChanceMatch::is_beyond_chance, "The views have something in common.")
+             "Mean match with noise that has the spectrum of the current view.")
+      .field("deviation", &ChanceMatch::deviation, "Standard deviation of the match with noise.")
+      .field("beyond_chance", &ChanceMatch::is_beyond_chance,
+             "True if the match is better than chance.")
       .field("direction_probability", &ChanceMatch::direction_probability,
              "That the home vector points home within 45 degrees.");
   Record<PhaseReading>(m, "PhaseReading", "Relative pose of two views from their phases.")
@@ -43,20 +43,20 @@ void bind_vectors(py::module_& m) {
       .field("length", &PhaseReading::length, "In units of R.")
       .field("disagreement_rad", &PhaseReading::disagreement_rad, "Of the two directions.")
       .field("turn_disagreement_rad", &PhaseReading::turn_disagreement_rad, "Of the two turns.")
-      .field("points", &PhaseReading::has_direction, "False for pictures of one place.")
+      .field("points", &PhaseReading::has_direction, "False for images of one place.")
       .field("residual", &PhaseReading::residual,
              "Share of the energy of both views that is left unexplained, 0 to 1.");
-  py::class_<HomingView>(m, "HomingView", "A view as homing needs it.")
+  py::class_<HomingView>(m, "HomingView", "A view, prepared for homing.")
       .def(py::init([](const FourierSignature& signature, bool horizon) {
              return horizon ? horizon_view(signature) : homing_view(signature);
            }),
            py::arg("signature"), py::arg("horizon") = false,
-           "All rows of a signature, or their mean near the horizon.")
+           "Uses all rows of a signature, or the mean of those near the horizon.")
       .def_property_readonly("rows", &HomingView::rows,
                              "Number of rows, from the highest elevation to the lowest.")
       .def_property_readonly("components", &HomingView::components,
                              "Number of frequencies, from 0 on.");
-  const std::string option_text = with_options("", {options_of<FourierHomingOptions>()});
+  const std::string option_text = append_option_list("", {options_of<FourierHomingOptions>()});
   m.def(
       "home_vector",
       [](const HomingView& home, const HomingView& current, const py::kwargs& keywords) {
@@ -75,29 +75,30 @@ void bind_vectors(py::module_& m) {
         return compare_with_chance(home, current, options);
       },
       py::arg("home"), py::arg("current"),
-      ("How well two views match, beside how well noise does." + option_text).c_str());
+      ("Compares the match of two views with that of noise." + option_text).c_str());
   m.def(
       "image_difference",
       [](const HomingView& a, const HomingView& b, int highest) {
         return image_difference(a, b, highest);
       },
       py::arg("home"), py::arg("current"), py::arg("highest") = 0,
-      "0 for the same place, about 1 for unrelated views; at the heading that fits best.");
+      "Difference at the best heading: 0 for the same place, about 1 for unrelated views.");
   m.def(
       "read_phases", [](const HomingView& a, const HomingView& b) { return read_phases(a, b); },
-      py::arg("a"), py::arg("b"), "Reads both ways; None when either view has no structure.");
+      py::arg("a"), py::arg("b"),
+      "Relative pose from the phases of both views; None if a view has no structure.");
 }
 
-std::unique_ptr<HomingGuide> guide_to(const py::object& goal, const py::object& memory,
-                                      const std::optional<PictureSource>& source, bool horizon,
-                                      const py::kwargs& keywords) {
+std::unique_ptr<HomingGuide> make_homing_guide(const py::object& goal, const py::object& memory,
+                                               const std::optional<PictureSource>& source,
+                                               bool horizon, const py::kwargs& keywords) {
   FourierHomingOptions homing;
   HomingViewOptions views{.horizon = horizon};
   Keywords parsed(keywords);
   parsed.options(homing);
   if (memory.is_none()) {
     parsed.options(views.signature).options(views.preprocessing).finish();
-    const Observation observation = observation_from(goal);
+    const Observation observation = to_observation(goal);
     if (!source) throw ContractError("source", "None", "a PictureSource, without a memory");
     const py::gil_scoped_release free;
     return std::make_unique<HomingGuide>(observation, *source, views, homing);
@@ -113,11 +114,11 @@ std::unique_ptr<HomingGuide> guide_to(const py::object& goal, const py::object& 
   return make(MemoryFile::open(path, Access::read_only));
 }
 
-NamedWay way_from(const HomingGuide& guide, const Observation& observation) {
+NamedHomingResult compute_home_result(const HomingGuide& guide, const Observation& observation) {
   return {guide.home(observation), observation.name};
 }
 
-/// A survey and the pictures that it is about.
+/// A survey with the names of its views.
 struct NamedSurvey : CatchmentResult {
   std::vector<std::string> goal_names;
   std::vector<std::string> place_names;
@@ -136,47 +137,47 @@ NamedSurvey survey(const Dataset& homes, const std::optional<Dataset>& current,
                    std::optional<std::uint64_t> turn_seed, int threads) {
   InterruptibleExecutor executor(threads);
   const auto goals = read_views(homes, options, std::nullopt, executor);
-  const Dataset& there = current ? *current : homes;
+  const Dataset& current_recording = current ? *current : homes;
   const auto places =
-      current || turn_seed ? read_views(there, options, turn_seed, executor) : goals;
-  return {survey_catchment(goals, places, settings, there.folder.string(), executor), goals.files,
-          places.files};
+      current || turn_seed ? read_views(current_recording, options, turn_seed, executor) : goals;
+  return {survey_catchment(goals, places, settings, current_recording.folder.string(), executor),
+          goals.files, places.files};
 }
 
 void bind_catchment(py::module_& m) {
-  Record<CatchmentResult::Bin>(m, "CatchmentBin", "Pairs of a range of distances.")
+  Record<CatchmentResult::Bin>(m, "CatchmentBin", "Pairs of views in a range of distances.")
       .field(
           "distance_m", [](const CatchmentResult::Bin& b) { return b.homeward.distance_m; },
           "Middle of the range.")
       .field(
           "pairs", [](const CatchmentResult::Bin& b) { return b.homeward.pairs; },
-          "Of a place and a home in the range.")
+          "Number of pairs of a place and a home.")
       .field(
           "homeward_component", [](const CatchmentResult::Bin& b) { return b.homeward.component; },
           "Mean cosine between home vector and true direction; nan without pairs.")
       .field("orientation_error_rad", &CatchmentResult::Bin::orientation_error_rad,
              "Circular standard deviation.");
-  Record<NamedSurvey>(m, "CatchmentSurvey", "From how far the views of a recording lead home.")
-      .field("goal_names", &NamedSurvey::goal_names, "Of the views that are homes.")
-      .field("place_names", &NamedSurvey::place_names, "Of the views to go home from.")
+  Record<NamedSurvey>(m, "CatchmentSurvey", "Distances from which views of a recording lead home.")
+      .field("goal_names", &NamedSurvey::goal_names, "Names of the views that are homes.")
+      .field("place_names", &NamedSurvey::place_names, "Names of the current views.")
       .field(
-          "goals", [](const NamedSurvey& s) { return pose_rows(s.survey.goals); },
+          "goals", [](const NamedSurvey& s) { return to_pose_rows(s.survey.goals); },
           "(goals, 3) of x_m, y_m, heading_rad.")
       .field(
-          "places", [](const NamedSurvey& s) { return pose_rows(s.survey.places); },
-          "(places, 3) of x_m, y_m, heading_rad, as the robot was turned.")
-      .field("spacing_m", &NamedSurvey::spacing_m, "Of the places.")
+          "places", [](const NamedSurvey& s) { return to_pose_rows(s.survey.places); },
+          "(places, 3) of x_m, y_m, heading_rad, after random turns.")
+      .field("spacing_m", &NamedSurvey::spacing_m, "Spacing of the places.")
       .field("typical_distance_m", &NamedSurvey::typical_distance_m,
              "Distance for a home vector of length 1, metres.")
-      .field("pairs", &NamedSurvey::pairs, "At different places.")
+      .field("pairs", &NamedSurvey::pairs, "Number of pairs at different places.")
       .field("homeward_component", &NamedSurvey::component,
-             "Mean cosine between home vector and true direction: 1 straight home, 0 chance.")
+             "Mean cosine between home vector and true direction: 1 is straight home, 0 random.")
       .field("orientation_error_rad", &NamedSurvey::orientation_error_rad,
              "Circular standard deviation.")
-      .field("bins", &NamedSurvey::bins, "By distance.")
+      .field("bins", &NamedSurvey::bins, "Results by distance.")
       .field("accepted_m", &NamedSurvey::accepted_m, "Distances of `areas`: 0 to 5 spacings.")
       .field("areas", &NamedSurvey::areas,
-             "Mean number of places from which runs end so near, for each of accepted_m.")
+             "Mean number of places from which runs end within each distance of accepted_m.")
       .field(
           "homeward", [](const NamedSurvey& s) { return to_pair_matrix(s, s.survey.homeward); },
           "float32 of (goals, places): cosine between home vector and true direction; nan at home.")
@@ -185,7 +186,7 @@ void bind_catchment(py::module_& m) {
           "uint32 of (goals, places): the place to which the step leads.")
       .field(
           "end_m", [](const NamedSurvey& s) { return to_pair_matrix(s, s.final_m); },
-          "float32 of (goals, places): how far from home the run from this place ends.")
+          "float32 of (goals, places): distance from home at the end of the run.")
       .type()
       .def(
           "places_within",
@@ -195,7 +196,7 @@ void bind_catchment(py::module_& m) {
             return count_places_in_catchment(s, goal, accepted_m);
           },
           py::arg("goal"), py::arg("accepted_m"),
-          "Number of places from which runs to this goal end so near.");
+          "Number of places from which runs end within accepted_m of this goal.");
   m.def(
       "survey_catchment",
       [](const py::object& recording, const py::object& current,
@@ -218,9 +219,9 @@ void bind_catchment(py::module_& m) {
           }
           settings.homing = published_homing_options(*published, iterations);
         }
-        const Dataset homes = dataset_from(recording, source);
+        const Dataset homes = to_dataset(recording, source);
         std::optional<Dataset> second;
-        if (!current.is_none()) second = dataset_from(current, source, homes.source);
+        if (!current.is_none()) second = to_dataset(current, source, homes.source);
         const py::gil_scoped_release free;
         return survey(homes, second, views, settings, turn_seed, threads);
       },
@@ -228,16 +229,17 @@ void bind_catchment(py::module_& m) {
       py::kw_only(), py::arg("horizon") = false, py::arg("published") = py::none(),
       py::arg("stages") = std::vector<int>{}, py::arg("up_to_m") = py::none(),
       py::arg("bin_m") = py::none(), py::arg("turn_seed") = py::none(), py::arg("threads") = 0,
-      with_options(
-          "Measures from how far the views of a recording lead home, as `panonav catchment` does: "
+      append_option_list(
+          "Measures the distances from which views of a recording lead home, as `panonav "
+          "catchment`: "
           "home vectors between all pairs of views, and runs from place to place.\n\n"
-          "`current`: the recording of the views to go home from; None: the same. `horizon`: "
-          "compare the mean of the rows near the horizon alone. `published`: the rule as published "
-          "with this many frequencies, in place of the options of homing. `stages`: the highest "
-          "frequency of each stage of a run. `up_to_m`: leave pairs that are farther apart out of "
-          "the averages. `turn_seed`: turn the robot before each current view at random. Where "
-          "they are not given, max_step_m is twice the spacing of the places, obstacle_m 0.8 of "
-          "it, and typical_distance_m is learnt from near pairs.",
+          "`current`: recording of the current views; None: the same recording. `horizon`: "
+          "compare only the mean of the rows near the horizon. `published`: use the published rule "
+          "with this number of frequencies instead of the homing options. `stages`: the highest "
+          "frequency of each stage of a run. `up_to_m`: largest distance of pairs that are in "
+          "the averages. `turn_seed`: seed for random rotations of the current views. If "
+          "not set, max_step_m is twice the spacing of the places, obstacle_m is 0.8 times "
+          "the spacing, and typical_distance_m is estimated from near pairs.",
           {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
            options_of<PreprocessingOptions>(), options_of<HomingSurveyOptions>()})
           .c_str());
@@ -248,56 +250,59 @@ void bind_catchment(py::module_& m) {
 void bind_homing(py::module_& m) {
   bind_vectors(m);
   bind_catchment(m);
-  Record<NamedWay>(m, "WayHome", "The direction home computed from an observation.")
-      .field("name", &NamedWay::name, "Of the picture, where it has one.")
-      .field("known", &NamedWay::known, "Whether the views have more in common than chance gives.")
-      .field("direction_rad", &NamedWay::direction_rad,
-             "In the frame of the robot; None where nothing is known, and at home.")
-      .field("distance_r", &NamedWay::distance_r, "In units of R.")
-      .field("turn_rad", &NamedWay::turn_rad, "By which the robot has turned since.")
-      .field("probability", &NamedWay::probability,
+  Record<NamedHomingResult>(m, "WayHome", "The direction home computed from an observation.")
+      .field("name", &NamedHomingResult::name, "Name of the image, if it has one.")
+      .field("known", &NamedHomingResult::known, "True if the views match better than chance.")
+      .field("direction_rad", &NamedHomingResult::direction_rad,
+             "In the robot frame; None if it is unknown or the robot is at home.")
+      .field("distance_r", &NamedHomingResult::distance_r, "In units of R.")
+      .field("turn_rad", &NamedHomingResult::turn_rad, "Turn of the robot since the goal's view.")
+      .field("probability", &NamedHomingResult::probability,
              "That the direction is right within 45 degrees.")
-      .field("vector", &NamedWay::vector, "All that was found, known or not.");
+      .field("vector", &NamedHomingResult::vector, "The home vector, also if it is not known.");
   const std::string option_text =
-      with_options("", {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
-                        options_of<PreprocessingOptions>()});
+      append_option_list("", {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
+                              options_of<PreprocessingOptions>()});
   py::class_<HomingGuide>(m, "HomingGuide",
-                          "Tells the way back to a goal from one observation. Several threads may "
-                          "ask at a time.")
-      .def(py::init(&guide_to), py::arg("goal"), py::arg("memory") = py::none(),
+                          "Computes the direction to a goal from one observation. Several threads "
+                          "may use it at the same time.")
+      .def(py::init(&make_homing_guide), py::arg("goal"), py::arg("memory") = py::none(),
            py::arg("source") = py::none(), py::arg("horizon") = false,
            ("`goal`: name or id of a view of `memory` (a path or a MemoryFile); without a memory "
-            "an observation made there, and `source` says how pictures lie. `horizon`: compare the "
-            "mean of the rows near the horizon alone. Options of signature and preprocessing go "
+            "an observation made there, and `source` is the image layout. `horizon`: compare only "
+            "the "
+            "mean of the rows near the horizon. Options of signature and preprocessing are allowed "
             "without a memory only." +
             option_text)
                .c_str())
       .def(
           "home",
           [](const HomingGuide& guide, const py::object& observation) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             const py::gil_scoped_release free;
-            return way_from(guide, seen);
+            return compute_home_result(guide, seen);
           },
-          py::arg("observation"), "The way home from where an observation was made.")
+          py::arg("observation"), "Computes the direction home for an observation.")
       .def(
           "home_all",
           [](const HomingGuide& guide, const py::object& recording,
              const std::optional<PictureSource>& source, int threads) {
-            const Dataset dataset = dataset_from(recording, source);
+            const Dataset dataset = to_dataset(recording, source);
             const py::gil_scoped_release free;
             InterruptibleExecutor executor(threads);
-            std::vector<NamedWay> ways;
+            std::vector<NamedHomingResult> results;
             process_in_order(
                 dataset.entries.size(), executor,
                 [&](std::size_t i) {
-                  return way_from(guide, read_observation(dataset.entries[i]));
+                  return compute_home_result(guide, read_observation(dataset.entries[i]));
                 },
-                [&](std::size_t, NamedWay&& way) { ways.push_back(std::move(way)); });
-            return ways;
+                [&](std::size_t, NamedHomingResult&& result) {
+                  results.push_back(std::move(result));
+                });
+            return results;
           },
           py::arg("recording"), py::arg("source") = py::none(), py::arg("threads") = 0,
-          "The same for each picture of a Dataset or of what lies at a path.");
+          "Does the same for each image of a Dataset, or of the recording at a path.");
 }
 
 }  // namespace panonav::python

@@ -64,14 +64,15 @@ class KeywordReader final : public OptionVisitor {
   std::string prefix_;
 };
 
-std::string joined(const std::string& prefix) {
+std::string make_name_prefix(const std::string& prefix) {
   return prefix.empty() ? "" : prefix + "_";
 }
 
-/// A line of a docstring for each option.
-class Lister final : public OptionVisitor {
+/// Appends the description of each option that it visits to a docstring.
+class DocstringLister final : public OptionVisitor {
  public:
-  Lister(std::string& text, std::string prefix) : text_(text), prefix_(std::move(prefix)) {}
+  DocstringLister(std::string& text, std::string prefix)
+      : text_(text), prefix_(std::move(prefix)) {}
   void visit(const OptionInfo& info, int& value) override {
     list(info, "int", std::to_string(value), describe_range(info));
   }
@@ -105,7 +106,7 @@ class Lister final : public OptionVisitor {
 Keywords::Keywords(const py::kwargs& argument) : all_(argument), unread_(argument.attr("copy")()) {}
 
 void Keywords::apply(const std::string& prefix, const std::function<void(OptionVisitor&)>& visit) {
-  KeywordReader reader(unread_, known_, joined(prefix));
+  KeywordReader reader(unread_, known_, make_name_prefix(prefix));
   visit(reader);
 }
 
@@ -124,10 +125,10 @@ void Keywords::finish() const {
   throw OptionError(line);
 }
 
-std::string with_options(const std::string& text, const std::vector<ListedOptions>& listed) {
+std::string append_option_list(const std::string& text, const std::vector<ListedOptions>& listed) {
   std::string all = text + "\n\nOptions:";
   for (const ListedOptions& options : listed) {
-    Lister lister(all, joined(options.prefix));
+    DocstringLister lister(all, make_name_prefix(options.prefix));
     options.visit(lister);
   }
   return all;

@@ -15,7 +15,7 @@ namespace panonav::python {
 
 namespace {
 
-/// An answer and what was asked.
+/// A place with the name of its image.
 struct NamedPlace : Place {
   std::string name;
 };
@@ -24,42 +24,42 @@ struct NamedEstimate : MonteCarloEstimate {
 };
 
 void bind_places(py::module_& m) {
-  Record<PlaceMatch>(m, "PlaceMatch", "A view of the memory that a picture resembles.")
-      .field("name", &PlaceMatch::name, "Of the view.")
-      .field("view", &PlaceMatch::view, "Its id.")
-      .field("dissimilarity", &PlaceMatch::dissimilarity, "Integer L1 over packed magnitudes.")
+  Record<PlaceMatch>(m, "PlaceMatch", "A view of the memory that is similar to an image.")
+      .field("name", &PlaceMatch::name, "Name of the view.")
+      .field("view", &PlaceMatch::view, "Id of the view.")
+      .field("dissimilarity", &PlaceMatch::dissimilarity, "Integer L1 distance of magnitudes.")
       .field("column_difference", &PlaceMatch::column_difference,
-             "Column by column, after turning.")
+             "Difference column by column at the same heading.")
       .field("verified_features", &PlaceMatch::verified_features,
-             "Local features that agree; None where they do not decide.")
-      .field("heading_rad", &PlaceMatch::heading_rad, "Of the robot relative to this view.");
-  Record<PositionEstimate>(m, "PlacePosition", "A position and how far off it may be.")
+             "Number of matching local features; None if they were not compared.")
+      .field("heading_rad", &PlaceMatch::heading_rad, "Heading relative to this view.");
+  Record<PositionEstimate>(m, "PlacePosition", "A position and its uncertainty.")
       .field("x_m", &PositionEstimate::x_m,
              "Along the x axis of the frame of the memory's positions.")
-      .field("y_m", &PositionEstimate::y_m, "Along its y axis.")
+      .field("y_m", &PositionEstimate::y_m, "Along the y axis of the same frame.")
       .field("radius_m", &PositionEstimate::radius_m,
-             "The true position lies within it in 95 % of the cases.");
+             "The true position is within this radius in 95 % of cases.");
   Record<Circle>(m, "Circle", "A circle.")
       .field(
           "centre", [](const Circle& c) { return c.centre; }, "(x_m, y_m)")
       .field("radius_m", &Circle::radius_m, "0 for one point.");
   Record<LocalisationLevel>(m, "LocalisationLevel",
-                            "The area where the robot may be after some components.")
-      .field("components", &LocalisationLevel::components, "Compared.")
-      .field("candidates", &LocalisationLevel::candidates, "Views that may still be the place.")
-      .field("area_m2", &LocalisationLevel::area_m2, "Of the candidates' cells, or None.")
-      .field("region", &LocalisationLevel::region, "A circle that covers them, or None.")
-      .field("bytes_read", &LocalisationLevel::bytes_read, "By all levels so far.");
+                            "Area in which the robot may be, for a number of components.")
+      .field("components", &LocalisationLevel::components, "Number of compared components.")
+      .field("candidates", &LocalisationLevel::candidates, "Views at which the robot may be.")
+      .field("area_m2", &LocalisationLevel::area_m2, "Area of the candidates' cells, or None.")
+      .field("region", &LocalisationLevel::region, "A circle around the candidates, or None.")
+      .field("bytes_read", &LocalisationLevel::bytes_read, "Bytes read up to this level.");
   Record<NamedPlace>(m, "Place", "The position and heading of an image.")
-      .field("name", &NamedPlace::name, "Of the picture, where it has one.")
-      .field("known", &NamedPlace::known, "Whether the place is one of the memory's.")
-      .field("known_probability", &NamedPlace::known_probability, "That it is.")
+      .field("name", &NamedPlace::name, "Name of the image, if it has one.")
+      .field("known", &NamedPlace::known, "True if the place is in the memory.")
+      .field("known_probability", &NamedPlace::known_probability, "Probability of `known`.")
       .field("position", &NamedPlace::position, "None: unknown.")
       .field("heading_rad", &NamedPlace::heading_rad, "None: unknown.")
-      .field("matches", &NamedPlace::matches, "The best first; listed for unknown places, too.")
-      .field("components", &NamedPlace::components, "Compared.")
-      .field("bytes_read", &NamedPlace::bytes_read, "By the search.")
-      .field("areas", &NamedPlace::areas, "From coarse to fine, where they were asked for.");
+      .field("matches", &NamedPlace::matches, "Best first; also given for unknown places.")
+      .field("components", &NamedPlace::components, "Number of compared components.")
+      .field("bytes_read", &NamedPlace::bytes_read, "Bytes that the search read.")
+      .field("areas", &NamedPlace::areas, "Areas from coarse to fine, if requested.");
 }
 
 using SharedRecogniser = Shared<PlaceRecogniser>;
@@ -69,8 +69,8 @@ NamedPlace localise_one(const PlaceRecogniser& recogniser, const Observation& ob
   return {recogniser.localise(observation, excluded_names), observation.name};
 }
 
-PlaceRecogniserOptions recogniser_options(const std::optional<PictureSource>& source, bool areas,
-                                          const py::kwargs& keywords) {
+PlaceRecogniserOptions make_recogniser_options(const std::optional<PictureSource>& source,
+                                               bool areas, const py::kwargs& keywords) {
   PlaceRecogniserOptions options{.source = source};
   LocalisationAccuracy accuracy;
   Keywords parsed(keywords);
@@ -83,7 +83,7 @@ PlaceRecogniserOptions recogniser_options(const std::optional<PictureSource>& so
   return options;
 }
 
-/// `memory`: a path or a MemoryFile.
+/// Makes a recogniser. `memory` is a path or a MemoryFile.
 std::unique_ptr<SharedRecogniser> make_recogniser(const py::object& memory,
                                                   const PlaceRecogniserOptions& options) {
   if (py::isinstance<SharedFile>(memory)) {
@@ -114,61 +114,61 @@ std::vector<NamedPlace> localise_all(const SharedRecogniser& recogniser, const D
 }
 
 void bind_recogniser(py::module_& m) {
-  const std::string option_text =
-      with_options("", {options_of<LocaliserOptions>(), options_of<LocalisationAccuracy>("area")});
+  const std::string option_text = append_option_list(
+      "", {options_of<LocaliserOptions>(), options_of<LocalisationAccuracy>("area")});
   py::class_<SharedRecogniser>(
       m, "PlaceRecogniser",
-      "Tells from one picture where it was taken, by a memory file. Several threads may ask at a "
+      "Finds the place of an image in a memory file. Several threads may use it at the same "
       "time.")
       .def(py::init([](const py::object& memory, const std::optional<PictureSource>& source,
                        bool areas, const py::kwargs& keywords) {
-             return make_recogniser(memory, recogniser_options(source, areas, keywords));
+             return make_recogniser(memory, make_recogniser_options(source, areas, keywords));
            }),
            py::arg("memory"), py::arg("source") = py::none(), py::arg("areas") = false,
-           ("`memory`: the path of a memory file, or a MemoryFile. `source`: how pictures lie; "
-            "None: as the memory's own. `areas`: also tell the area where the robot may be; only "
-            "then there are options area_*." +
+           ("`memory`: the path of a memory file, or a MemoryFile. `source`: image layout; "
+            "None: that of the memory. `areas`: also find the area in which the robot may be; only "
+            "then the options area_* are allowed." +
             option_text)
                .c_str())
       .def(
           "localise",
           [](const SharedRecogniser& recogniser, const py::object& observation,
              const std::vector<std::string>& excluded_names) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             return recogniser.read(
                 [&](const PlaceRecogniser& r) { return localise_one(r, seen, excluded_names); });
           },
           py::arg("observation"), py::arg("excluded_names") = std::vector<std::string>{},
-          "Where an observation was made: an Observation, a Panorama, an array of pixels, or the "
-          "path of a picture. Views called `excluded_names` are not found.")
+          "Finds the place of an Observation, a Panorama, an array of pixels, or the "
+          "path of an image. Views with names in `excluded_names` are ignored.")
       .def(
           "localise_all",
           [](const SharedRecogniser& recogniser, const py::object& recording,
              bool exclude_same_file, int threads) {
             const auto source = recogniser.read(
                 [](const PlaceRecogniser& r) { return r.encoder().header().source; });
-            return localise_all(recogniser, dataset_from(recording, std::nullopt, source),
+            return localise_all(recogniser, to_dataset(recording, std::nullopt, source),
                                 exclude_same_file, threads);
           },
           py::arg("recording"), py::kw_only(), py::arg("exclude_same_file") = false,
           py::arg("threads") = 0,
-          "The same for each picture of a Dataset or of what lies at a path, on all threads.")
+          "Does the same for each image of a Dataset, or of the recording at a path.")
       .def(
           "packed",
           [](const SharedRecogniser& recogniser, const py::object& observation) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             return recogniser.read(
                 [&](const PlaceRecogniser& r) { return r.encoder().packed(seen); });
           },
-          py::arg("observation"), "The signature that is compared.")
+          py::arg("observation"), "Returns the packed signature that is compared.")
       .def(
           "panorama",
           [](const SharedRecogniser& recogniser, const py::object& observation) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             return recogniser.read(
                 [&](const PlaceRecogniser& r) { return r.encoder().panorama(seen); });
           },
-          py::arg("observation"), "The panorama as the memory has it.")
+          py::arg("observation"), "Returns the panorama in the shape of the memory.")
       .def_property_readonly(
           "memory",
           [](const SharedRecogniser& recogniser) {
@@ -188,22 +188,22 @@ void bind_recogniser(py::module_& m) {
           },
           py::arg("signature"), py::arg("name"), py::arg("pose") = py::none(),
           py::arg("stamp_s") = py::none(),
-          "A view that can be found from now on; the file is not touched.");
+          "Adds a view that can be found from now on; the file does not change.");
   m.def(
       "localise",
       [](const py::object& memory, const py::object& observation, bool areas,
          const py::kwargs& keywords) {
         const auto recogniser =
-            make_recogniser(memory, recogniser_options(std::nullopt, areas, keywords));
-        const Observation seen = observation_from(observation);
+            make_recogniser(memory, make_recogniser_options(std::nullopt, areas, keywords));
+        const Observation seen = to_observation(observation);
         return recogniser->read(
             [&](const PlaceRecogniser& r) { return localise_one(r, seen, {}); });
       },
       py::arg("memory"), py::arg("observation"), py::arg("areas") = false,
-      ("Tells from one picture where it was taken and which way the robot faced. Who asks more "
-       "than once makes a PlaceRecogniser.\n\n"
+      ("Finds position and heading of one image. To localise several images, make "
+       "a PlaceRecogniser.\n\n"
        "`memory`: the path of a memory file, or a MemoryFile. `observation`: an Observation, a "
-       "Panorama, an array of pixels (uint8), or the path of a picture, which lies as those of "
+       "Panorama, an array of pixels (uint8), or the path of an image, with the image layout of "
        "the memory." +
        option_text)
           .c_str());
@@ -230,9 +230,9 @@ std::vector<NamedEstimate> track_recording(Tracker& tracker, Dataset run, std::s
 }
 
 void bind_tracker(py::module_& m) {
-  Record<PoseMode>(m, "PoseMode", "Particles that lie together.")
-      .field("weight", &PoseMode::weight, "Sum over its particles.")
-      .field("mean", &PoseMode::mean, "Weighted; the heading is the circular mean.")
+  Record<PoseMode>(m, "PoseMode", "A cluster of particles.")
+      .field("weight", &PoseMode::weight, "Sum of the weights of its particles.")
+      .field("mean", &PoseMode::mean, "Weighted mean; the heading is the circular mean.")
       .field(
           "covariance",
           [](const PoseMode& mode) {
@@ -241,35 +241,33 @@ void bind_tracker(py::module_& m) {
           "(3, 3) of x, y in m and heading in rad.")
       .field("spread_m", &PoseMode::spread_m,
              "Root mean square distance of the particles from the mean.")
-      .field("heading_spread_rad", &PoseMode::heading_spread_rad, "The same of the headings.");
-  Record<NamedEstimate>(m, "MonteCarloEstimate", "Where a tracked robot is.")
-      .field("name", &NamedEstimate::name, "Of the picture, where it has one.")
+      .field("heading_spread_rad", &PoseMode::heading_spread_rad, "Same for the headings.");
+  Record<NamedEstimate>(m, "MonteCarloEstimate", "Estimated pose of a tracked robot.")
+      .field("name", &NamedEstimate::name, "Name of the image, if it has one.")
       .field(
           "state", [](const NamedEstimate& e) { return name_of(e.state); },
           "'localised', 'ambiguous' or 'lost'.")
-      .field("pose", &NamedEstimate::pose, "Mean of the heaviest mode; None when lost.")
-      .field("inside", &NamedEstimate::inside, "Belief that the robot is in the memorised area.")
-      .field("probability", &NamedEstimate::probability, "That it is at the heaviest mode.")
-      .field("modes", &NamedEstimate::modes, "Heaviest first.")
+      .field("pose", &NamedEstimate::pose, "Mean of the largest mode; None if lost.")
+      .field("inside", &NamedEstimate::inside, "Probability that it is in the memory's area.")
+      .field("probability", &NamedEstimate::probability, "That it is at the largest mode.")
+      .field("modes", &NamedEstimate::modes, "Largest weight first.")
       .field("spread_m", &NamedEstimate::spread_m,
              "Root mean square distance of all particles from their mean.")
-      .field("particles", &NamedEstimate::particles,
-             "Number of them; as many as KLD sampling asks for.")
+      .field("particles", &NamedEstimate::particles, "Number of particles, set by KLD sampling.")
       .field("effective_particles", &NamedEstimate::effective_particles,
-             "Effective number of them, before resampling.")
-      .field("resampled", &NamedEstimate::resampled,
-             "Whether light particles were replaced by heavy ones.")
-      .field("injected", &NamedEstimate::injected, "Particles that were replaced by new ones.")
+             "Effective sample size before resampling.")
+      .field("resampled", &NamedEstimate::resampled, "True if the particles were resampled.")
+      .field("injected", &NamedEstimate::injected, "Number of particles replaced by new ones.")
       .field("difference_here", &NamedEstimate::difference_here,
-             "Least column difference (0: equal, above about 0.6: unrelated) from the views near "
+             "Smallest column difference (0: equal, above about 0.6: unrelated) to views near "
              "the particles, or None.")
       .field("difference_anywhere", &NamedEstimate::difference_anywhere,
-             "The same from views anywhere, or None.");
+             "Smallest column difference to any view, or None.");
   using SharedTracker = Shared<Tracker>;
   py::class_<SharedTracker>(
       m, "Tracker",
-      "Follows a moving robot through its pictures and odometry by a memory file. The robot starts "
-      "anywhere in the memorised area.")
+      "Tracks a moving robot with images, odometry and a memory file. The robot starts "
+      "anywhere in the area of the memory.")
       .def(py::init([](const py::object& memory, const std::optional<PictureSource>& source,
                        bool visual_odometry, const py::kwargs& keywords) {
              TrackerOptions options{.source = source};
@@ -284,33 +282,34 @@ void bind_tracker(py::module_& m) {
              return std::make_unique<SharedTracker>(path, options);
            }),
            py::arg("memory"), py::arg("source") = py::none(), py::arg("visual_odometry") = false,
-           with_options("`memory`: the path of a memory file, or a MemoryFile. `visual_odometry`: "
-                        "the robot's motion is read from pictures, and as uncertain as that is.",
-                        {options_of<MonteCarloOptions>(), options_of<OdometryNoise>()})
+           append_option_list(
+               "`memory`: the path of a memory file, or a MemoryFile. `visual_odometry`: "
+               "use the noise of motion that is computed from images.",
+               {options_of<MonteCarloOptions>(), options_of<OdometryNoise>()})
                .c_str())
       .def(
           "observe",
           [](SharedTracker& tracker, const py::object& observation) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             return tracker.change([&](Tracker& t) {
               return NamedEstimate{t.observe(seen), seen.name};
             });
           },
           py::arg("observation"),
-          "Moves by the odometry, where the observation has one, and takes the picture into "
-          "account.")
+          "Moves the particles by the odometry, if the observation has one, and weights them by "
+          "the image.")
       .def(
           "move_to",
           [](SharedTracker& tracker, const Pose2& odometry) {
             tracker.change([&](Tracker& t) { t.move_to(odometry); });
           },
-          py::arg("odometry"), "Odometry between pictures, absolute in its own frame.")
+          py::arg("odometry"), "Moves the particles; `odometry` is a pose in the odometry frame.")
       .def(
           "start_anywhere",
           [](SharedTracker& tracker, std::optional<double> heading_rad) {
             tracker.change([&](Tracker& t) { t.start_globally(heading_rad); });
           },
-          py::arg("heading_rad") = py::none(), "Forgets what is known of the robot.")
+          py::arg("heading_rad") = py::none(), "Starts again at an unknown position.")
       .def(
           "start_at",
           [](SharedTracker& tracker, const Pose2& pose, double deviation_m,
@@ -319,7 +318,7 @@ void bind_tracker(py::module_& m) {
                 [&](Tracker& t) { t.start_at(pose, deviation_m, heading_deviation_rad); });
           },
           py::arg("pose"), py::arg("deviation_m"), py::arg("heading_deviation_rad"),
-          "Around a known pose in the frame of the memory's positions; deviations of each "
+          "Starts again around a pose in the memory's frame; standard deviations of each "
           "coordinate, >= 0.")
       .def(
           "track",
@@ -327,17 +326,17 @@ void bind_tracker(py::module_& m) {
             require(every >= 1, "every", every, ">= 1");
             const auto source =
                 tracker.read([](const Tracker& t) { return t.encoder().header().source; });
-            Dataset run = dataset_from(recording, std::nullopt, source);
+            Dataset run = to_dataset(recording, std::nullopt, source);
             return tracker.change([&](Tracker& t) {
               return track_recording(t, std::move(run), static_cast<std::size_t>(every), threads);
             });
           },
           py::arg("recording"), py::kw_only(), py::arg("every") = 1, py::arg("threads") = 0,
-          "Follows the robot of a Dataset, or of what lies at a path, as `panonav track` does: "
+          "Tracks the robot of a Dataset, or of the recording at a path, like `panonav track`: "
           "moves "
-          "with each picture's odometry and looks at every n-th picture. Without odometry motion "
+          "with each odometry pose and observes every n-th image. Without odometry, motion "
           "is "
-          "read from the pictures; a tracker for that is made with `visual_odometry`.")
+          "computed from the images; set `visual_odometry` for such a tracker.")
       .def(
           "particles",
           [](const SharedTracker& tracker) {
@@ -354,27 +353,26 @@ void bind_tracker(py::module_& m) {
             }
             return rows;
           },
-          "(n, 4) of x_m, y_m, heading_rad, weight.");
+          "Returns (n, 4) of x_m, y_m, heading_rad, weight.");
 }
 
 void bind_updater(py::module_& m) {
   using Changes = MemoryUpdater::Changes;
   Record<Changes>(m, "MemoryUpdaterChanges", "Changes of a memory by a run.")
-      .field("seen", &Changes::observations, "Observations with odometry.")
-      .field("certain", &Changes::certain, "Of these, whose place was certain and new.")
-      .field("reinforced", &Changes::reinforced,
-             "Views of the memory that explained what the robot saw.")
-      .field("added", &Changes::added, "Views of this run.")
-      .field("replaced", &Changes::replaced, "Views that were dropped for added ones.")
+      .field("seen", &Changes::observations, "Number of observations with odometry.")
+      .field("certain", &Changes::certain, "Number of these whose place was certain and new.")
+      .field("reinforced", &Changes::reinforced, "Number of views that matched the robot's images.")
+      .field("added", &Changes::added, "Number of added views.")
+      .field("replaced", &Changes::replaced, "Views that were replaced by added ones.")
       .field("forgotten", &Changes::forgotten,
-             "Views that were dropped because they had failed for long.")
-      .field("views", &Changes::views, "Of the memory now.");
+             "Views that were deleted because they often did not match.")
+      .field("views", &Changes::views, "Number of views in the memory now.");
   using SharedUpdater = Shared<MemoryUpdater>;
   py::class_<SharedUpdater>(
       m, "MemoryUpdater",
-      "Keeps a memory file true while its places change: hears what a robot saw on a run and what "
-      "the memory answered, and `finish` changes the file, in one step that MemoryFile.undo takes "
-      "back. It is for one run; recognisers that were made before know the former views.")
+      "Updates a memory file when its places change. It collects observations of a run and their "
+      "answers; `finish` then changes the file in one step, which MemoryFile.undo can "
+      "revert. Use it for one run; recognisers that already exist keep the old views.")
       .def(py::init([](const std::filesystem::path& memory, const py::kwargs& keywords) {
              MemoryUpdateOptions options;
              Keywords(keywords).options(options).finish();
@@ -382,35 +380,36 @@ void bind_updater(py::module_& m) {
              return std::make_unique<SharedUpdater>(memory, options);
            }),
            py::arg("memory"),
-           with_options("`memory`: the path of a memory file that can be written, or the address "
-                        "of a memory on a server.",
-                        {options_of<MemoryUpdateOptions>()})
+           append_option_list(
+               "`memory`: the path of a memory file that can be written, or the address "
+               "of a memory on a server.",
+               {options_of<MemoryUpdateOptions>()})
                .c_str())
       .def(
           "see",
           [](SharedUpdater& updater, const py::object& observation, const Panorama& panorama,
              const NamedPlace& place) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             updater.change([&](MemoryUpdater& u) { u.observe(seen, panorama, place); });
           },
           py::arg("observation"), py::arg("panorama"), py::arg("place"),
-          "The next observation of the run, which needs its odometry (another says nothing and is "
-          "left out), with its panorama (PlaceRecogniser.panorama) and its answer.")
+          "Adds the next observation of the run, which needs odometry (without it, it is "
+          "ignored), with its panorama (PlaceRecogniser.panorama) and its answer.")
       .def_property_readonly(
           "near_known_places",
           [](const SharedUpdater& updater) {
             return updater.read([](const MemoryUpdater& u) { return u.is_near_known_place(); });
           },
-          "Whether the observation seen last is so near to one whose place was surely known that "
-          "it will be placed by odometry.")
+          "True if the last observation is so near to one with a certain place that "
+          "odometry gives its position.")
       .def(
           "finish",
           [](SharedUpdater& updater, const std::string& what) {
             return updater.change([&](MemoryUpdater& u) { return u.finish(what); });
           },
           py::arg("what"),
-          "Changes the file and learns its models again. `what`: the run, for the file's history. "
-          "Once.");
+          "Changes the file and learns its models again. `what` names the run in the history. "
+          "Call it once.");
 }
 
 }  // namespace

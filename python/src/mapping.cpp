@@ -15,15 +15,15 @@ namespace {
 
 constexpr std::array<const char*, 3> link_names{"sequence", "neighbour", "closure"};
 
-/// x_m, y_m, heading_rad of each.
+/// Returns rows of x_m, y_m, heading_rad, one per node.
 template <class Nodes>
-py::array_t<double> poses_of(const Nodes& nodes) {
+py::array_t<double> to_pose_rows_of_nodes(const Nodes& nodes) {
   std::vector<Pose2> poses;
   for (const auto& node : nodes) poses.push_back(node.pose);
-  return pose_rows(poses);
+  return to_pose_rows(poses);
 }
 
-MapperOptions mapper_options(const py::kwargs& keywords, SignatureOptions* signature) {
+MapperOptions make_mapper_options(const py::kwargs& keywords, SignatureOptions* signature) {
   MapperOptions options;
   Keywords parsed(keywords);
   parsed.options(options.mapping)
@@ -35,17 +35,17 @@ MapperOptions mapper_options(const py::kwargs& keywords, SignatureOptions* signa
   return options;
 }
 
-/// Does the same as the verb `map`: views that the file does not know are appended to it.
+/// Does the same as the verb `map`: appends views that are not in the file.
 Mapper::Result make_map(const Dataset& recording, const std::filesystem::path& path,
                         const SignatureOptions& signature, const MapperOptions& options,
                         int threads) {
   InterruptibleExecutor executor(threads);
-  const bool there = memory_exists(path);
-  Mapper mapper(there ? MemoryFile::open(path, Access::read_write)
-                      : MemoryFile::create(
-                            path, make_header_from_recording(recording, signature, {}, executor)),
+  const bool memory_existed = memory_exists(path);
+  Mapper mapper(memory_existed ? MemoryFile::open(path, Access::read_write)
+                               : MemoryFile::create(path, make_header_from_recording(
+                                                              recording, signature, {}, executor)),
                 recording.source, options);
-  if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), executor);
+  if (memory_existed) check_known_views(recording, mapper.memory(), mapper.encoder(), executor);
   return mapper.map(recording, executor);
 }
 
@@ -54,10 +54,10 @@ void bind_maps(py::module_& m) {
       .field("view", &TopologicalMap::Node::view, "Its id in the memory.")
       .field("pose", &TopologicalMap::Node::pose, "In the frame of its connected component.")
       .field("component", &TopologicalMap::Node::component,
-             "Number of its connected component; components have no common frame.");
+             "Index of its connected component; components have no common frame.");
   Record<TopologicalMap::Edge>(m, "MapEdge", "Two nodes and the motion between them.")
-      .field("a", &TopologicalMap::Edge::a, "One node, by its view.")
-      .field("b", &TopologicalMap::Edge::b, "The other.")
+      .field("a", &TopologicalMap::Edge::a, "View of one node.")
+      .field("b", &TopologicalMap::Edge::b, "View of the other node.")
       .field("a_from_b", &TopologicalMap::Edge::a_from_b, "Pose of b in the frame of a.")
       .field(
           "kind",
@@ -65,23 +65,22 @@ void bind_maps(py::module_& m) {
             return link_names[static_cast<std::size_t>(e.kind)];
           },
           "'sequence', 'neighbour' or 'closure'.")
-      .field("weight", &TopologicalMap::Edge::weight,
-             "Small where the rest of the map contradicts.");
+      .field("weight", &TopologicalMap::Edge::weight, "Small if other edges contradict it.");
   Record<TopologicalMap>(m, "TopologicalMap", "A map of places with closed loops.")
       .field("nodes", &TopologicalMap::nodes, "Ascending by view.")
-      .field("edges", &TopologicalMap::edges, "Each joins two nodes of the map.")
+      .field("edges", &TopologicalMap::edges, "Each connects two nodes of the map.")
       .type()
       .def(
-          "poses", [](const TopologicalMap& map) { return poses_of(map.nodes); },
-          "(n, 3) of x_m, y_m, heading_rad, a row a node.");
+          "poses", [](const TopologicalMap& map) { return to_pose_rows_of_nodes(map.nodes); },
+          "Returns (n, 3) of x_m, y_m, heading_rad, one row per node.");
   Record<Mapper::Result>(m, "MappedRun", "The map of a Mapper's observations.")
       .field("map", &Mapper::Result::map, "All nodes and edges.")
-      .field("observations", &Mapper::Result::observations, "By node: its number, from 0.")
-      .field("skipped", &Mapper::Result::skipped, "Observations that differed too little.")
-      .field("scale_m", &Mapper::Result::scale_m, "Metres for a unit of length of the views.")
-      .field("wheels", &Mapper::Result::wheels, "Steps come from odometry.")
-      .field("mapping_s", &Mapper::Result::mapping_s, "Time of the mapping itself.");
-  const std::string option_text = with_options(
+      .field("observations", &Mapper::Result::observations, "Index of each node's observation.")
+      .field("skipped", &Mapper::Result::skipped, "Number of too similar observations.")
+      .field("scale_m", &Mapper::Result::scale_m, "Metres per unit of visual length.")
+      .field("wheels", &Mapper::Result::wheels, "True if steps come from odometry.")
+      .field("mapping_s", &Mapper::Result::mapping_s, "Duration of the mapping in seconds.");
+  const std::string option_text = append_option_list(
       "", {options_of<MappingOptions>(), options_of<VisualOdometryOptions>(),
            options_of<LoopClosureOptions>("closure"), options_of<PoseGraphOptions>("graph")});
   using SharedMapper = Shared<Mapper>;
@@ -90,41 +89,41 @@ void bind_maps(py::module_& m) {
                            "stores it in a memory file as \"map\".")
       .def(py::init([](const std::filesystem::path& memory,
                        const std::optional<PictureSource>& source, const py::kwargs& keywords) {
-             const MapperOptions options = mapper_options(keywords, nullptr);
+             const MapperOptions options = make_mapper_options(keywords, nullptr);
              return std::make_unique<SharedMapper>(MemoryFile::open(memory, Access::read_write),
                                                    source, options);
            }),
            py::arg("memory"), py::arg("source") = py::none(),
-           ("`memory`: a memory file that is there." + option_text).c_str())
+           ("`memory`: an existing memory file." + option_text).c_str())
       .def(
           "add",
           [](SharedMapper& mapper, const py::object& observation) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             return mapper.change([&](Mapper& one) { return one.add(seen); });
           },
-          py::arg("observation"), "The next observation; whether it became a node.")
+          py::arg("observation"), "Adds the next observation; True if it became a node.")
       .def(
           "finish",
           [](SharedMapper& mapper) {
             return mapper.change([](Mapper& one) { return one.finish(); });
           },
-          "Optimises what is not yet, and stores the map. More observations may follow.");
+          "Optimises and stores the map. More observations may follow.");
   m.def(
       "make_map",
       [](const py::object& recording, const std::filesystem::path& memory,
          const std::optional<PictureSource>& source, bool thumbnails, int threads,
          const py::kwargs& keywords) {
         SignatureOptions signature;
-        MapperOptions options = mapper_options(keywords, &signature);
+        MapperOptions options = make_mapper_options(keywords, &signature);
         options.thumbnails = thumbnails;
-        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
+        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
         const py::gil_scoped_release free;
         return make_map(dataset, memory, signature, options, threads);
       },
       py::arg("recording"), py::arg("memory"), py::arg("source") = py::none(),
       py::arg("thumbnails") = true, py::arg("threads") = 0,
-      ("Makes a map of a recording in its order, as `panonav map` does. `memory` is made where "
-       "there is none; views that it does not know are appended." +
+      ("Makes a map of a recording in its order, like `panonav map`. `memory` is created if it "
+       "does not exist; views that are not in it are appended." +
        option_text)
           .c_str());
 }
@@ -135,32 +134,32 @@ void bind_lattices(py::module_& m) {
       .field("pose", &Lattice::Node::pose, "In its component's frame.")
       .field("component", &Lattice::Node::component, "Index of its connected component.");
   Record<Lattice::Spring>(m, "LatticeSpring", "The relative position of two views.")
-      .field("a", &Lattice::Spring::a, "Number of a node.")
-      .field("b", &Lattice::Spring::b, "Number of the other, larger than a.")
+      .field("a", &Lattice::Spring::a, "Index of a node.")
+      .field("b", &Lattice::Spring::b, "Index of the other node, larger than a.")
       .field("dissimilarity", &Lattice::Spring::dissimilarity,
-             "Of the two views, over the components asked for.")
+             "Dissimilarity of the views, over the requested components.")
       .field("length", &Lattice::Spring::length, "Rest length.")
-      .field("stiffness", &Lattice::Spring::stiffness, "K of [M04 eq. 5].")
+      .field("stiffness", &Lattice::Spring::stiffness, "Spring constant K [M04 eq. 5].")
       .field("weight", &Lattice::Spring::weight, "Near 0: an outlier.");
-  Record<Lattice::Component>(m, "LatticeComponent", "Views that springs join.")
+  Record<Lattice::Component>(m, "LatticeComponent", "Views that springs connect.")
       .field("views", &Lattice::Component::views, "Number of its nodes.")
       .field("handedness_known", &Lattice::Component::handedness_known,
-             "False: it may be the mirror image.");
-  Record<Lattice>(m, "Lattice", "Views with the poses that their springs give them.")
-      .field("nodes", &Lattice::nodes, "One for each view, in its order.")
+             "False if the component may be mirrored.");
+  Record<Lattice>(m, "Lattice", "Views and the poses computed from their springs.")
+      .field("nodes", &Lattice::nodes, "One for each view, in the order of ids.")
       .field("springs", &Lattice::springs, "Ascending (a, b).")
       .field("components", &Lattice::components, "The largest first.")
       .field("candidates", &Lattice::candidates,
-             "Pairs of views whose relative pose or dissimilarity was read; those that are no "
+             "Number of pairs of views that were compared; those that are no "
              "springs were rejected.")
-      .field("metric", &Lattice::metric, "Lengths are metres.")
-      .field("iterations", &Lattice::iterations, "Of the solver, over all rounds.")
+      .field("metric", &Lattice::metric, "True if lengths are in metres.")
+      .field("iterations", &Lattice::iterations, "Solver iterations, over all rounds.")
       .field("energy", &Lattice::energy,
              "Sum over springs of weight times squared strain in deviations.")
       .type()
       .def(
-          "poses", [](const Lattice& lattice) { return poses_of(lattice.nodes); },
-          "(n, 3) of x, y, heading_rad, a row a node.");
+          "poses", [](const Lattice& lattice) { return to_pose_rows_of_nodes(lattice.nodes); },
+          "Returns (n, 3) of x, y, heading_rad, one row per node.");
   m.def(
       "arrange",
       [](const py::object& memory, const py::object& odometry, bool save, int threads,
@@ -173,7 +172,7 @@ void bind_lattices(py::module_& m) {
         parsed.finish();
         const auto path = memory.cast<std::filesystem::path>();
         std::optional<Dataset> recording;
-        if (!odometry.is_none()) recording = dataset_from(odometry, std::nullopt);
+        if (!odometry.is_none()) recording = to_dataset(odometry, std::nullopt);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
         auto file = MemoryFile::open(path, save ? Access::read_write : Access::read_only);
@@ -186,11 +185,12 @@ void bind_lattices(py::module_& m) {
       },
       py::arg("memory"), py::arg("odometry") = py::none(), py::kw_only(), py::arg("save") = true,
       py::arg("threads") = 0,
-      with_options("Arranges the views of a memory file as they lie in space, by their similarity "
-                   "alone, and with `save` stores the arrangement in it as \"lattice\". "
-                   "`odometry`: a Dataset or path that tells of the motion between views, by name; "
-                   "only then there are options motion_*.",
-                   {options_of<LatticeOptions>(), options_of<CoarseMotionOptions>("motion")})
+      append_option_list(
+          "Computes the positions of all views of a memory file from their similarity "
+          "alone, and with `save` stores the arrangement in it as \"lattice\". "
+          "`odometry`: a Dataset or path with odometry between views, assigned by name; "
+          "only then the options motion_* are allowed.",
+          {options_of<LatticeOptions>(), options_of<CoarseMotionOptions>("motion")})
           .c_str());
   m.def(
       "read_map",
@@ -201,24 +201,24 @@ void bind_lattices(py::module_& m) {
 }
 
 void bind_merging(py::module_& m) {
-  Record<SessionAlignment>(m, "SessionAlignment", "How the maps of two sessions lie to each other.")
+  Record<SessionAlignment>(m, "SessionAlignment", "Relative pose of the maps of two sessions.")
       .field("first_from_second", &SessionAlignment::first_from_second,
-             "Takes a pose of the second map into the frame of the first.")
-      .field("places", &SessionAlignment::places, "That lead to this frame.")
-      .field("other_places", &SessionAlignment::other_places, "That lead to the next best.")
+             "Pose of the second map's frame in the frame of the first.")
+      .field("places", &SessionAlignment::places, "Number of places that support this pose.")
+      .field("other_places", &SessionAlignment::other_places, "Number for the second best pose.")
       .field("expected_places", &SessionAlignment::expected_places,
-             "Where both maps lie upon each other.")
-      .field("confirmed_places", &SessionAlignment::confirmed_places, "Of these, that match.")
-      .field("refuted", &SessionAlignment::refuted, "Matches that lead elsewhere.");
+             "Number of places at which both maps overlap.")
+      .field("confirmed_places", &SessionAlignment::confirmed_places, "Number of these that match.")
+      .field("refuted", &SessionAlignment::refuted, "Matches that contradict this pose.");
   Record<MergedMemory>(m, "MergedMemory", "The result of merge_memories.")
-      .field("views", &MergedMemory::views, "Of the new memory.")
-      .field("shared", &MergedMemory::shared, "Views that both had, kept once.")
+      .field("views", &MergedMemory::views, "Number of views of the new memory.")
+      .field("shared", &MergedMemory::shared, "Views that were in both, stored once.")
       .field("renamed", &MergedMemory::renamed,
-             "Views and routes of the second whose names the first had for others.")
-      .field("alignment", &MergedMemory::alignment, "None where no place in common was found.")
-      .field("connected_components", &MergedMemory::connected_components, "Of the new map.")
+             "Views and routes of the second that were renamed, as the first uses their names.")
+      .field("alignment", &MergedMemory::alignment, "None if no common place was found.")
+      .field("connected_components", &MergedMemory::connected_components, "Number in the new map.")
       .field("without_position", &MergedMemory::without_position,
-             "Views of the second whose positions were in a frame of their own.");
+             "Views of the second that lost their positions, as these are in another frame.");
   m.def(
       "merge_memories",
       [](const std::filesystem::path& first, const std::filesystem::path& second,
@@ -232,11 +232,12 @@ void bind_merging(py::module_& m) {
         return merge_memories(first, second, memory, alignment, graph, check_signals);
       },
       py::arg("first"), py::arg("second"), py::arg("memory"),
-      with_options("Makes one memory file of two, as `panonav merge` does: places in common are "
-                   "found by appearance, and the second is moved into the frame of the first. "
-                   "Without any, both stay connected components, and the views of the second lose "
-                   "their positions.",
-                   {options_of<SessionAlignmentOptions>(), options_of<PoseGraphOptions>("graph")})
+      append_option_list(
+          "Merges two memory files into one, like `panonav merge`: common places are "
+          "found by appearance, and the second is transformed to the frame of the first. "
+          "Without any, both stay separate components, and the views of the second lose "
+          "their positions.",
+          {options_of<SessionAlignmentOptions>(), options_of<PoseGraphOptions>("graph")})
           .c_str());
 }
 

@@ -9,13 +9,13 @@ namespace {
 
 using Rows = py::array_t<double, py::array::c_style>;
 
-std::vector<Point2> points_of(const Rows& rows) {
+std::vector<Point2> to_points(const Rows& rows) {
   std::vector<Point2> points;
   for (py::ssize_t i = 0; i < rows.shape(0); ++i) points.push_back({rows.at(i, 0), rows.at(i, 1)});
   return points;
 }
 
-Rows rows_of(const std::vector<StampedPose>& poses) {
+Rows to_rows(const std::vector<StampedPose>& poses) {
   Rows rows({static_cast<py::ssize_t>(poses.size()), py::ssize_t{4}});
   auto row = rows.mutable_unchecked<2>();
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -30,7 +30,7 @@ Rows rows_of(const std::vector<StampedPose>& poses) {
 
 }  // namespace
 
-Trajectory trajectory_of(const Rows& rows) {
+Trajectory to_trajectory(const Rows& rows) {
   std::vector<StampedPose> poses;
   for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
     poses.push_back({rows.at(i, 0), {rows.at(i, 1), rows.at(i, 2), rows.at(i, 3)}});
@@ -41,32 +41,31 @@ Trajectory trajectory_of(const Rows& rows) {
 void bind_measures(py::module_& m) {
   Record<Alignment>(m, "Alignment", "to = scale R(rotation) from + translation.")
       .field("scale", &Alignment::scale,
-             "Metres of `to` for each unit of `from`; 1 unless the scale was free.")
+             "Length in `to` per unit length in `from`; 1 unless the scale was free.")
       .field("rotation_rad", &Alignment::rotation_rad, "Counter-clockwise, in [-pi, pi].")
       .field(
           "translation", [](const Alignment& a) { return a.translation; }, "(x_m, y_m)")
-      .field("reflected", &Alignment::reflected, "A mirror image (y -> -y) comes first.")
-      .field("rms_m", &Alignment::rms_m, "Root mean square distance that remains.");
+      .field("reflected", &Alignment::reflected, "True if `from` is mirrored first (y -> -y).")
+      .field("rms_m", &Alignment::rms_m, "Root mean square distance after alignment.");
   Record<ShapeDifference>(m, "ShapeDifference", "Procrustes disparity of two shapes.")
       .field("value", &ShapeDifference::value, "0 (same shape) to 1.")
       .field("with_reflection", &ShapeDifference::with_reflection,
-             "When a mirror image is allowed.");
+             "Value if a reflection is allowed.");
   Record<TrajectoryError::Summary>(m, "ErrorSummary", "Statistics of errors.")
       .field("rms", &TrajectoryError::Summary::rms, "Root mean square.")
       .field("mean", &TrajectoryError::Summary::mean, "Arithmetic mean.")
       .field("median", &TrajectoryError::Summary::median, "Half of the errors are at most this.")
-      .field("p95", &TrajectoryError::Summary::p95, "95 % are at most this.")
-      .field("largest", &TrajectoryError::Summary::largest, "The greatest error of all.");
-  Record<TrajectoryError>(m, "TrajectoryError",
-                          "How far an estimated trajectory is from the truth: ATE and RPE.")
-      .field("pairs", &TrajectoryError::pairs, "Estimates with a true pose at their stamp.")
-      .field("left_out", &TrajectoryError::left_out, "Estimates without one.")
+      .field("p95", &TrajectoryError::Summary::p95, "95 % of the errors are at most this.")
+      .field("largest", &TrajectoryError::Summary::largest, "Largest error.");
+  Record<TrajectoryError>(m, "TrajectoryError", "Errors of an estimated trajectory: ATE and RPE.")
+      .field("pairs", &TrajectoryError::pairs, "Number of estimates with a true pose.")
+      .field("left_out", &TrajectoryError::left_out, "Number of estimates without a true pose.")
       .field("ground_truth_from_estimate", &TrajectoryError::ground_truth_from_estimate,
              "Identity without `align`; its rms_m is that of position_m.")
       .field("position_m", &TrajectoryError::position_m, "ATE, after alignment.")
       .field("heading_rad", &TrajectoryError::heading_rad, "After alignment.")
       .field("relative_pairs", &TrajectoryError::relative_pairs,
-             "0: the path is shorter than relative_distance_m.")
+             "Number of RPE pairs; 0 if the path is shorter than relative_distance_m.")
       .field("relative_position_m", &TrajectoryError::relative_position_m,
              "RPE over relative_distance_m.")
       .field("relative_heading_rad", &TrajectoryError::relative_heading_rad,
@@ -74,17 +73,17 @@ void bind_measures(py::module_& m) {
   m.def(
       "align",
       [](const py::object& from, const py::object& to, bool allow_scale, bool allow_reflection) {
-        return align(points_of(number_rows(from, "source", 2)),
-                     points_of(number_rows(to, "target", 2)), {allow_scale, allow_reflection});
+        return align(to_points(to_number_rows(from, "source", 2)),
+                     to_points(to_number_rows(to, "target", 2)), {allow_scale, allow_reflection});
       },
       py::arg("source"), py::arg("target"), py::arg("allow_scale") = false,
       py::arg("allow_reflection") = false,
-      "The least-squares map (Procrustes) of one point set (n, 2) onto another.");
+      "Aligns one point set (n, 2) with another by least squares (Umeyama).");
   m.def(
       "shape_difference",
       [](const py::object& a, const py::object& b) {
-        return shape_difference(points_of(number_rows(a, "a", 2)),
-                                points_of(number_rows(b, "b", 2)));
+        return shape_difference(to_points(to_number_rows(a, "a", 2)),
+                                to_points(to_number_rows(b, "b", 2)));
       },
       py::arg("a"), py::arg("b"),
       "Procrustes disparity of two point sets (n, 2): how much they differ after the best "
@@ -94,20 +93,21 @@ void bind_measures(py::module_& m) {
       [](const py::object& estimate, const py::object& truth, const py::kwargs& keywords) {
         TrajectoryError::Options options;
         Keywords(keywords).options(options).finish();
-        const auto a = trajectory_of(number_rows(estimate, "estimate", 4));
-        const auto b = trajectory_of(number_rows(truth, "truth", 4));
+        const auto a = to_trajectory(to_number_rows(estimate, "estimate", 4));
+        const auto b = to_trajectory(to_number_rows(truth, "truth", 4));
         const py::gil_scoped_release free;
         return trajectory_error(a, b, options);
       },
       py::arg("estimate"), py::arg("truth"),
-      with_options("ATE and RPE of two trajectories, (n, 4) of stamp_s, x_m, y_m, heading_rad. "
-                   "None when fewer than two estimates have a true pose at their stamp.",
-                   {options_of<TrajectoryError::Options>()})
+      append_option_list(
+          "ATE and RPE of two trajectories, (n, 4) of stamp_s, x_m, y_m, heading_rad. "
+          "None if fewer than two estimates have a true pose at their stamp.",
+          {options_of<TrajectoryError::Options>()})
           .c_str());
   m.def(
       "read_trajectory",
-      [](const std::filesystem::path& path) { return rows_of(read_trajectory(path)); },
-      py::arg("path"), "TUM text, or CSV: (n, 4) of stamp_s, x_m, y_m, heading_rad.");
+      [](const std::filesystem::path& path) { return to_rows(read_trajectory(path)); },
+      py::arg("path"), "Reads TUM text or CSV: (n, 4) of stamp_s, x_m, y_m, heading_rad.");
 }
 
 }  // namespace panonav::python

@@ -12,15 +12,15 @@ namespace {
 
 constexpr std::array<const char*, 3> link_names{"sequence", "neighbour", "closure"};
 
-Link::Kind link_kind(const std::string& name) {
+Link::Kind parse_link_kind(const std::string& name) {
   for (std::size_t i = 0; i < link_names.size(); ++i) {
     if (name == link_names[i]) return static_cast<Link::Kind>(i);
   }
   throw ContractError("kind", "'" + name + "'", "'sequence', 'neighbour', 'closure'");
 }
 
-/// x_m, y_m, heading_rad; nan stands for unknown.
-std::optional<ReferencePose> pose_of_row(const double* row) {
+/// Converts a row of x_m, y_m, heading_rad, in which nan is unknown.
+std::optional<ReferencePose> to_reference_pose(const double* row) {
   if (std::isnan(row[0]) && std::isnan(row[1])) return std::nullopt;
   return ReferencePose{row[0], row[1], std::isnan(row[2]) ? std::nullopt : std::optional(row[2])};
 }
@@ -38,13 +38,13 @@ void extend(SharedMemory& memory, const py::object& given_magnitudes,
             const py::object& given_phases, const std::optional<std::vector<std::string>>& names,
             const py::object& given_poses) {
   const SignatureShape shape = memory.read([](const VisualMemory& m) { return m.shape(); });
-  const auto magnitudes =
-      exact_array<std::uint8_t>(given_magnitudes, "magnitudes", {-1, shape.components, shape.rows});
+  const auto magnitudes = require_exact_array<std::uint8_t>(given_magnitudes, "magnitudes",
+                                                            {-1, shape.components, shape.rows});
   const py::ssize_t count = magnitudes.shape(0);
-  const auto phases =
-      exact_array<std::uint8_t>(given_phases, "phases", {count, shape.components, shape.rows});
+  const auto phases = require_exact_array<std::uint8_t>(given_phases, "phases",
+                                                        {count, shape.components, shape.rows});
   std::optional<py::array_t<double, py::array::c_style>> poses;
-  if (!given_poses.is_none()) poses = number_rows(given_poses, "poses", 3);
+  if (!given_poses.is_none()) poses = to_number_rows(given_poses, "poses", 3);
   const auto check = [&](std::size_t size, const char* what) {
     require(size == static_cast<std::size_t>(count), what, static_cast<double>(size),
             "one for each signature");
@@ -61,15 +61,16 @@ void extend(SharedMemory& memory, const py::object& given_magnitudes,
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
       signature.magnitudes.assign(first_magnitude + i * size, first_magnitude + (i + 1) * size);
       signature.phases.assign(first_phase + i * size, first_phase + (i + 1) * size);
-      m.append(signature, {.name = names ? (*names)[i] : std::to_string(next++),
-                           .pose = first_pose ? pose_of_row(first_pose + 3 * i) : std::nullopt,
-                           .stamp_s = std::nullopt});
+      m.append(signature,
+               {.name = names ? (*names)[i] : std::to_string(next++),
+                .pose = first_pose ? to_reference_pose(first_pose + 3 * i) : std::nullopt,
+                .stamp_s = std::nullopt});
       if (i % 1024 == 0) check_signals();
     }
   });
 }
 
-/// One row for each view in the order of their ids; nan where something is not known.
+/// Returns rows of x_m, y_m, heading_rad, one per view in the order of ids; nan is unknown.
 py::array_t<double> poses_of(const SharedMemory& memory) {
   std::vector<double> rows;
   memory.read([&](const VisualMemory& m) {
@@ -87,28 +88,28 @@ py::array_t<double> poses_of(const SharedMemory& memory) {
 
 void bind_visual_memory(py::module_& m) {
   Record<Match>(m, "Match", "A view that a search found.")
-      .field("view", &Match::view, "Its id.")
-      .field("dissimilarity", &Match::dissimilarity, "Integer L1 of packed magnitudes.");
+      .field("view", &Match::view, "Id of the view.")
+      .field("dissimilarity", &Match::dissimilarity, "Integer L1 distance of magnitudes.");
   Record<SearchResult>(m, "SearchResult", "The result of an exact search.")
       .field("matches", &SearchResult::matches, "Ascending (dissimilarity, view).")
-      .field("bytes_read", &SearchResult::bytes_read, "That the search touched.")
-      .field("bytes_in_full", &SearchResult::bytes_in_full, "That a scan over all would read.")
-      .field("views_in_full", &SearchResult::views_in_full, "Views whose whole sum was computed.");
+      .field("bytes_read", &SearchResult::bytes_read, "Bytes that the search read.")
+      .field("bytes_in_full", &SearchResult::bytes_in_full, "Bytes that a full scan would read.")
+      .field("views_in_full", &SearchResult::views_in_full, "Number of completely compared views.");
   Record<ReferenceInfo>(m, "ReferenceInfo", "Data of a view besides its signature.")
       .field("name", &ReferenceInfo::name, "Unique within a memory.")
-      .field("pose", &ReferenceInfo::pose, "Where it was taken, or None.")
-      .field("stamp_s", &ReferenceInfo::stamp_s, "When, or None.");
+      .field("pose", &ReferenceInfo::pose, "Pose at which it was taken, or None.")
+      .field("stamp_s", &ReferenceInfo::stamp_s, "Seconds at which it was taken, or None.");
   Record<Link>(m, "Link", "Two views between which a robot can move.")
-      .field("a", &Link::a, "Id of the one.")
-      .field("b", &Link::b, "Id of the other.")
+      .field("a", &Link::a, "Id of one view.")
+      .field("b", &Link::b, "Id of the other view.")
       .field(
           "kind", [](const Link& l) { return link_names[static_cast<std::size_t>(l.kind)]; },
           "'sequence', 'neighbour' or 'closure'.");
 
   py::class_<SharedMemory, std::shared_ptr<SharedMemory>>(
       m, "VisualMemory",
-      "The reference views that a robot remembers, in memory. Any number of threads may ask at a "
-      "time; views keep their id for ever.")
+      "The reference views of a robot, in RAM. Several threads may read at the same "
+      "time; the id of a view never changes.")
       .def(py::init<SignatureShape, float, std::optional<ElevationBand>>(), py::arg("shape"),
            py::arg("full_scale"), py::arg("elevations") = py::none(),
            "`shape`: (rows, components); `full_scale`: the magnitude that is packed as 255.")
@@ -147,16 +148,16 @@ void bind_visual_memory(py::module_& m) {
             return s.change([&](VisualMemory& v) { return v.append(own, std::move(info)); });
           },
           py::arg("signature"), py::arg("name"), py::arg("pose") = py::none(),
-          py::arg("stamp_s") = py::none(), "Adds a view, packed or to be packed, and gives its id.")
+          py::arg("stamp_s") = py::none(), "Adds a view and returns its id; packs it if needed.")
       .def("extend", &extend, py::arg("magnitudes"), py::arg("phases"),
            py::arg("names") = py::none(), py::arg("poses") = py::none(),
-           "Adds n views from uint8 arrays of (n, components, rows). `names`: None stands for the "
-           "numbers; `poses`: (n, 3) of x_m, y_m, heading_rad, nan where unknown. An error keeps "
-           "the views before it.")
+           "Adds n views from uint8 arrays of (n, components, rows). `names`: None: the ids as "
+           "names; `poses`: (n, 3) of x_m, y_m, heading_rad, nan if unknown. After an error, "
+           "views that were added before it remain.")
       .def(
           "remove",
           [](SharedMemory& s, ViewId view) { s.change([&](VisualMemory& v) { v.remove(view); }); },
-          py::arg("view"), "Also drops the links of the view.")
+          py::arg("view"), "Removes the view and its links.")
       .def_property_readonly(
           "views",
           [](const SharedMemory& s) {
@@ -189,19 +190,19 @@ void bind_visual_memory(py::module_& m) {
           [](const SharedMemory& s, ViewId view) {
             return s.read([&](const VisualMemory& v) { return v.packed(view); });
           },
-          py::arg("view"), "A copy of the view's bytes.")
+          py::arg("view"), "Returns a copy of the view's packed signature.")
       .def(
           "signature",
           [](const SharedMemory& s, ViewId view) {
             return s.read([&](const VisualMemory& v) { return v.signature(view); });
           },
           py::arg("view"),
-          "Magnitudes and phases as real numbers, to the precision of the packed form.")
+          "Returns the signature as real numbers, with the precision of the packed form.")
       .def("poses", &poses_of, "(n, 3) of x_m, y_m, heading_rad by ascending id; nan: unknown.")
       .def(
           "link",
           [](SharedMemory& s, ViewId a, ViewId b, const std::string& kind) {
-            const Link link{a, b, link_kind(kind)};
+            const Link link{a, b, parse_link_kind(kind)};
             s.change([&](VisualMemory& v) { v.link(link); });
           },
           py::arg("a"), py::arg("b"), py::arg("kind") = "sequence",
@@ -213,7 +214,7 @@ void bind_visual_memory(py::module_& m) {
             s.change([&](VisualMemory& v) { v.unlink(a, b); });
           },
           py::arg("a"), py::arg("b"),
-          "Drops the link of the two views, in whichever order; nothing happens where there is "
+          "Removes the link of the two views, in either order; does nothing if there is "
           "none.")
       .def_property_readonly(
           "links",
@@ -223,11 +224,10 @@ void bind_visual_memory(py::module_& m) {
             });
           },
           "All links, each once.")
-      .def(
-          "search", &search, py::arg("query"), py::arg("top") = 10, py::arg("components") = 0,
-          py::arg("excluded_views") = std::vector<ViewId>{},
-          "The nearest views by integer L1 over packed magnitudes: exactly what a full scan finds, "
-          "ties by id. `components`: 0 takes all.")
+      .def("search", &search, py::arg("query"), py::arg("top") = 10, py::arg("components") = 0,
+           py::arg("excluded_views") = std::vector<ViewId>{},
+           "Finds the most similar views by L1 of packed magnitudes, exactly as a full scan, "
+           "ties by id. `components`: number of compared components; 0: all.")
       .def("__repr__", [](const SharedMemory& s) {
         return s.read([](const VisualMemory& v) {
           return "VisualMemory(" + std::to_string(v.size()) + " views, " +
@@ -244,7 +244,7 @@ void bind_memory_file(py::module_& m) {
              "Of these, with x and y.")
       .field("views_with_heading", &MemoryFile::Info::views_with_heading,
              "Of these, with a heading.")
-      .field("links", &MemoryFile::Info::links, "Between two views.")
+      .field("links", &MemoryFile::Info::links, "Number of links.")
       .field("thumbnails", &MemoryFile::Info::thumbnails, "Views stored with a picture file.")
       .field("views_with_features", &MemoryFile::Info::views_with_features,
              "Views stored with local features.")
@@ -252,18 +252,17 @@ void bind_memory_file(py::module_& m) {
              "Packed local features of all views.")
       .field("maps", &MemoryFile::Info::maps, "Kept by name.")
       .field("routes", &MemoryFile::Info::routes, "Kept by name.")
-      .field("file_bytes", &MemoryFile::Info::file_bytes,
-             "With what is still in the write-ahead log.")
+      .field("file_bytes", &MemoryFile::Info::file_bytes, "Size including the write-ahead log.")
       .field("format_version", &MemoryFile::Info::format_version, "Of the file, >= 1.");
   Record<MemoryFile::Fault>(m, "MemoryFault", "A fault in a memory file.")
-      .field("view", &MemoryFile::Fault::view, "Where it concerns one.")
-      .field("what", &MemoryFile::Fault::what, "One line.");
+      .field("view", &MemoryFile::Fault::view, "Id of the view, or None.")
+      .field("what", &MemoryFile::Fault::what, "Description in one line.");
   Record<MemoryFile::KeptChange>(m, "KeptChange", "A change of a memory that was kept for `undo`.")
-      .field("what", &MemoryFile::KeptChange::what, "For people.")
+      .field("what", &MemoryFile::KeptChange::what, "Description of the change.")
       .field("stamp_s", &MemoryFile::KeptChange::stamp_s, "Seconds since 1970, or None.")
-      .field("bytes", &MemoryFile::KeptChange::bytes, "That are kept for taking it back.")
+      .field("bytes", &MemoryFile::KeptChange::bytes, "Bytes stored to revert it.")
       .field("undoable", &MemoryFile::KeptChange::undoable,
-             "False: too old, only its description is left.");
+             "False if it is too old; only the description is stored then.");
   Record<MemoryHeader>(m, "MemoryHeader",
                        "Properties of all views of a memory file: how images become signatures.")
       .field(
@@ -273,14 +272,14 @@ void bind_memory_file(py::module_& m) {
           "elevations", [](const MemoryHeader& h) { return h.elevations; },
           "(bottom, top) in radians, or None.")
       .field("panorama_columns", &MemoryHeader::panorama_columns,
-             "Of the panoramas that the signatures are taken from.")
-      .field("source", &MemoryHeader::source, "How its pictures lay.")
+             "Columns of the panoramas from which signatures are computed.")
+      .field("source", &MemoryHeader::source, "Layout of its images.")
       .field("created_s", &MemoryHeader::created_s, "Seconds since 1970, or None.");
 
   py::class_<SharedFile, std::shared_ptr<SharedFile>>(
       m, "MemoryFile",
-      "A visual memory on disk. What a changing function returned for is still there after the "
-      "process is killed. All functions raise FileError.")
+      "A visual memory on disk. A change is on disk when its function returns, also if the "
+      "process is killed then. All functions raise FileError.")
       .def(py::init([](const std::filesystem::path& path, bool write) {
              return std::make_shared<SharedFile>(
                  MemoryFile::open(path, write ? Access::read_write : Access::read_only));
@@ -292,27 +291,27 @@ void bind_memory_file(py::module_& m) {
           [](const SharedFile& s) {
             return s.read([](const MemoryFile& f) { return f.header(); });
           },
-          "As the file was made.")
+          "Properties with which the file was made.")
       .def_property_readonly(
           "path",
           [](const SharedFile& s) { return s.read([](const MemoryFile& f) { return f.path(); }); },
-          "As it was given; of a server the address without its password.")
+          "Path as given; for a server the address without password.")
       .def(
           "load",
           [](SharedFile& s) {
             return s.change([](MemoryFile& f) { return std::make_shared<SharedMemory>(f.load()); });
           },
-          "All views and links as a VisualMemory, which does not need the file any more.")
+          "Loads all views and links into a VisualMemory, which no longer needs the file.")
       .def(
           "info", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.info(); }); },
           "Counts and sizes; nothing is checked.")
       .def(
           "verify",
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.verify(); }); },
-          "Everything that is wrong with the file; empty: intact.")
+          "Returns all faults of the file; empty: intact.")
       .def(
           "names", [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.names(); }); },
-          "Of all views, by ascending id.")
+          "Returns the names of all views, by ascending id.")
       .def(
           "find",
           [](SharedFile& s, const std::string& name) {
@@ -324,7 +323,7 @@ void bind_memory_file(py::module_& m) {
           [](SharedFile& s, const std::string& name) {
             return s.change([&](MemoryFile& f) { return find_view_by_name_or_id(f, name); });
           },
-          py::arg("name"), "The id of a view by name or, as text, by id; FileError when none is.")
+          py::arg("name"), "Returns the id of a view by name, or by id as text.")
       .def(
           "thumbnail",
           [](SharedFile& s, ViewId view) -> py::object {
@@ -345,32 +344,32 @@ void bind_memory_file(py::module_& m) {
           [](SharedFile& s, ViewId view, const std::string& name) {
             s.change([&](MemoryFile& f) { f.rename(view, name); });
           },
-          py::arg("view"), py::arg("name"), "Gives a view another name, which no other has.")
+          py::arg("view"), py::arg("name"), "Renames a view; the name must be unused.")
       .def(
           "remove",
           [](SharedFile& s, const std::vector<ViewId>& views) {
             s.change([&](MemoryFile& f) { f.remove(views); });
           },
-          py::arg("views"), "Also drops their links, thumbnails and features; all or none.")
+          py::arg("views"), "Removes all or none, with links, thumbnails and features.")
       .def(
           "undo", [](SharedFile& s) { s.change([](MemoryFile& f) { f.undo(); }); },
-          "Takes back the newest change of `history`.")
+          "Reverts the newest change of `history`.")
       .def(
           "history",
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.history(); }); },
-          "The changes that were kept for `undo`, the newest first.")
+          "Returns the changes that `undo` can revert, newest first.")
       .def(
           "map_names",
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.map_names(); }); },
-          "Of the maps in the file, ascending.")
+          "Returns the names of the maps, ascending.")
       .def(
           "route_names",
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.route_names(); }); },
-          "Of the routes in the file, ascending.")
+          "Returns the names of the routes, ascending.")
       .def(
           "keep_models",
           [](SharedFile& s) { s.change([](MemoryFile& f) { learn_and_store_models(f); }); },
-          "Learns what localisation needs of the views and keeps it in the file; to be called "
+          "Learns the models for localisation from the views and stores them in the file. Call it "
           "when views or poses have changed.")
       .def("__repr__", [](const SharedFile& s) {
         return s.read(
@@ -381,16 +380,16 @@ void bind_memory_file(py::module_& m) {
 void bind_synchronisation(py::module_& m) {
   using Report = fleet::SynchronisationReport;
   Record<Report>(m, "SynchronisationReport", "The changes made by synchronise_memory.")
-      .field("views", &Report::views, "Of the file, afterwards.")
-      .field("uploaded", &Report::uploaded, "Views that the server got.")
-      .field("downloaded", &Report::downloaded, "Views that the file got.")
-      .field("adopted", &Report::adopted, "Views that both had already, by name and signature.")
+      .field("views", &Report::views, "Number of views in the file afterwards.")
+      .field("uploaded", &Report::uploaded, "Views added on the server.")
+      .field("downloaded", &Report::downloaded, "Views added to the file.")
+      .field("adopted", &Report::adopted, "Views that were in both, by name and signature.")
       .field("updated_on_server", &Report::updated_on_server,
-             "Views with another name, pose or stamp there.")
-      .field("updated_in_file", &Report::updated_in_file, "The same of the file.")
-      .field("removed_on_server", &Report::removed_on_server, "Views that the file had removed.")
+             "Views whose name, pose or stamp changed on the server.")
+      .field("updated_in_file", &Report::updated_in_file, "The same, in the file.")
+      .field("removed_on_server", &Report::removed_on_server, "Views that the file had deleted.")
       .field("removed_in_file", &Report::removed_in_file, "Views that others had removed.")
-      .field("renamed", &Report::renamed, "Views of the file whose names others had.")
+      .field("renamed", &Report::renamed, "Views of the file whose names others use.")
       .field("conflicts", &Report::conflicts,
              "Changes of the file that were dropped, because others were first.")
       .field("withheld", &Report::withheld,
@@ -401,8 +400,8 @@ void bind_synchronisation(py::module_& m) {
       .field("links_downloaded", &Report::links_downloaded,
              "Links added, changed and removed in the file.")
       .field("restored", &Report::restored,
-             "Whether the server had lost views, which were uploaded again.")
-      .field("seconds", &Report::seconds, "From the beginning to the end.");
+             "True if the server had lost views, which were uploaded again.")
+      .field("seconds", &Report::seconds, "Duration.");
   using Areas = std::vector<std::pair<double, double>>;
   m.def(
       "areas_around",
@@ -414,7 +413,7 @@ void bind_synchronisation(py::module_& m) {
         return areas;
       },
       py::arg("x_m"), py::arg("y_m"), py::arg("radius_m"),
-      "(column, row) of the squares of 10 m that touch the circle around a position.");
+      "Returns (column, row) of the 10 m squares that touch the circle around a position.");
   m.def(
       "synchronise_memory",
       [](const std::filesystem::path& file, const std::string& server,
@@ -429,11 +428,11 @@ void bind_synchronisation(py::module_& m) {
                                          [](std::size_t) { check_signals(); });
       },
       py::arg("file"), py::arg("server"), py::arg("areas") = py::none(),
-      "Brings a robot's memory file and a memory on a PostgreSQL server to the same views, links, "
-      "names and poses, as `panonav synchronise` does; where one of the two does not exist it is "
-      "made. `areas`: (column, row) of the squares of 10 m that the file keeps; None: all. When "
-      "the link breaks, FileError is raised, nothing is lost or doubled, and the next call goes "
-      "on.");
+      "Synchronises a robot's memory file with a memory on a PostgreSQL server: views, links, "
+      "names and poses, like `panonav synchronise`; if one of the two does not exist, it is "
+      "created. `areas`: (column, row) of the 10 m squares that the file keeps; None: all. If "
+      "the connection breaks, FileError is raised, nothing is lost, and the next call "
+      "continues.");
 }
 
 }  // namespace

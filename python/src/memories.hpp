@@ -6,8 +6,8 @@
 
 namespace panonav::python {
 
-/// `VisualMemory` and `MemoryFile` as Python holds them. Of a file even reading takes its only
-/// connection, so that every function counts as a change.
+/// `VisualMemory` and `MemoryFile` for Python. A file has one connection, which reading uses, too,
+/// so nearly all its functions use `change`.
 using SharedMemory = Shared<VisualMemory>;
 using SharedFile = Shared<MemoryFile>;
 

@@ -5,9 +5,9 @@ namespace panonav::python {
 
 namespace {
 
-RobotNavigatorOptions navigator_options(const std::optional<std::string>& edges,
-                                        const std::optional<std::string>& route,
-                                        const py::kwargs& keywords) {
+RobotNavigatorOptions make_navigator_options(const std::optional<std::string>& edges,
+                                             const std::optional<std::string>& route,
+                                             const py::kwargs& keywords) {
   RobotNavigatorOptions options{.route = route};
   if (edges) {
     options.edges = parse_graph_origin(*edges);
@@ -30,26 +30,26 @@ void bind_navigation(py::module_& m) {
       .field("left_m_s", &Velocity::left_m_s, "0 for a differential drive.")
       .field("turn_rad_s", &Velocity::turn_rad_s, "Counter-clockwise.");
   Record<NavigationDecision>(m, "NavigationDecision", "One decision with its reasons.")
-      .field("step", &NavigationDecision::step, "Counts from 1.")
+      .field("step", &NavigationDecision::step, "Number of the decision, from 1.")
       .field(
           "state", [](const NavigationDecision& d) { return name_of(d.state); },
           "'moving', 'arrived', 'blocked', 'lost' or 'unreachable'.")
       .field("direction_rad", &NavigationDecision::direction_rad, "In the current robot frame.")
-      .field("advance_m", &NavigationDecision::advance_m, "How far; 0 unless moving.")
+      .field("advance_m", &NavigationDecision::advance_m, "Distance to drive; 0 unless moving.")
       .field("homing", &NavigationDecision::homing,
-             "The last stretch, by the home vector to the goal itself.")
-      .field("on_route", &NavigationDecision::on_route, "A leg along a recorded route.")
-      .field("nearest", &NavigationDecision::nearest, "The view where the robot is, or None.")
-      .field("probability", &NavigationDecision::probability, "That it is there.")
-      .field("next", &NavigationDecision::next, "The view ahead, or None.")
-      .field("area", &NavigationDecision::area, "That is loaded.")
+             "True on the last part, which follows the home vector to the goal.")
+      .field("on_route", &NavigationDecision::on_route, "True on a recorded route.")
+      .field("nearest", &NavigationDecision::nearest, "View nearest to the robot, or None.")
+      .field("probability", &NavigationDecision::probability, "Probability of `nearest`.")
+      .field("next", &NavigationDecision::next, "Next view of the path, or None.")
+      .field("area", &NavigationDecision::area, "Index of the loaded area.")
       .field("difference", &NavigationDecision::difference,
-             "Of what is seen from `nearest`, homing: from the goal.")
+             "Difference between the image and `nearest`, or the goal while homing.")
       .field("path_length", &NavigationDecision::path_length,
-             "That is left along the edges, in their unit.")
-      .field("components", &NavigationDecision::components, "Compared.")
+             "Remaining path length along the edges, in their unit.")
+      .field("components", &NavigationDecision::components, "Number of compared components.")
       .field("bytes_read", &NavigationDecision::bytes_read,
-             "Of the loaded area's signatures and index, by this observation.")
+             "Bytes of the loaded area's signatures and index that were read.")
       .field(
           "events",
           [](const NavigationDecision& d) {
@@ -59,23 +59,23 @@ void bind_navigation(py::module_& m) {
           },
           "Reasons for a decision other than to continue, such as 'kidnapped' or 'closed'.");
   Record<RobotNavigator::Step>(m, "NavigationStep", "The motion of a robot after an observation.")
-      .field("decision", &RobotNavigator::Step::decision, "The last one.")
+      .field("decision", &RobotNavigator::Step::decision, "The latest decision.")
       .field("velocity", &RobotNavigator::Step::velocity, "For the next period of the base.")
       .field("decided", &RobotNavigator::Step::decided,
-             "By this observation; else the step decided before continues.");
+             "True if this observation caused a decision; otherwise the step continues.");
   using SharedNavigator = Shared<RobotNavigator>;
   const auto view_name = [](SharedNavigator& navigator, std::uint32_t view) {
     return navigator.change([&](RobotNavigator& n) { return n.info(ViewId{view}).name; });
   };
   py::class_<SharedNavigator>(m, "RobotNavigator",
-                              "Sends a robot to a remembered view by what it sees: a picture in, a "
-                              "velocity out.")
+                              "Drives a robot to a stored view: takes an image, returns a "
+                              "velocity.")
       .def(py::init([](const std::filesystem::path& memory, const std::string& goal,
                        const std::optional<PictureSource>& source,
                        const std::optional<std::string>& edges,
                        const std::optional<std::string>& route, int threads,
                        const py::kwargs& keywords) {
-             const auto options = navigator_options(edges, route, keywords);
+             const auto options = make_navigator_options(edges, route, keywords);
              const py::gil_scoped_release free;
              InterruptibleExecutor executor(threads);
              return std::make_unique<SharedNavigator>(memory, goal, options, source,
@@ -83,18 +83,19 @@ void bind_navigation(py::module_& m) {
            }),
            py::arg("memory"), py::arg("goal"), py::arg("source") = py::none(), py::kw_only(),
            py::arg("edges") = py::none(), py::arg("route") = py::none(), py::arg("threads") = 0,
-           with_options("`goal`: name or id of a view of the memory file. `edges`: 'map', "
-                        "'lattice', 'links' or 'arrangement' (made now); None: the first that "
-                        "the memory has. `route`: a recorded route to go along where the way "
-                        "leads along it; only then there are options route_*.",
-                        {options_of<NavigatorOptions>(), options_of<PlannerOptions>(),
-                         options_of<BaseOptions>(), options_of<KnownRouteOptions>("route")})
+           append_option_list(
+               "`goal`: name or id of a view of the memory file. `edges`: 'map', "
+               "'lattice', 'links' or 'arrangement' (computed now); None: the first that "
+               "the memory has. `route`: a recorded route to follow on parts of the path "
+               "that lie on it; only then the options route_* are allowed.",
+               {options_of<NavigatorOptions>(), options_of<PlannerOptions>(),
+                options_of<BaseOptions>(), options_of<KnownRouteOptions>("route")})
                .c_str())
       .def(
           "step",
           [](SharedNavigator& navigator, const py::object& observation, bool obstacle,
              std::optional<std::uint32_t> estimate) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             return navigator.change([&](RobotNavigator& n) {
               RobotReport report{.obstacle = obstacle};
               if (estimate) report.estimate = ViewId{*estimate};
@@ -102,9 +103,9 @@ void bind_navigation(py::module_& m) {
             });
           },
           py::arg("observation"), py::arg("obstacle") = false, py::arg("estimate") = py::none(),
-          "To be called once in each period of the base (period_s). `obstacle`: something stopped "
-          "the robot. `estimate`: the view where another estimate has it, where that is certain. "
-          "The observation's odometry says when a step is done; without, time does.")
+          "Call it once in each period of the base (period_s). `obstacle`: an obstacle stopped "
+          "the robot. `estimate`: the robot's view by another, certain estimate. "
+          "A step ends by the observation's odometry, or without it by time.")
       .def(
           "set_goal",
           [](SharedNavigator& navigator, const std::string& goal) {
@@ -113,8 +114,8 @@ void bind_navigation(py::module_& m) {
               return 0;
             });
           },
-          py::arg("goal"), "Another goal; where the robot is stays known.")
-      .def("name_of", view_name, py::arg("view"), "Of a view of the memory.")
+          py::arg("goal"), "Sets another goal; the estimated position is kept.")
+      .def("name_of", view_name, py::arg("view"), "Returns the name of a view.")
       .def_property_readonly(
           "goal",
           [](SharedNavigator& navigator) {
@@ -138,7 +139,7 @@ void bind_navigation(py::module_& m) {
               return edges;
             });
           },
-          "Pairs of views.");
+          "Edges as pairs of views.");
 }
 
 }  // namespace panonav::python

@@ -9,23 +9,23 @@
 
 namespace panonav::python {
 
-ColumnDirection direction_of(const std::string& name) {
+ColumnDirection parse_direction(const std::string& name) {
   if (name == "clockwise") return ColumnDirection::clockwise;
   if (name == "counter-clockwise") return ColumnDirection::counter_clockwise;
   throw ContractError("direction", "'" + name + "'", "'clockwise', 'counter-clockwise'");
 }
 
-CameraModel camera_model_from(const std::string& name, const py::dict& parameters) {
+CameraModel make_camera_model(const std::string& name, const py::dict& parameters) {
   auto model = make_default_model(name);
   if (!model) throw ContractError("model", "'" + name + "'", "a name of `camera_models`");
-  py::dict left = parameters.attr("copy")();
+  py::dict unused = parameters.attr("copy")();
   visit_parameters(*model, [&](const auto& parameter, auto& value) {
     const py::str key{std::string(parameter)};
-    if (!left.contains(key)) return;
-    value = left.attr("pop")(key).template cast<std::remove_cvref_t<decltype(value)>>();
+    if (!unused.contains(key)) return;
+    value = unused.attr("pop")(key).template cast<std::remove_cvref_t<decltype(value)>>();
   });
-  if (!left.empty()) {
-    throw ContractError("parameter", std::string(py::repr(left.begin()->first)),
+  if (!unused.empty()) {
+    throw ContractError("parameter", std::string(py::repr(unused.begin()->first)),
                         "those of the model '" + name + "'");
   }
   return *model;
@@ -39,14 +39,14 @@ std::string name_of(ColumnDirection direction) {
 
 constexpr std::array<const char*, 3> kind_names{"panorama", "equirectangular", "mirror"};
 
-PictureKind kind_of(const std::string& name) {
+PictureKind parse_kind(const std::string& name) {
   for (std::size_t i = 0; i < kind_names.size(); ++i) {
     if (name == kind_names[i]) return static_cast<PictureKind>(i);
   }
   throw ContractError("kind", "'" + name + "'", "'panorama', 'equirectangular', 'mirror'");
 }
 
-py::dict parameters_of(const CameraModel& model) {
+py::dict to_parameter_dict(const CameraModel& model) {
   py::dict all;
   visit_parameters(
       model, [&](const auto& name, const auto& value) { all[py::str(std::string(name))] = value; });
@@ -55,18 +55,18 @@ py::dict parameters_of(const CameraModel& model) {
 
 void bind_cameras(py::module_& m) {
   py::class_<Camera>(m, "Camera",
-                     "A camera that sees all azimuths: how its pixels and the directions in the "
-                     "robot frame belong together.")
+                     "A camera that sees all azimuths: converts between pixels and directions in "
+                     "the robot frame.")
       .def(py::init([](const std::string& model, std::pair<int, int> image_size,
                        const py::dict& parameters, std::pair<double, double> centre,
                        double rim_radius_px, double inner_radius_px, const std::string& direction,
                        double forward_angle_rad, double forward_column) {
-             Camera camera{.model = camera_model_from(model, parameters),
+             Camera camera{.model = make_camera_model(model, parameters),
                            .image_size = {image_size.first, image_size.second},
                            .centre = {centre.first, centre.second},
                            .rim_radius_px = rim_radius_px,
                            .inner_radius_px = inner_radius_px,
-                           .direction = direction_of(direction),
+                           .direction = parse_direction(direction),
                            .forward_angle_rad = forward_angle_rad,
                            .forward_column = forward_column};
              validate(camera);
@@ -76,14 +76,14 @@ void bind_cameras(py::module_& m) {
            py::kw_only(), py::arg("centre") = std::pair(0.0, 0.0), py::arg("rim_radius_px") = 0.0,
            py::arg("inner_radius_px") = 0.0, py::arg("direction") = "clockwise",
            py::arg("forward_angle_rad") = 0.0, py::arg("forward_column") = 0.5,
-           "`model`: one of `camera_models`; `parameters`: a dictionary of its numbers, as a "
-           "camera file names them; `image_size`: (width, height). Centre and radii in pixels are "
+           "`model`: one of `camera_models`; `parameters`: a dictionary, with names as in a "
+           "camera file; `image_size`: (width, height). Centre and radii in pixels are "
            "those of a mirror.")
       .def_property_readonly(
           "model", [](const Camera& c) { return model_name(c.model); }, "One of `camera_models`.")
       .def_property_readonly(
-          "parameters", [](const Camera& c) { return parameters_of(c.model); },
-          "Of the model: a dictionary of numbers, as a camera file names them.")
+          "parameters", [](const Camera& c) { return to_parameter_dict(c.model); },
+          "Parameters of the model: a dictionary, with names as in a camera file.")
       .def_property_readonly(
           "image_size",
           [](const Camera& c) { return std::pair(c.image_size.width, c.image_size.height); },
@@ -91,19 +91,19 @@ void bind_cameras(py::module_& m) {
       .def_property_readonly(
           "centre", [](const Camera& c) { return std::pair(c.centre.u_px, c.centre.v_px); },
           "(u, v) of the mirror in pixels.")
-      .def_readonly("rim_radius_px", &Camera::rim_radius_px, "Of a mirror: nothing is seen beyond.")
+      .def_readonly("rim_radius_px", &Camera::rim_radius_px, "Outer radius of the mirror.")
       .def_readonly("inner_radius_px", &Camera::inner_radius_px,
-                    "Of a mirror: nothing is seen within.")
+                    "Radius of the camera's reflection in the mirror.")
       .def_property_readonly(
           "direction", [](const Camera& c) { return name_of(c.direction); },
-          "How azimuth runs in the picture as it is shown: 'clockwise' or 'counter-clockwise'.")
+          "Direction of increasing azimuth in the image: 'clockwise' or 'counter-clockwise'.")
       .def_readonly("forward_angle_rad", &Camera::forward_angle_rad,
-                    "Of a mirror: image angle of forward, counter-clockwise from the right.")
+                    "Mirror: image angle of forward, counter-clockwise from the right.")
       .def_readonly("forward_column", &Camera::forward_column,
-                    "Equirectangular: fraction of the width that looks along the heading, 0 to 1.")
+                    "Equirectangular: column of the forward direction, as a fraction of the width.")
       .def_property_readonly(
           "visible_elevations", [](const Camera& c) { return visible_elevations(c); },
-          "(lowest, highest) elevation in radians that is seen at every azimuth.")
+          "(lowest, highest) elevation in radians that is visible at every azimuth.")
       .def(
           "project",
           [](const Camera& camera, const std::tuple<double, double, double>& direction) {
@@ -111,7 +111,7 @@ void bind_cameras(py::module_& m) {
             return pixel ? std::optional(std::pair(pixel->u_px, pixel->v_px)) : std::nullopt;
           },
           py::arg("direction"),
-          "The pixel (u, v) that shows a direction (x, y, z) of the robot frame; None where the "
+          "Returns the pixel (u, v) of a direction (x, y, z) of the robot frame; None if the "
           "camera does not see it.")
       .def(
           "unproject",
@@ -119,7 +119,7 @@ void bind_cameras(py::module_& m) {
             const auto d = unproject(camera, {pixel.first, pixel.second});
             return d ? std::optional(std::tuple(d->x, d->y, d->z)) : std::nullopt;
           },
-          py::arg("pixel"), "The unit direction (x, y, z) that a pixel (u, v) shows, or None.")
+          py::arg("pixel"), "Returns the unit direction (x, y, z) of a pixel (u, v), or None.")
       .def("__eq__", [](const Camera& a, const Camera& b) { return a == b; })
       .def("__repr__",
            [](const Camera& c) {
@@ -132,7 +132,7 @@ void bind_cameras(py::module_& m) {
       py::cast(std::vector<std::string>(camera_model_names.begin(), camera_model_names.end())));
   m.def(
       "read_camera", [](const std::filesystem::path& path) { return read_camera(path).camera; },
-      py::arg("path"), "The camera of a camera file (camera.toml). Raises FileError.");
+      py::arg("path"), "Reads a camera file (camera.toml). Raises FileError.");
   m.def(
       "write_camera",
       [](const std::filesystem::path& path, const Camera& camera, const py::object& mask) {
@@ -141,26 +141,26 @@ void bind_cameras(py::module_& m) {
         write_camera(path, file);
       },
       py::arg("path"), py::arg("camera"), py::arg("mask") = py::none(),
-      "Writes a camera file, whole or not at all; a mask (uint8, 0 where the robot itself is seen) "
-      "goes beside it.");
+      "Writes a camera file atomically; a mask (uint8, 0 where the robot itself is visible) "
+      "is written next to it.");
 
   py::class_<Unwarper>(m, "Unwarper",
-                       "Turns the pictures of one camera into panoramas by a table that is "
-                       "computed once. Several threads may use one at a time.")
-      .def(
-          py::init([](const Camera& camera, const std::optional<ElevationBand>& elevations,
-                      const py::kwargs& keywords) {
-            UnwarperOptions options;
-            Keywords(keywords).options(options).finish();
-            options.elevations = elevations;
-            const py::gil_scoped_release free;
-            return std::make_unique<Unwarper>(camera, options);
-          }),
-          py::arg("camera"), py::arg("elevations") = py::none(),
-          with_options("`elevations`: the band (bottom, top) in radians; None: all that the camera "
-                       "sees at every azimuth.",
-                       {options_of<UnwarperOptions>()})
-              .c_str())
+                       "Converts images of one camera to panoramas with a table that is "
+                       "computed once. Several threads may use it at the same time.")
+      .def(py::init([](const Camera& camera, const std::optional<ElevationBand>& elevations,
+                       const py::kwargs& keywords) {
+             UnwarperOptions options;
+             Keywords(keywords).options(options).finish();
+             options.elevations = elevations;
+             const py::gil_scoped_release free;
+             return std::make_unique<Unwarper>(camera, options);
+           }),
+           py::arg("camera"), py::arg("elevations") = py::none(),
+           append_option_list(
+               "`elevations`: the band (bottom, top) in radians; None: all that the camera "
+               "sees at every azimuth.",
+               {options_of<UnwarperOptions>()})
+               .c_str())
       .def_property_readonly("rows", &Unwarper::rows, "Of its panoramas.")
       .def_property_readonly("columns", &Unwarper::columns, "Of its panoramas.")
       .def_property_readonly("elevations", &Unwarper::elevations,
@@ -180,8 +180,8 @@ void bind_cameras(py::module_& m) {
 
 void bind_panoramas(py::module_& m) {
   py::class_<Panorama>(m, "Panorama",
-                       "A panoramic cylinder of float32: row 0 is the highest elevation, column c "
-                       "looks along azimuth 2 pi c / columns, counter-clockwise, forward at 0.")
+                       "A panorama of float32: row 0 is the highest elevation, column c "
+                       "has azimuth 2 pi c / columns, counter-clockwise, 0 forward.")
       .def(py::init(&panorama_from_array), py::arg("values"), py::arg("elevations") = py::none(),
            "`values`: float32, or uint8 for 0 to 1, of (rows, columns), with any strides; copied. "
            "`elevations`: (bottom, top) of the band in radians; None: unknown.")
@@ -196,9 +196,9 @@ void bind_panoramas(py::module_& m) {
           "values",
           [](const py::object& self) {
             const auto& p = self.cast<const Panorama&>();
-            return read_only<float>({p.rows(), p.columns()}, p.values().data(), self);
+            return make_read_only_array<float>({p.rows(), p.columns()}, p.values().data(), self);
           },
-          "Read-only array of (rows, columns) that looks at the panorama itself.")
+          "Read-only array of (rows, columns) that shares the panorama's memory.")
       .def(
           "__array__",
           [](const py::object& self, const py::object& dtype) -> py::object {
@@ -211,8 +211,8 @@ void bind_panoramas(py::module_& m) {
           py::arg("columns"),
           "The view after a rotation of the robot by this many columns, counter-clockwise.")
       .def(
-          "to_picture", [](const Panorama& p) { return array_of(to_picture(p)); },
-          "As a picture for people: uint8, clockwise, forward in the middle.")
+          "to_picture", [](const Panorama& p) { return to_array(to_picture(p)); },
+          "Returns an image to show: uint8, clockwise, forward in the middle.")
       .def("__eq__", [](const Panorama& a, const Panorama& b) { return a == b; })
       .def("__repr__",
            [](const Panorama& p) {
@@ -225,7 +225,7 @@ void bind_panoramas(py::module_& m) {
       "level_panorama",
       [](const Panorama& seen, const Tilt& tilt) { return level_panorama(seen, tilt); },
       py::arg("panorama"), py::arg("tilt"), py::call_guard<py::gil_scoped_release>(),
-      "The view of a robot with a vertical axis; `tilt` is (roll, pitch) in radians.");
+      "Removes the tilt of the robot from a panorama; `tilt` is (roll, pitch) in radians.");
   m.def(
       "preprocess",
       [](const Panorama& panorama, const py::kwargs& keywords) {
@@ -235,36 +235,35 @@ void bind_panoramas(py::module_& m) {
         return preprocess(panorama, options);
       },
       py::arg("panorama"),
-      with_options("Processing of a panorama before its signature is computed.",
-                   {options_of<PreprocessingOptions>()})
+      append_option_list("Processes a panorama before its signature is computed.",
+                         {options_of<PreprocessingOptions>()})
           .c_str());
 
   bind_cameras(m);
   py::class_<PictureSource>(m, "PictureSource",
-                            "How pictures become panoramas: all that is known of the camera.")
-      .def(
-          py::init([](const std::string& kind, const std::optional<ElevationBand>& elevations,
-                      const std::optional<ElevationBand>& kept_elevations,
-                      const std::string& direction, double forward_column,
-                      const std::optional<Camera>& camera, const py::object& mask) {
-            PictureSource source{.kind = kind_of(kind),
-                                 .layout = {.direction = direction_of(direction),
-                                            .forward_column = forward_column,
-                                            .elevations = elevations,
-                                            .kept_elevations = kept_elevations},
-                                 .camera = camera,
-                                 .mask = std::nullopt};
-            if (!mask.is_none()) source.mask = PictureArray(mask, "mask").image();
-            return source;
-          }),
-          py::arg("kind") = "panorama", py::kw_only(), py::arg("elevations") = py::none(),
-          py::arg("kept_elevations") = py::none(), py::arg("direction") = "clockwise",
-          py::arg("forward_column") = 0.5, py::arg("camera") = py::none(),
-          py::arg("mask") = py::none(),
-          "`kind`: 'panorama', 'equirectangular' or 'mirror' (which needs `camera`). Bands are "
-          "(bottom, top) in radians: of the picture's edges, and of the part to keep. `direction`: "
-          "how columns run, 'clockwise' or 'counter-clockwise'. `mask`: uint8, 0 where the robot "
-          "itself is seen.")
+                            "Image layout: how images are converted to panoramas.")
+      .def(py::init([](const std::string& kind, const std::optional<ElevationBand>& elevations,
+                       const std::optional<ElevationBand>& kept_elevations,
+                       const std::string& direction, double forward_column,
+                       const std::optional<Camera>& camera, const py::object& mask) {
+             PictureSource source{.kind = parse_kind(kind),
+                                  .layout = {.direction = parse_direction(direction),
+                                             .forward_column = forward_column,
+                                             .elevations = elevations,
+                                             .kept_elevations = kept_elevations},
+                                  .camera = camera,
+                                  .mask = std::nullopt};
+             if (!mask.is_none()) source.mask = PictureArray(mask, "mask").image();
+             return source;
+           }),
+           py::arg("kind") = "panorama", py::kw_only(), py::arg("elevations") = py::none(),
+           py::arg("kept_elevations") = py::none(), py::arg("direction") = "clockwise",
+           py::arg("forward_column") = 0.5, py::arg("camera") = py::none(),
+           py::arg("mask") = py::none(),
+           "`kind`: 'panorama', 'equirectangular' or 'mirror' (which needs `camera`). Bands are "
+           "(bottom, top) in radians: of the image's edges, and of the part to keep. `direction`: "
+           "how columns run, 'clockwise' or 'counter-clockwise'. `mask`: uint8, 0 where the robot "
+           "itself is seen.")
       .def_property_readonly(
           "kind",
           [](const PictureSource& s) { return kind_names[static_cast<std::size_t>(s.kind)]; },
@@ -281,8 +280,8 @@ void bind_panoramas(py::module_& m) {
           "'counter-clockwise'.")
       .def_property_readonly(
           "forward_column", [](const PictureSource& s) { return s.layout.forward_column; },
-          "Fraction of the width that shows the direction of the heading, 0 to 1.")
-      .def_readonly("camera", &PictureSource::camera, "Of the kind 'mirror', else None.")
+          "Column of the forward direction, as a fraction of the width.")
+      .def_readonly("camera", &PictureSource::camera, "For 'mirror', otherwise None.")
       .def("__eq__", [](const PictureSource& a, const PictureSource& b) { return a == b; })
       .def("__repr__",
            [](const PictureSource& s) {
@@ -290,16 +289,15 @@ void bind_panoramas(py::module_& m) {
                     "')";
            })
       .attr("__hash__") = py::none();
-  py::class_<PanoramaReader>(
-      m, "PanoramaReader",
-      "Turns the pictures of one source into panoramas of one shape. Several "
-      "threads may use one at a time.")
+  py::class_<PanoramaReader>(m, "PanoramaReader",
+                             "Converts images of one source to panoramas of one shape. Several "
+                             "threads may use it at the same time.")
       .def(py::init([](const PictureSource& source, const PanoramaShape& shape) {
              return PanoramaReader(source, shape);
            }),
            py::arg("source"), py::arg("shape") = PanoramaShape{},
            py::call_guard<py::gil_scoped_release>(),
-           "`shape`: (rows, columns); 0 keeps the pictures' own, 80 x 512 for mirror pictures.")
+           "`shape`: (rows, columns); 0: that of the images, or 80 x 512 for mirror images.")
       .def(
           "convert",
           [](const PanoramaReader& reader, const py::object& picture, const Tilt& tilt) {
@@ -308,8 +306,8 @@ void bind_panoramas(py::module_& m) {
             return reader.convert(pixels.view(), tilt);
           },
           py::arg("picture"), py::arg("tilt") = Tilt{},
-          "The panorama of a picture; with a tilt (roll, pitch), what a level robot would have "
-          "seen.")
+          "Returns the panorama of an image; with a tilt (roll, pitch) as a level robot would have "
+          "taken it.")
       .def("read", &PanoramaReader::read, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
            "Reads a PNG or JPEG file and converts it.");
 }

@@ -25,8 +25,8 @@ Dataset open_with_warnings(const std::filesystem::path& path, const InputOptions
 
 }  // namespace
 
-Dataset dataset_from(const py::handle& recording, const std::optional<PictureSource>& source,
-                     const std::optional<PictureSource>& default_source) {
+Dataset to_dataset(const py::handle& recording, const std::optional<PictureSource>& source,
+                   const std::optional<PictureSource>& default_source) {
   if (!py::isinstance<Dataset>(recording)) {
     InputOptions options;
     options.source = source;
@@ -37,7 +37,7 @@ Dataset dataset_from(const py::handle& recording, const std::optional<PictureSou
   return recording.cast<const Dataset&>();
 }
 
-std::optional<PictureSource> remembered_source(const std::filesystem::path& memory) {
+std::optional<PictureSource> read_stored_source(const std::filesystem::path& memory) {
   const py::gil_scoped_release free;
   if (!memory_exists(memory)) return std::nullopt;
   return MemoryFile::open(memory, Access::read_only).header().source;
@@ -48,17 +48,17 @@ namespace {
 py::object get_picture(const Observation& observation) {
   if (const auto* panorama = std::get_if<Panorama>(&observation.picture))
     return py::cast(*panorama);
-  return array_of(std::get<Image>(observation.picture));
+  return to_array(std::get<Image>(observation.picture));
 }
 
 void bind_observations(py::module_& m) {
   py::class_<Observation>(m, "Observation",
-                          "One moment of a robot: what its camera saw, and what else is known of "
-                          "it. A picture alone counts as one.")
+                          "An image of a robot's camera and the other data that are known for "
+                          "it. An image alone is accepted, too.")
       .def(py::init([](const py::object& picture, const std::string& name,
                        std::optional<double> stamp_s, const std::optional<Pose2>& odometry,
                        const std::optional<ReferencePose>& pose, const std::optional<Tilt>& tilt) {
-             Observation observation = observation_from(picture);
+             Observation observation = to_observation(picture);
              if (!name.empty()) observation.name = name;
              observation.stamp_s = stamp_s;
              observation.odometry = odometry;
@@ -71,16 +71,14 @@ void bind_observations(py::module_& m) {
            py::arg("tilt") = py::none(),
            "`picture`: a Panorama, an array of pixels as the camera delivers them (uint8), or the "
            "path of a picture. `odometry`: absolute, in a frame that drifts. `pose`: in the world "
-           "frame, where it is known. `tilt`: (roll, pitch) in radians.")
+           "frame, if it is known. `tilt`: (roll, pitch) in radians.")
       .def_property_readonly("picture", &get_picture, "A Panorama, or an array of pixels.")
-      .def_readonly("name", &Observation::name,
-                    "Of the view that a memory keeps; messages name it.")
-      .def_readonly("stamp_s", &Observation::stamp_s, "When it was taken, seconds, or None.")
+      .def_readonly("name", &Observation::name, "Name of the image, and of its view in a memory.")
+      .def_readonly("stamp_s", &Observation::stamp_s, "Seconds at which it was taken, or None.")
       .def_readonly("odometry", &Observation::odometry,
                     "Absolute, in a frame that drifts against the world, or None.")
-      .def_readonly(
-          "pose", &Observation::pose,
-          "In the world frame, where it is known; no estimate of the picture's own place reads it.")
+      .def_readonly("pose", &Observation::pose,
+                    "In the world frame, if known; localisation of this image does not use it.")
       .def_property_readonly(
           "tilt", [](const Observation& o) { return o.tilt; },
           "(roll, pitch) in radians as an inertial sensor measured it, or None.")
@@ -88,10 +86,10 @@ void bind_observations(py::module_& m) {
 }
 
 void bind_datasets(py::module_& m) {
-  Record<DatasetEntry>(m, "DatasetEntry", "One picture of a data set and what is known of it.")
-      .field("file", &DatasetEntry::file, "As the data set names it; unique.")
+  Record<DatasetEntry>(m, "DatasetEntry", "An image of a data set and its data.")
+      .field("file", &DatasetEntry::file, "Name of the file in the data set; unique.")
       .field("stamp_s", &DatasetEntry::stamp_s,
-             "When it was taken, seconds on the recording's clock, or None.")
+             "Time at which it was taken, seconds of the recording's clock, or None.")
       .field("pose", &DatasetEntry::pose, "In the world frame, or None.")
       .field("odometry", &DatasetEntry::odometry, "In the odometry frame, or None.")
       .field(
@@ -101,8 +99,8 @@ void bind_datasets(py::module_& m) {
           "observation", [](const DatasetEntry& entry) { return read_observation(entry); },
           py::call_guard<py::gil_scoped_release>(), "Reads the picture. Raises FileError.");
   py::class_<Dataset>(m, "Dataset",
-                      "A recording: pictures in order, which are read when they are needed. "
-                      "Iterating gives its observations.")
+                      "A recording: images in order, which are read only when needed. "
+                      "Iterating returns its observations.")
       .def(
           py::init([](const std::filesystem::path& path, const std::optional<PictureSource>& source,
                       bool recursive, const std::optional<std::string>& image_topic,
@@ -119,13 +117,13 @@ void bind_datasets(py::module_& m) {
           py::arg("recursive") = false, py::arg("image_topic") = py::none(),
           py::arg("odometry_topic") = py::none(), py::arg("odometry_frames") = py::none(),
           py::arg("imu_topic") = py::none(),
-          "A data set (a folder with dataset.toml) describes itself and refuses `source`, which "
-          "says how the pictures of a folder, a video, a recording of topics (MCAP, rosbag2, "
-          "ROS 1 bag) or a single picture lie. `recursive`: pictures of the folders within a "
-          "folder, too. Topics of a recording are found by their types where they are not named; "
-          "`odometry_frames`: odometry from the transforms between these two frames. What is left "
-          "out or looks wrong is a UserWarning.")
-      .def_readonly("source", &Dataset::source, "How all pictures lie.")
+          "`source` is the image layout; it is not allowed for a data set (with dataset.toml). It "
+          "describes the images of a folder, a video, a recording of topics (MCAP, rosbag2, "
+          "ROS 1 bag), or a single image. `recursive`: also read the subfolders of a "
+          "folder. Topics that are not named are found by their types; "
+          "`odometry_frames`: odometry from the transforms between these two frames. Skipped or "
+          "suspicious data cause a UserWarning.")
+      .def_readonly("source", &Dataset::source, "Layout of all images.")
       .def_readonly("entries", &Dataset::entries, "In the order in which they were taken.")
       .def_readonly("left_out", &Dataset::left_out, "Files of a folder that are no images.")
       .def("__len__", [](const Dataset& d) { return d.entries.size(); })
@@ -150,7 +148,7 @@ void bind_datasets(py::module_& m) {
           },
           py::arg("every") = 1, py::kw_only(), py::arg("every_s") = py::none(),
           py::arg("from_s") = py::none(), py::arg("to_s") = py::none(),
-          "A part of it: each n-th picture, or by seconds from the first.")
+          "Returns a part: every n-th image, or by seconds from the first.")
       .def("__repr__", [](const Dataset& d) {
         return "Dataset('" + d.folder.string() + "', " + std::to_string(d.entries.size()) +
                " pictures)";
@@ -165,10 +163,10 @@ void bind_images(py::module_& m) {
           const py::gil_scoped_release free;
           return read_image(path);
         }();
-        return array_of(image);
+        return to_array(image);
       },
       py::arg("path"),
-      "A PNG or JPEG file, upright, as uint8 of (rows, columns) or (rows, columns, 3).");
+      "Reads a PNG or JPEG file, upright: uint8 of (rows, columns) or (rows, columns, 3).");
   m.def(
       "write_png",
       [](const std::filesystem::path& path, const py::object& picture) {
@@ -176,16 +174,16 @@ void bind_images(py::module_& m) {
         const py::gil_scoped_release free;
         write_png(path, pixels.view());
       },
-      py::arg("path"), py::arg("picture"), "Writes a PNG that appears whole or not at all.");
+      py::arg("path"), py::arg("picture"), "Writes a PNG file atomically.");
 }
 
 void bind_memorising(py::module_& m) {
   Record<Memoriser::Counts>(m, "MemorisedCounts", "Numbers of views added to a memory.")
-      .field("appended", &Memoriser::Counts::appended, "Views.")
+      .field("appended", &Memoriser::Counts::appended, "Number of added views.")
       .field("known_before", &Memoriser::Counts::known_before,
-             "Observations whose views were there.");
+             "Observations whose views were already stored.");
   const std::string option_text =
-      with_options("", {options_of<SignatureOptions>(), options_of<PreprocessingOptions>()});
+      append_option_list("", {options_of<SignatureOptions>(), options_of<PreprocessingOptions>()});
   const auto options_from = [](const std::optional<PictureSource>& source, bool thumbnails,
                                bool features, const py::kwargs& keywords) {
     MemoriserOptions options{.source = source, .thumbnails = thumbnails, .features = features};
@@ -194,7 +192,7 @@ void bind_memorising(py::module_& m) {
   };
   using SharedMemoriser = Shared<Memoriser>;
   py::class_<SharedMemoriser>(m, "Memoriser",
-                              "Appends observations to a memory file, which is made where there is "
+                              "Appends observations to a memory file, which is created if there is "
                               "none.")
       .def(py::init([=](const std::filesystem::path& memory,
                         const std::optional<PictureSource>& source, bool thumbnails, bool features,
@@ -204,14 +202,14 @@ void bind_memorising(py::module_& m) {
            }),
            py::arg("memory"), py::arg("source") = py::none(), py::arg("thumbnails") = true,
            py::arg("features") = true,
-           ("`source` says how pictures lie; a new file needs it. Options are those of a new "
+           ("`source` is the image layout; a new file needs it. Options are those of a new "
             "file." +
             option_text)
                .c_str())
       .def(
           "add",
           [](SharedMemoriser& memoriser, const py::object& observation, const std::string& name) {
-            Observation seen = observation_from(observation);
+            Observation seen = to_observation(observation);
             if (!name.empty()) seen.name = name;
             memoriser.change([&](Memoriser& one) { one.add(std::move(seen)); });
           },
@@ -223,13 +221,13 @@ void bind_memorising(py::module_& m) {
           [](SharedMemoriser& memoriser) {
             return memoriser.change([](Memoriser& one) { return one.finish(); });
           },
-          "Writes what still waits and keeps in the file what is learnt of its views.");
+          "Writes pending views and stores the models learnt from all views.");
   m.def(
       "memorise",
       [=](const py::object& recording, const std::filesystem::path& memory,
           const std::optional<PictureSource>& source, bool thumbnails, bool features, int threads,
           const py::kwargs& keywords) {
-        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
+        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
         const auto options = options_from(dataset.source, thumbnails, features, keywords);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
@@ -249,10 +247,10 @@ void bind_memorising(py::module_& m) {
       },
       py::arg("recording"), py::arg("memory"), py::arg("source") = py::none(),
       py::arg("thumbnails") = true, py::arg("features") = true, py::arg("threads") = 0,
-      ("Remembers what the places of a recording look like, as `panonav memorise` does.\n\n"
-       "`recording`: a Dataset or a path; `memory`: the file, which grows if it is there. A "
-       "picture that cannot be read raises FileError; those before it are kept. threads: 0 takes "
-       "one for each core." +
+      ("Stores the images of a recording as views in a memory, like `panonav memorise`.\n\n"
+       "`recording`: a Dataset or a path; `memory`: the file, new or existing. An "
+       "image that cannot be read raises FileError; those before it are stored. threads: 0: "
+       "one per core." +
        option_text)
           .c_str());
 }

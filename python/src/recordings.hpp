@@ -8,12 +8,12 @@
 
 namespace panonav::python {
 
-/// Returns a `Dataset` of Python as it is, or opens a path (`open_input`) and passes its warnings
-/// on to Python. Throws OptionError on a source of what says itself how its pictures lie.
-[[nodiscard]] Dataset dataset_from(const py::handle& recording,
-                                   const std::optional<PictureSource>& source,
-                                   const std::optional<PictureSource>& default_source = {});
-/// Returns how the pictures lay that the memory was made from; `nullopt` where there is no memory.
-[[nodiscard]] std::optional<PictureSource> remembered_source(const std::filesystem::path& memory);
+/// Returns a Python `Dataset` unchanged, or opens a path (`open_input`) and issues its warnings in
+/// Python. Throws OptionError if `source` is set for data that states its own image layout.
+[[nodiscard]] Dataset to_dataset(const py::handle& recording,
+                                 const std::optional<PictureSource>& source,
+                                 const std::optional<PictureSource>& default_source = {});
+/// Returns the layout of the images from which the memory was made; nullopt if there is no memory.
+[[nodiscard]] std::optional<PictureSource> read_stored_source(const std::filesystem::path& memory);
 
 }  // namespace panonav::python

@@ -25,8 +25,8 @@ auto fix_field(Value RouteFix::*member) {
   };
 }
 
-RouteFollowerOptions follower_options(const std::optional<std::string>& name, bool use_odometry,
-                                      const py::kwargs& keywords) {
+RouteFollowerOptions make_follower_options(const std::optional<std::string>& name,
+                                           bool use_odometry, const py::kwargs& keywords) {
   RouteFollowerOptions options{.name = name, .use_odometry = use_odometry};
   Keywords(keywords).options(options.tracker).options(options.fit).finish();
   return options;
@@ -35,12 +35,12 @@ RouteFollowerOptions follower_options(const std::optional<std::string>& name, bo
 void bind_following(py::module_& m) {
   Record<RouteChanges::AzimuthRange>(m, "AzimuthRange", "Azimuths in the robot's frame.")
       .field("from_rad", &RouteChanges::AzimuthRange::from_rad, "In [-pi, pi).")
-      .field("to_rad", &RouteChanges::AzimuthRange::to_rad, "Counter-clockwise from the first.");
-  Record<NamedStep>(m, "RouteStep", "Where a robot is beside a route.")
-      .field("name", &NamedStep::name, "Of the picture, where it has one.")
+      .field("to_rad", &RouteChanges::AzimuthRange::to_rad, "Counter-clockwise from from_rad.");
+  Record<NamedStep>(m, "RouteStep", "Pose of a robot relative to a route.")
+      .field("name", &NamedStep::name, "Name of the image, if it has one.")
       .field(
           "on_route", [](const NamedStep& s) { return s.fix.has_value(); },
-          "Where not, all else is None.")
+          "If False, the values of the fix are None.")
       .field("pose", fix_field(&RouteFix::pose), "In the route's frame.")
       .field(
           "origin",
@@ -51,14 +51,14 @@ void bind_following(py::module_& m) {
           "'prediction', 'recovery' or 'search'.")
       .field("along_m", fix_field(&RouteFix::along_m), "Path length along the route.")
       .field("lateral_m", fix_field(&RouteFix::lateral_m),
-             "From the route to the robot; positive to the left.")
+             "Distance of the robot from the route; positive to the left.")
       .field("correlation", fix_field(&RouteFix::correlation),
-             "Of what is seen and what the route shows from there, -1 to 1.")
+             "Correlation of observed and predicted line, -1 to 1.")
       .field("residual", fix_field(&RouteFix::residual),
-             "Robust root mean square of what the fit leaves, over the standard deviation of what "
-             "the route shows.")
+             "Robust root mean square of the residuals of the fit, relative to the standard "
+             "deviation of the predicted line.")
       .field("columns", fix_field(&RouteFix::columns),
-             "Directions in which the line of sight crosses the path.")
+             "Number of directions whose line of sight crosses the path.")
       .field(
           "covariance",
           [](const NamedStep& s) -> std::optional<py::array_t<double>> {
@@ -66,7 +66,7 @@ void bind_following(py::module_& m) {
             return py::array_t<double>({3, 3}, s.fix->covariance.data());
           },
           "(3, 3) of x, y in m and heading in rad.")
-      .field("changed", &NamedStep::changed, "Where the scene is not as remembered.")
+      .field("changed", &NamedStep::changed, "Azimuths at which the scene has changed.")
       .field(
           "line",
           [](const NamedStep& s) {
@@ -74,38 +74,38 @@ void bind_following(py::module_& m) {
           },
           "The scanline of the observation, float32.");
   const std::string option_text =
-      with_options("", {options_of<RouteTrackerOptions>(), options_of<RouteFitOptions>()});
+      append_option_list("", {options_of<RouteTrackerOptions>(), options_of<RouteFitOptions>()});
   using SharedFollower = Shared<RouteFollower>;
   py::class_<SharedFollower>(m, "RouteFollower",
-                             "Says where a robot is beside a recorded route, one observation after "
-                             "the other.")
+                             "Localises a robot relative to a recorded route, one image after "
+                             "another.")
       .def(py::init([](const std::filesystem::path& memory, const std::optional<std::string>& name,
                        const std::optional<PictureSource>& source, bool use_odometry,
                        const py::kwargs& keywords) {
-             const auto options = follower_options(name, use_odometry, keywords);
+             const auto options = make_follower_options(name, use_odometry, keywords);
              const py::gil_scoped_release free;
              return std::make_unique<SharedFollower>(MemoryFile::open(memory, Access::read_only),
                                                      source, options);
            }),
            py::arg("memory"), py::arg("name") = py::none(), py::arg("source") = py::none(),
            py::arg("use_odometry") = true,
-           ("`name`: of the route; None: the only one that there is." + option_text).c_str())
+           ("`name`: name of the route; None: the only one in the file." + option_text).c_str())
       .def(
           "step",
           [](SharedFollower& follower, const py::object& observation) {
-            const Observation seen = observation_from(observation);
+            const Observation seen = to_observation(observation);
             return follower.change([&](RouteFollower& one) {
               return NamedStep{one.step(seen), seen.name};
             });
           },
-          py::arg("observation"), "The next observation.");
+          py::arg("observation"), "Processes the next observation.");
   m.def(
       "follow_route",
       [](const std::filesystem::path& memory, const py::object& recording,
          const std::optional<std::string>& name, const std::optional<PictureSource>& source,
          bool use_odometry, int threads, const py::kwargs& keywords) {
-        auto options = follower_options(name, use_odometry, keywords);
-        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
+        auto options = make_follower_options(name, use_odometry, keywords);
+        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
         options.use_odometry = use_odometry && !odometry_poses(dataset).empty();
@@ -124,7 +124,7 @@ void bind_following(py::module_& m) {
       py::arg("memory"), py::arg("recording"), py::arg("name") = py::none(),
       py::arg("source") = py::none(), py::kw_only(), py::arg("use_odometry") = true,
       py::arg("threads") = 0,
-      ("Where the robot of a recording is beside a route, as `panonav route follow` says." +
+      ("Localises the robot of a recording relative to a route, like `panonav route follow`." +
        option_text)
           .c_str());
 }
@@ -151,8 +151,8 @@ void bind_recording(py::module_& m) {
                             "Horizon scanlines along a route, one for each place.")
       .def("__len__", &RoutePanorama::size)
       .def_property_readonly("columns", &RoutePanorama::columns,
-                             "Bytes of a line: azimuths of a full turn.")
-      .def_property_readonly("length_m", &RoutePanorama::length_m, "Of the way through all places.")
+                             "Number of bytes per line, over a full turn.")
+      .def_property_readonly("length_m", &RoutePanorama::length_m, "Path length over all places.")
       .def(
           "lines",
           [](const RoutePanorama& route) {
@@ -165,7 +165,7 @@ void bind_recording(py::module_& m) {
           },
           "uint8 of (places, columns), from straight ahead counter-clockwise.")
       .def(
-          "poses", [](const RoutePanorama& route) { return pose_rows(route.poses()); },
+          "poses", [](const RoutePanorama& route) { return to_pose_rows(route.poses()); },
           "(places, 3) of x_m, y_m, heading_rad.")
       .def("__repr__", [](const RoutePanorama& route) {
         return "RoutePanorama(" + std::to_string(route.size()) + " lines, " +
@@ -173,11 +173,11 @@ void bind_recording(py::module_& m) {
       });
   Record<RouteRecorder::Recorded>(m, "RecordedRoute", "A route as stored in a memory file.")
       .field("route", &RouteRecorder::Recorded::route,
-             "All of its lines, those of earlier drives included.")
-      .field("appended", &RouteRecorder::Recorded::appended, "Lines.")
-      .field("bytes", &RouteRecorder::Recorded::bytes, "Of its lines and poses as they are kept.")
+             "All lines, including those of earlier drives.")
+      .field("appended", &RouteRecorder::Recorded::appended, "Number of new lines.")
+      .field("bytes", &RouteRecorder::Recorded::bytes, "Stored size of lines and poses.")
       .field("bytes_per_km", &RouteRecorder::Recorded::bytes_per_km,
-             "Bytes for each kilometre; 0 for a route without length.");
+             "Bytes per kilometre; 0 for a route of length 0.");
   m.def(
       "record_route",
       [](const py::object& recording, const std::filesystem::path& memory, const std::string& name,
@@ -189,17 +189,17 @@ void bind_recording(py::module_& m) {
         HorizonScanlineOptions line;
         Keywords(keywords).options(line).finish();
         if (py::len(keywords) > 0) options.line = line;
-        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
+        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
         const py::gil_scoped_release free;
         return record_route(dataset, memory, options, threads);
       },
       py::arg("recording"), py::arg("memory"), py::arg("name") = "route",
       py::arg("source") = py::none(), py::kw_only(), py::arg("every_m") = 0.1,
       py::arg("horizon_rows") = py::none(), py::arg("odometry") = false, py::arg("threads") = 0,
-      with_options(
-          "Remembers a route as one line of pixels a step, as `panonav route record` does. "
-          "`horizon_rows`: (first, last) that show the horizon, of panoramas whose elevations are "
-          "not known. `odometry`: remember its poses, even where the recording knows positions.",
+      append_option_list(
+          "Records a route as one line of pixels per step, like `panonav route record`. "
+          "`horizon_rows`: (first, last) row at the horizon, for panoramas whose elevations are "
+          "not known. `odometry`: use the poses of the odometry, even if positions are known.",
           {options_of<HorizonScanlineOptions>()})
           .c_str());
   m.def(

@@ -10,7 +10,8 @@ namespace {
 
 using World = std::shared_ptr<const simulation::SimulatedWorld>;
 
-/// Makes a world of the keyword arguments; the caller reads those of its recording.
+/// Makes a world from the keyword arguments. The caller must read the options of a recording
+/// before.
 World make_world(const std::string& scene, simulation::SimulatedWorldOptions options,
                  Keywords& parsed, int threads) {
   parsed.options(options.simulation)
@@ -35,7 +36,7 @@ World make_world(const std::string& scene, simulation::SimulatedWorldOptions opt
       executor);
 }
 
-simulation::SimulatedWorldOptions recording_options(Keywords& parsed) {
+simulation::SimulatedWorldOptions read_recording_options(Keywords& parsed) {
   simulation::SimulatedWorldOptions options;
   parsed.options(options.recording);
   if (!parsed.has("heading")) {
@@ -44,9 +45,9 @@ simulation::SimulatedWorldOptions recording_options(Keywords& parsed) {
   return options;
 }
 
-std::optional<Trajectory> trajectory_from(const py::object& rows) {
+std::optional<Trajectory> parse_trajectory(const py::object& rows) {
   if (rows.is_none()) return std::nullopt;
-  auto trajectory = trajectory_of(number_rows(rows, "trajectory", 4));
+  auto trajectory = to_trajectory(to_number_rows(rows, "trajectory", 4));
   require(!trajectory.empty(), "poses of trajectory", 0, ">= 1");
   return trajectory;
 }
@@ -64,7 +65,7 @@ Dataset record(const simulation::SimulatedWorld& world, const std::filesystem::p
   return simulation::record_dataset(world, folder, poses, with_path, executor);
 }
 
-py::array_t<double> point_rows(std::span<const Point2> points) {
+py::array_t<double> to_point_rows(std::span<const Point2> points) {
   py::array_t<double> rows({static_cast<py::ssize_t>(points.size()), py::ssize_t{2}});
   auto row = rows.mutable_unchecked<2>();
   for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
@@ -74,22 +75,23 @@ py::array_t<double> point_rows(std::span<const Point2> points) {
   return rows;
 }
 
-/// Seen somewhere in the world.
-Image picture_at(const simulation::SimulatedWorld& world, const Pose2& pose, std::uint64_t seed) {
+/// Renders the image at a pose of the world.
+Image take_picture_at(const simulation::SimulatedWorld& world, const Pose2& pose,
+                      std::uint64_t seed) {
   Executor executor(1);
   return world.take_picture(pose, seed, executor);
 }
 
 void bind_worlds(py::module_& m) {
-  const auto of_world = {
+  const auto world_option_list = {
       options_of<simulation::SimulationOptions>(), options_of<simulation::FrameOptions>(),
       options_of<simulation::SensorOptions>(), options_of<simulation::FreeSpaceOptions>(),
       options_of<OdometryNoise>("odometry")};
-  std::vector<ListedOptions> of_recording{options_of<simulation::RecordingOptions>()};
-  of_recording.insert(of_recording.end(), of_world);
+  std::vector<ListedOptions> recording_option_list{options_of<simulation::RecordingOptions>()};
+  recording_option_list.insert(recording_option_list.end(), world_option_list);
   py::class_<simulation::SimulatedWorld, std::shared_ptr<simulation::SimulatedWorld>>(
       m, "SimulatedWorld",
-      "A scene with a robot in it, whose pictures are ray-traced. Several threads may use one at a "
+      "A scene and a robot with ray-traced images. Several threads may use it at the same "
       "time.")
       .def(py::init([](const std::string& scene, const std::optional<Camera>& mirror, int threads,
                        const py::kwargs& keywords) {
@@ -100,30 +102,31 @@ void bind_worlds(py::module_& m) {
                  make_world(scene, std::move(options), parsed, threads));
            }),
            py::arg("scene"), py::kw_only(), py::arg("mirror") = py::none(), py::arg("threads") = 0,
-           with_options("`scene`: one of `scenes`, or the path of a Gazebo world or a mesh file. "
-                        "`mirror`: the camera, where kind is 'mirror'. The robot and its camera's "
-                        "height are those that the scene is made for, unless they are given.",
-                        of_world)
+           append_option_list(
+               "`scene`: one of `scenes`, or the path of a Gazebo world or a mesh file. "
+               "`mirror`: the camera if kind is 'mirror'. The robot and its camera's "
+               "height have the defaults of the scene unless they are set.",
+               world_option_list)
                .c_str())
       .def_property_readonly(
           "name", [](const simulation::SimulatedWorld& w) { return w.scene().name; },
-          "Of the built-in scene or of the file.")
+          "Name of the built-in scene or of the file.")
       .def_property_readonly(
           "warnings", [](const simulation::SimulatedWorld& w) { return w.scene().warnings; },
           "Parts of a file that cannot be rendered.")
-      .def_property_readonly("source", &simulation::SimulatedWorld::source, "How its pictures lie.")
+      .def_property_readonly("source", &simulation::SimulatedWorld::source, "Layout of its images.")
       .def_property_readonly(
           "camera_height_m",
           [](const simulation::SimulatedWorld& w) { return w.options().frame.camera_height_m; },
-          "Of the viewpoint above the floor.")
+          "Height of the viewpoint above the floor.")
       .def_property_readonly(
           "robot_radius_m",
           [](const simulation::SimulatedWorld& w) { return w.options().free_space.robot_radius_m; },
-          "Of the robot, which is treated as a cylinder.")
+          "Radius of the robot, which is a cylinder.")
       .def_property_readonly(
           "free_area_m2",
           [](const simulation::SimulatedWorld& w) { return w.free_space().area_m2(); },
-          "Where the robot can stand.")
+          "Area in which the robot can stand.")
       .def_property_readonly(
           "low", [](const simulation::SimulatedWorld& w) { return w.free_space().low(); },
           "Lower corner of the floor: (x_m, y_m).")
@@ -131,32 +134,32 @@ void bind_worlds(py::module_& m) {
           "high", [](const simulation::SimulatedWorld& w) { return w.free_space().high(); },
           "Upper corner of the floor: (x_m, y_m).")
       .def_property_readonly(
-          "tour", [](const simulation::SimulatedWorld& w) { return point_rows(w.scene().tour); },
+          "tour", [](const simulation::SimulatedWorld& w) { return to_point_rows(w.scene().tour); },
           "A round trip, (n, 2) of x_m, y_m; may be empty.")
       .def(
           "floor_plan",
-          [](const simulation::SimulatedWorld& w) { return array_of(w.free_space().picture()); },
-          "uint8 of (rows, columns), y upwards from `low` to `high`: free 255, obstacles 0, grey "
-          "too near to one.")
+          [](const simulation::SimulatedWorld& w) { return to_array(w.free_space().picture()); },
+          "uint8 of (rows, columns), y upwards from `low` to `high`: 255 free, 0 obstacle, grey "
+          "too near to an obstacle.")
       .def(
           "is_free",
           [](const simulation::SimulatedWorld& w, const Point2& place) {
             return w.free_space().is_free(place);
           },
-          py::arg("place"), "Whether the robot can stand at (x_m, y_m).")
+          py::arg("place"), "True if the robot can stand at (x_m, y_m).")
       .def(
           "clearance_m",
           [](const simulation::SimulatedWorld& w, const Point2& place) {
             return w.free_space().clearance_m(place);
           },
-          py::arg("place"), "Distance from (x_m, y_m) to the nearest obstacle, never too long.")
+          py::arg("place"), "Distance from (x_m, y_m) to the nearest obstacle, or less.")
       .def(
           "random_pose",
           [](const simulation::SimulatedWorld& w, std::uint64_t seed) {
             Random random(seed, 0);
             return w.free_space().random_pose(random);
           },
-          py::arg("seed"), "A free place, any heading.")
+          py::arg("seed"), "Returns a random free pose with random heading.")
       .def(
           "shortest_path",
           [](const simulation::SimulatedWorld& w, const Point2& from,
@@ -166,38 +169,38 @@ void bind_worlds(py::module_& m) {
               return w.free_space().shortest_path(from, to);
             }();
             if (!path) return std::nullopt;
-            return point_rows(*path);
+            return to_point_rows(*path);
           },
           py::arg("start"), py::arg("end"),
-          "Way points of a short free path, (n, 2) of x_m, y_m; None where there is none.")
+          "Waypoints of a short free path, (n, 2) of x_m, y_m; None if there is none.")
       .def(
           "take_picture",
           [](const simulation::SimulatedWorld& w, const Pose2& pose, std::uint64_t seed) {
             const Image picture = [&] {
               const py::gil_scoped_release free;
-              return picture_at(w, pose, seed);
+              return take_picture_at(w, pose, seed);
             }();
-            return array_of(picture);
+            return to_array(picture);
           },
           py::arg("pose"), py::arg("seed") = 0,
-          "What the camera sees there, uint8. The same seed gives the same noise; give each "
-          "picture its own.")
+          "Renders the image at a pose, uint8. The same seed gives the same noise; use another "
+          "seed for each image.")
       .def(
           "plan",
           [](const simulation::SimulatedWorld& w, const py::kwargs& keywords) {
             Keywords parsed(keywords);
-            const auto options = recording_options(parsed);
+            const auto options = read_recording_options(parsed);
             parsed.finish();
             std::vector<Pose2> poses;
             for (const auto& one :
                  w.with(options.recording, w.options().simulation.scene.seed).plan()) {
               poses.push_back(one.pose);
             }
-            return pose_rows(poses);
+            return to_pose_rows(poses);
           },
-          with_options("Where a recording with these options takes its pictures: (n, 3) of x_m, "
-                       "y_m, heading_rad.",
-                       {options_of<simulation::RecordingOptions>()})
+          append_option_list("Returns the poses of a recording with these options: (n, 3) of x_m, "
+                             "y_m, heading_rad.",
+                             {options_of<simulation::RecordingOptions>()})
               .c_str())
       .def(
           "record",
@@ -205,9 +208,9 @@ void bind_worlds(py::module_& m) {
              const py::object& trajectory, std::optional<int> seed, int threads,
              const py::kwargs& keywords) {
             Keywords parsed(keywords);
-            const auto options = recording_options(parsed);
+            const auto options = read_recording_options(parsed);
             parsed.finish();
-            const auto along = trajectory_from(trajectory);
+            const auto along = parse_trajectory(trajectory);
             const py::gil_scoped_release free;
             return record(
                 w.with(options.recording, seed.value_or(w.options().simulation.scene.seed)), folder,
@@ -215,11 +218,11 @@ void bind_worlds(py::module_& m) {
           },
           py::arg("folder"), py::kw_only(), py::arg("trajectory") = py::none(),
           py::arg("seed") = py::none(), py::arg("threads") = 0,
-          with_options("Writes a data set, as `panonav simulate` does, and returns it. "
-                       "`trajectory`: the robot goes along (n, 4) of stamp_s, x_m, y_m, "
-                       "heading_rad instead. `seed`: of poses, noise and odometry, in place of "
-                       "the world's.",
-                       {options_of<simulation::RecordingOptions>()})
+          append_option_list("Writes a data set, like `panonav simulate`, and returns it. "
+                             "`trajectory`: poses to use instead, (n, 4) of stamp_s, x_m, y_m, "
+                             "heading_rad. `seed`: seed of poses, noise and odometry, instead of "
+                             "that of the world.",
+                             {options_of<simulation::RecordingOptions>()})
               .c_str())
       .def("__repr__", [](const simulation::SimulatedWorld& w) {
         return "SimulatedWorld('" + w.scene().name + "', " + to_text(w.free_space().area_m2()) +
@@ -231,18 +234,18 @@ void bind_worlds(py::module_& m) {
          const std::optional<Camera>& mirror, const py::object& trajectory, int threads,
          const py::kwargs& keywords) {
         Keywords parsed(keywords);
-        auto options = recording_options(parsed);
+        auto options = read_recording_options(parsed);
         options.mirror = mirror;
-        const auto along = trajectory_from(trajectory);
+        const auto along = parse_trajectory(trajectory);
         const World world = make_world(scene, std::move(options), parsed, threads);
         const py::gil_scoped_release free;
         return record(*world, folder, along, threads);
       },
       py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("mirror") = py::none(),
       py::arg("trajectory") = py::none(), py::arg("threads") = 0,
-      with_options("Renders a data set of a simulated robot, as `panonav simulate` does: "
-                   "SimulatedWorld(scene).record(folder).",
-                   of_recording)
+      append_option_list("Renders a data set of a simulated robot, like `panonav simulate`: "
+                         "SimulatedWorld(scene).record(folder).",
+                         recording_option_list)
           .c_str());
   py::tuple names(simulation::scene_names().size());
   for (std::size_t i = 0; i < simulation::scene_names().size(); ++i)
@@ -250,7 +253,7 @@ void bind_worlds(py::module_& m) {
   m.attr("scenes") = names;
 }
 
-/// A base, and what its camera has seen so far.
+/// A simulated base with its world, the number of images taken and the time.
 struct Robot {
   World world;
   simulation::SimulatedBase base;
@@ -260,8 +263,8 @@ struct Robot {
 };
 using SharedRobot = Shared<Robot>;
 
-Pose2 free_start(const simulation::SimulatedWorld& world, const std::optional<Pose2>& start,
-                 std::uint64_t seed) {
+Pose2 choose_free_start(const simulation::SimulatedWorld& world, const std::optional<Pose2>& start,
+                        std::uint64_t seed) {
   Random random(seed, 0);
   if (!start) return world.free_space().random_pose(random);
   if (world.free_space().is_free(start->position())) return *start;
@@ -270,13 +273,13 @@ Pose2 free_start(const simulation::SimulatedWorld& world, const std::optional<Po
 
 void bind_robots(py::module_& m) {
   py::class_<SharedRobot>(m, "SimulatedRobot",
-                          "A robot in a simulated world: it drives as it is told until something "
-                          "is in its way, and sees.")
+                          "A robot in a simulated world. It drives until an obstacle "
+                          "stops it, and takes images.")
       .def(py::init([](const std::shared_ptr<simulation::SimulatedWorld>& world,
                        const std::optional<Pose2>& start, std::uint64_t seed) {
              return std::make_unique<SharedRobot>(
                  Robot{world,
-                       {free_start(*world, start, seed),
+                       {choose_free_start(*world, start, seed),
                         [world](Point2 from, Point2 to) {
                           return world->free_space().is_free_between(from, to);
                         },
@@ -284,8 +287,8 @@ void bind_robots(py::module_& m) {
                        seed});
            }),
            py::arg("world"), py::arg("start") = py::none(), py::arg("seed") = 1,
-           "`start`: a free pose; None: any. `seed`: of its start, its odometry and the noise of "
-           "its pictures.")
+           "`start`: a free pose; None: random. `seed`: seed of start, odometry and the noise of "
+           "its images.")
       .def(
           "drive",
           [](SharedRobot& robot, double forward_m_s, double turn_rad_s, double seconds,
@@ -298,13 +301,13 @@ void bind_robots(py::module_& m) {
           },
           py::arg("forward_m_s"), py::arg("turn_rad_s") = 0.0, py::arg("seconds") = 0.1,
           py::kw_only(), py::arg("left_m_s") = 0.0,
-          "Drives so for a while. False where something was in its way: it then turned only.")
+          "Drives for `seconds`. Returns False if an obstacle stopped it; it only turned then.")
       .def(
           "observe",
           [](SharedRobot& robot) {
             return robot.change([](Robot& r) {
               Observation observation(
-                  picture_at(*r.world, r.base.pose(), Random(r.seed, ++r.pictures).next()));
+                  take_picture_at(*r.world, r.base.pose(), Random(r.seed, ++r.pictures).next()));
               const Pose2& pose = r.base.pose();
               observation.stamp_s = r.time_s;
               observation.odometry = r.base.odometry();
@@ -312,35 +315,35 @@ void bind_robots(py::module_& m) {
               return observation;
             });
           },
-          "What it sees now, with stamp, odometry and, for the record, its true pose, which no "
-          "estimate reads.")
+          "Takes an image with stamp, odometry and the true pose, which no "
+          "estimate uses.")
       .def(
           "carry_to",
           [](SharedRobot& robot, const Pose2& pose) {
             robot.change([&](Robot& r) {
-              r.base.carry_to(free_start(*r.world, pose, 0));
+              r.base.carry_to(choose_free_start(*r.world, pose, 0));
               return 0;
             });
           },
-          py::arg("pose"), "Somebody carries it there; its odometry does not know.")
+          py::arg("pose"), "Moves the robot to a pose by hand; the odometry does not change.")
       .def_property_readonly(
           "pose",
           [](const SharedRobot& robot) {
             return robot.read([](const Robot& r) { return r.base.pose(); });
           },
-          "Where it truly is.")
+          "True pose.")
       .def_property_readonly(
           "odometry",
           [](const SharedRobot& robot) {
             return robot.read([](const Robot& r) { return r.base.odometry(); });
           },
-          "Where its odometry says that it is, in a frame of its own.")
+          "Odometry pose, in the odometry frame.")
       .def_property_readonly(
           "time_s",
           [](const SharedRobot& robot) {
             return robot.read([](const Robot& r) { return r.time_s; });
           },
-          "Seconds that it has driven.");
+          "Simulated time in seconds.");
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ struct MemoryChanges::Implementation {
       : memories(connect_to_memories(address, false)) {
     const auto found = find_memory(memories, address);
     if (!found) throw_missing_memory(address);
-    memories.connection.execute("LISTEN \"" + found->channel + "\"");  // of the server's making
+    memories.connection.execute("LISTEN \"" + found->channel + "\"");  // name chosen by the server
   }
   MemoriesConnection memories;
 };

@@ -52,14 +52,14 @@ void require_path_and_address(const std::filesystem::path& file,
 
 namespace {
 
-/// The memory on the server, made like the file where there is none.
+/// Returns the memory on the server; creates it with the header of the file if it is missing.
 std::unique_ptr<ServerExchange> connect_or_create_memory(const ServerAddress& address,
                                                          const MemoryHeader& header) {
   if (auto found = ServerExchange::connect(address)) return found;
   try {
     create_postgresql_memory(address, header, {});
   } catch (const FileError&) {
-    if (auto found = ServerExchange::connect(address)) return found;  // somebody was first
+    if (auto found = ServerExchange::connect(address)) return found;  // another client was first
     throw;
   }
   auto made = ServerExchange::connect(address);

@@ -35,7 +35,7 @@ std::optional<MemoryArea> to_memory_area_if_known(const std::optional<Point2>& p
   return to_memory_area(position->x_m, position->y_m);
 }
 
-/// Views that are being sketched.
+/// Collects views and sketches them in batches.
 class Sketcher {
  public:
   explicit Sketcher(SignatureShape shape) : sketches(shape) {}
@@ -75,14 +75,14 @@ class Sketcher {
 }  // namespace
 
 struct PlaceSearch::Implementation {
-  /// State that searches read; replaced when views are added or removed.
+  /// State that searches read; it is replaced when views are added or removed.
   struct Sketched {
     ViewSketches sketches;
     std::uint64_t bytes = 0;
   };
 
   explicit Implementation(std::filesystem::path memory) : path(std::move(memory)) {
-    // First, so that no change is missed.
+    // Listens before it reads, so that no change is missed.
     if (is_postgresql_address(path)) changes.emplace(path);
     OpenedMemory opened = open_memory_tables(path, Access::read_only);
     header = std::move(opened.header);
@@ -94,8 +94,8 @@ struct PlaceSearch::Implementation {
     return open_memory_tables(path, Access::read_only).tables;
   }
 
-  /// The range of ids is cut into a part for each connection; a part is in the order of the ids,
-  /// which is mostly the order of recording.
+  /// Cuts the range of ids into one part for each connection. Ids mostly ascend in the order of
+  /// recording, so a part has nearby places.
   void sketch_all_views() {
     const std::uint32_t last = own->last_id();
     const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
@@ -111,8 +111,8 @@ struct PlaceSearch::Implementation {
         const std::lock_guard lock(mutex);
         sketchers[part].store_areas(areas);
       };
-      // A limited number of ids at a time, so that a server uses its index and does not sort them
-      // all.
+      // Reads a limited number of ids at a time, so that a server uses its index instead of sorting
+      // all of them.
       constexpr std::uint32_t at_a_time = 20000;
       for (std::uint32_t before = border(part); before < border(part + 1);) {
         const std::uint32_t end = before + std::min(at_a_time, border(part + 1) - before);
@@ -171,7 +171,7 @@ struct PlaceSearch::Implementation {
     const std::lock_guard lock(mutex);
     idle.push_back(std::move(tables));
   }
-  /// Connections of a server that was away cannot be used again.
+  /// Connections to a server that could not be reached are useless afterwards.
   void drop_idle_connections() const {
     std::vector<std::unique_ptr<MemoryTables>> dropped;
     const std::lock_guard lock(mutex);
@@ -218,7 +218,7 @@ struct PlaceSearch::Implementation {
     }
   }
 
-  /// Returns true if views were added or removed.
+  /// Updates the sketches of changed areas, or of all views; true if any were added or removed.
   bool update_sketches(const std::set<MemoryArea>& changed_areas, bool all) {
     const auto reading = own->transaction(MemoryTables::Kind::reading);
     std::vector<ViewId> there;
@@ -247,7 +247,7 @@ struct PlaceSearch::Implementation {
     }
     std::vector<ViewId> removed;
     std::ranges::set_difference(before, there, std::back_inserter(removed));
-    if (!all && !removed.empty()) {  // or they are elsewhere now
+    if (!all && !removed.empty()) {  // some may only have moved
       std::vector<ViewId> elsewhere;
       own->read_available_views(removed, [&](const ViewRow& row) {
         elsewhere.push_back(row.id);
@@ -262,7 +262,7 @@ struct PlaceSearch::Implementation {
     if (added.empty() && removed.empty()) return false;
     Sketcher sketcher(header.shape);
     for (std::size_t begin = 0; begin < added.size();) {
-      // Ids one after the other in one statement.
+      // One statement reads consecutive ids.
       std::size_t end = begin + 1;
       while (end < added.size() && added[end].value == added[end - 1].value + 1) ++end;
       own->read_magnitudes(added[begin], added[end - 1], header.shape.size(),
@@ -283,13 +283,13 @@ struct PlaceSearch::Implementation {
 
   std::filesystem::path path;
   MemoryHeader header;
-  mutable std::mutex mutex;  // of `current`, `idle` and `counted`
+  mutable std::mutex mutex;  // guards `current`, `idle`, `counted`
   std::shared_ptr<const Sketched> current;
   mutable std::vector<std::unique_ptr<MemoryTables>> idle;
   mutable SearchCounters counted;
-  mutable std::atomic<int> running = 0;  // searches
+  mutable std::atomic<int> running = 0;  // number of running searches
 
-  std::mutex refreshing;  // of all below
+  std::mutex refreshing;  // guards all members below
   std::unique_ptr<MemoryTables> own;
   std::optional<MemoryChanges> changes;
   AreasOfViews areas;
@@ -318,7 +318,7 @@ struct PlaceSearch::Snapshot::Implementation {
     if (!failed) search->return_connection(std::move(tables));
   }
 
-  /// Runs `read_some`. After an exception the connection is not used again.
+  /// Runs `read_some`; if it throws, the connection is not used again.
   template <class Read>
   void mark_failed_on_throw(const Read& read_some) {
     try {
@@ -377,7 +377,7 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
                                            const SearchOptions& options, const SearchMask& mask) {
   Implementation& own = *implementation_;
   const auto start = std::chrono::steady_clock::now();
-  // A single search uses all cores; several at a time share them.
+  // A single search uses all cores; concurrent searches share them.
   struct Running {
     explicit Running(std::atomic<int>& all_) : all(all_), number(++all_) {}
     ~Running() { --all; }
@@ -447,7 +447,7 @@ std::vector<PosedView> PlaceSearch::Snapshot::posed_views() {
     views = own.tables->views_within(
         {-max_position_m, max_position_m, -max_position_m, max_position_m});
   });
-  std::erase_if(views, [](const PosedView& view) {  // a bad row, which a search would leave out
+  std::erase_if(views, [](const PosedView& view) {  // damaged row, as searches skip it
     return view.pose.heading_rad && !std::isfinite(*view.pose.heading_rad);
   });
   return views;

@@ -19,12 +19,12 @@ constexpr std::uint8_t marker = 0xff;
 constexpr std::uint8_t start_of_image = 0xd8;
 constexpr std::uint8_t end_of_image = 0xd9;
 
-/// Stand alone, without a length: fill bytes, stuffed zeros, TEM and restart markers.
+/// True for markers that no length follows: stuffed zeros, TEM and restart markers.
 bool is_marker_without_length(std::uint8_t kind) {
   return kind == 0x00 || kind == 0x01 || (kind >= 0xd0 && kind <= 0xd7);
 }
 
-/// Pictures one behind the other in a file without a name.
+/// Stores pictures one after the other in an unnamed temporary file.
 class SpooledPictures final : public PictureStore {
  public:
   explicit SpooledPictures(std::string name)
@@ -102,13 +102,13 @@ std::optional<std::vector<std::uint8_t>> JpegStream::next() {
   while (true) {
     if (walked_ == 0) {
       auto found = std::search(buffer_.begin(), buffer_.end(), beginning.begin(), beginning.end());
-      // The last two bytes may begin the next picture.
+      // The last two bytes are kept, as they may begin the next picture.
       if (found == buffer_.end()) found -= std::min<std::ptrdiff_t>(2, found - buffer_.begin());
       buffer_.erase(buffer_.begin(), found);
       if (buffer_.size() < beginning.size()) return std::nullopt;
       walked_ = 2;
     }
-    // Entropy-coded data is between segments: skip to the next marker.
+    // Entropy-coded data follows a segment: skip it to the next marker.
     const auto at =
         std::find(buffer_.begin() + static_cast<std::ptrdiff_t>(walked_), buffer_.end(), marker) -
         buffer_.begin();
@@ -125,7 +125,7 @@ std::optional<std::vector<std::uint8_t>> JpegStream::next() {
       buffer_.erase(buffer_.begin(), end);
       walked_ = 0;
       return picture;
-    } else if (kind == start_of_image) {  // the picture before was cut off
+    } else if (kind == start_of_image) {  // the previous picture was cut off
       buffer_.erase(buffer_.begin(), buffer_.begin() + at);
       walked_ = 2;
     } else {

@@ -11,9 +11,9 @@
 
 namespace panonav::recordings {
 
-/// Cuts a stream of JPEG pictures that follow each other ("MJPEG") into pictures. Their segments
-/// are walked over, so a thumbnail within a picture does not end it; bytes between pictures, such
-/// as the heads of a multipart stream, are left out. Memory: one picture, at most `max_bytes`.
+/// Cuts a stream of JPEG pictures that follow each other ("MJPEG") into pictures. It follows the
+/// segments of a picture, so that a thumbnail within does not end it; bytes between pictures, such
+/// as the heads of a multipart stream, are skipped. Memory: one picture, at most `max_bytes`.
 class JpegStream {
  public:
   /// Largest size of a picture; larger ones are refused.
@@ -28,13 +28,13 @@ class JpegStream {
   [[nodiscard]] std::size_t unfinished() const noexcept { return buffer_.size(); }
 
  private:
-  std::vector<std::uint8_t> buffer_;  // from the beginning of a picture on
-  std::size_t walked_ = 0;            // into it; 0: the beginning is still looked for
+  std::vector<std::uint8_t> buffer_;  // from the beginning of the current picture
+  std::size_t walked_ = 0;            // bytes of `buffer_` parsed so far; 0: no beginning found yet
 };
 
-/// Reads such a stream to its end, into a temporary file, as a data set; the file is removed with
-/// the data set. Names are "000001.jpg" and so on. Throws FileError on `name` when no picture
-/// comes, or the temporary folder (TMPDIR) is full.
+/// Reads a stream of JPEG pictures to its end into a temporary file, which is removed with the
+/// returned data set. Names are "000001.jpg" and so on. Throws FileError on `name` if there is no
+/// picture, or the temporary folder (TMPDIR) is full.
 [[nodiscard]] Dataset read_jpeg_stream(int descriptor, const std::string& name,
                                        PictureSource source);
 

@@ -11,8 +11,9 @@ std::optional<Observation> LiveObservations::next() {
   if (!live_picture) return std::nullopt;
   Observation observation(std::move(live_picture->picture));
   observation.encoded = std::move(live_picture->encoded);
-  // Names are unique in a memory. Pictures that arrive together have the same time, to the
-  // microsecond; a clock that is set back leaves more between.
+  // Names must be unique in a memory. A picture with the stamp of the previous one gets a stamp one
+  // microsecond later, and so does one up to a second earlier; a larger step back is a clock that
+  // was set, and is kept.
   constexpr std::int64_t second_us = 1'000'000;
   auto stamp_us = static_cast<std::int64_t>(std::floor(1e6 * live_picture->stamp_s));
   if (last_us_ && stamp_us <= *last_us_ && *last_us_ - stamp_us < second_us) {

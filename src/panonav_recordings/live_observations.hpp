@@ -11,8 +11,8 @@
 
 namespace panonav::recordings {
 
-/// Observations of a live source, the newest each time (`LivePictures`), named by their stamps
-/// ("2026-11-23T05:06:07.123456Z").
+/// Provides the newest picture of a live source (`LivePictures`) at each call as an observation,
+/// named by its stamp ("2026-11-23T05:06:07.123456Z").
 class LiveObservations final : public ObservationSource {
  public:
   /// Opens the source. Throws as `LivePictures`.
@@ -22,14 +22,14 @@ class LiveObservations final : public ObservationSource {
 
   [[nodiscard]] const PictureSource& pictures() const noexcept override { return pictures_; }
   [[nodiscard]] std::optional<Observation> next() override;
-  /// Returns the source, to stop it and for its counts.
+  /// Returns the source, for `stop` and `counts`.
   [[nodiscard]] LivePictures& live() noexcept { return live_; }
   /// Times of a picture.
   struct Timing {
-    std::chrono::steady_clock::time_point arrived{};  ///< by the clock that is never set
-    std::chrono::steady_clock::duration decoding{};   ///< how long decoding took, where we do it
+    std::chrono::steady_clock::time_point arrived{};  ///< on the steady clock
+    std::chrono::steady_clock::duration decoding{};   ///< 0 if ffmpeg decoded
   };
-  /// Returns the times of the last picture of `next`.
+  /// Returns the times of the picture that `next` returned last.
   [[nodiscard]] const Timing& timing() const noexcept { return timing_; }
 
  private:

@@ -44,20 +44,20 @@ struct RawPicture {
   std::variant<std::vector<std::uint8_t>, Image> picture;
   double stamp_s = 0.0;
   Steady::time_point arrived{};
-  std::uint64_t lost = 0;  ///< before it, where the source tells
+  std::uint64_t lost = 0;  ///< pictures lost before it, if the source reports that
 };
 
 /// An open source of pictures.
 class Input {
  public:
   virtual ~Input() = default;
-  /// Waits for the next picture; empty at the end, and after `stop`. Throws Error when the source
-  /// broke off.
+  /// Waits for the next picture; `nullopt` at the end and after `stop`. Throws Error if the source
+  /// is lost.
   virtual std::optional<RawPicture> take() = 0;
   virtual Image decode(std::span<const std::uint8_t> bytes, const ImageLimits& limits) const {
     return decode_image(bytes, "the image", limits);
   }
-  /// Another thread's call.
+  /// Ends a `take` that another thread is in.
   virtual void stop() noexcept {}
 };
 
@@ -129,7 +129,7 @@ class AddressInput final : public Input {
   DecodedVideo video_;
 };
 
-/// Adds the Huffman tables that cameras leave out and viewers need.
+/// True if a JPEG file has Huffman tables. Some cameras leave them out, but viewers need them.
 bool is_whole_jpeg(std::span<const std::uint8_t> bytes) {
   constexpr std::array<std::uint8_t, 2> begin{0xff, 0xd8};
   constexpr std::array<std::uint8_t, 2> tables{0xff, 0xc4};
@@ -163,7 +163,7 @@ struct LivePictures::Implementation {
     return std::make_shared<AddressInput>(address, options.limits, options.max_silence_s);
   }
 
-  /// Takes pictures until the input ends.
+  /// Receives pictures until the input ends.
   void receive_all() {
     while (auto picture = input->take()) {
       std::unique_lock lock(mutex);
@@ -202,10 +202,10 @@ struct LivePictures::Implementation {
           const std::lock_guard lock(mutex);
           input = std::move(opened);
           break;
-        } catch (const Error&) {  // NOLINT(bugprone-empty-catch): it is tried again
+        } catch (const Error&) {  // NOLINT(bugprone-empty-catch): retried by the loop
         }
       }
-      // Stopping reaches the input that was there then.
+      // `stop` ended only the input that was open then, not the one opened since.
       if (stopped) break;
     }
     const std::lock_guard lock(mutex);
@@ -222,9 +222,9 @@ struct LivePictures::Implementation {
   std::shared_ptr<Input> input;
   std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
   Counts counts;
-  std::vector<std::string> notes;  // of which the caller of `next` was not told yet
+  std::vector<std::string> notes;  // for `options.note`; `next` passes them on
   bool is_broken_off = false;
-  bool has_been_read = false;  // for the first picture
+  bool has_been_read = false;  // `next` was called
   std::atomic<bool> stopped = false;
   bool ended = false;
   std::thread thread;
@@ -243,7 +243,7 @@ LivePictures::LivePictures(std::string address, const LiveOptions& options)
   if (self.stop_event < 0) throw Error("no event can be made");
   try {
     self.input = self.open();
-    // Only the first image shows whether an address can be opened.
+    // Only the first image shows that an address can be opened.
     if (self.address != "-" && !is_camera(self.address)) {
       self.newest = std::pair(self.input->take().value(), self.input);
     }

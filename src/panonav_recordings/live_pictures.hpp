@@ -22,32 +22,34 @@ namespace panonav::recordings {
 /// A live picture and its times.
 struct LivePicture {
   Image picture;                      ///< decoded and upright
-  std::vector<std::uint8_t> encoded;  ///< the JPEG it was decoded from; empty if it was none
-  /// Time of arrival, or from a camera of the exposure, in seconds since 1970-01-01 UTC.
+  std::vector<std::uint8_t> encoded;  ///< the JPEG file, if it has all its tables; else empty
+  /// Exposure time reported by a camera, otherwise time of arrival, in seconds since 1970-01-01
+  /// UTC.
   double stamp_s = 0.0;
-  /// Time of the image on the monotonic clock.
+  /// The same time on the steady clock.
   std::chrono::steady_clock::time_point arrived{};
-  std::chrono::steady_clock::duration decoding{};  ///< how long it took, where we do it
+  std::chrono::steady_clock::duration decoding{};  ///< 0 if ffmpeg decoded
 };
 
 /// Options for reading a live source.
 struct LiveOptions {
-  /// Size requested from a camera, which may give its nearest. Empty: the camera's setting.
+  /// Image size requested from a camera, which may choose the nearest that it supports. Empty: the
+  /// camera's present setting.
   std::optional<ImageSize> size;
-  double reopen_after_s = 1.0;  ///< until a source that broke off is opened again
-  /// Longest silence of an address, after which it has broken off; three times as long before its
-  /// first image, which may take a while.
+  double reopen_after_s = 1.0;  ///< pause before a lost source is opened again
+  /// An address that sends no image for this time is lost. Its first image may take three times as
+  /// long.
   double max_silence_s = 5.0;
-  /// Receives a line when the source has broken off, and when its images come again; `next` calls.
+  /// Called by `next` with a message when the source is lost, and when its images come again.
   std::function<void(const std::string& line)> note;
-  ImageLimits limits;  ///< of each picture; those beyond count as damaged
+  ImageLimits limits;  ///< larger pictures are counted as damaged
 };
 
-/// Reads pictures of a source that does not wait. A thread receives them, and `next` returns the
-/// newest; those between are dropped and counted. Standard input waits instead, and none of its
-/// pictures is dropped. A camera or address that breaks off or
-/// falls silent is opened again until `stop`. Pictures
-/// that cannot be decoded are counted as damaged. Memory: two pictures, packed or not.
+/// Reads pictures of a live source, which does not wait for its reader. A thread receives them, and
+/// `next` returns the newest; older ones are dropped and counted. Standard input is the exception:
+/// it waits, and none of its pictures is dropped. A camera or address that is lost or silent is
+/// opened again until `stop`. Pictures that cannot be decoded are counted as damaged. Memory: two
+/// pictures, encoded or decoded.
 class LivePictures {
  public:
   /// Opens the source, and waits for the first picture of an address. Throws FileError if it is not
@@ -57,20 +59,20 @@ class LivePictures {
   LivePictures(const LivePictures&) = delete;
   LivePictures& operator=(const LivePictures&) = delete;
 
-  /// Waits for a picture and returns it; empty at the end of standard input and after `stop`. One
-  /// thread at a time.
+  /// Waits for a picture and returns it; empty at the end of standard input and after `stop`. Only
+  /// one thread may call at a time.
   [[nodiscard]] std::optional<LivePicture> next();
-  /// Ends `next`, which then returns empty. Any thread may call.
+  /// Makes `next` return empty, now and later. Any thread may call.
   void stop() noexcept;
 
-  /// Numbers of pictures that did not reach the caller.
+  /// Numbers of lost pictures and of interruptions.
   struct Counts {
-    std::uint64_t dropped = 0;        ///< since the first `next`
+    std::uint64_t dropped = 0;        ///< pictures lost after the first call of `next`
     std::uint64_t damaged = 0;        ///< pictures that could not be decoded
-    std::uint64_t interruptions = 0;  ///< times that the source broke off and was opened again
+    std::uint64_t interruptions = 0;  ///< times that the source was lost
     friend bool operator==(const Counts&, const Counts&) = default;
   };
-  /// Returns the losses so far. Any thread may call.
+  /// Returns the counts so far. Any thread may call.
   [[nodiscard]] Counts counts() const;
 
  private:
@@ -81,11 +83,12 @@ class LivePictures {
 /// A pixel format of a camera, with its sizes.
 struct CameraFormat {
   std::string pixels;            ///< "MJPG", "YUYV", "GREY", ...: the driver's name
-  bool usable = false;           ///< MJPG, JPEG, YUYV, UYVY and GREY are
+  bool usable = false;           ///< true if we can decode it
   std::vector<ImageSize> sizes;  ///< empty: the driver does not list them
 };
 
-/// Lists the formats and sizes that a camera (V4L2) offers. Throws FileError when there is none.
+/// Lists the formats and sizes that a camera (V4L2) offers. Throws FileError if the device is no
+/// camera.
 [[nodiscard]] std::vector<CameraFormat> list_camera_formats(const std::filesystem::path& device);
 
 }  // namespace panonav::recordings

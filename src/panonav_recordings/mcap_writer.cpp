@@ -21,7 +21,7 @@ namespace panonav::recordings {
 
 namespace {
 
-// Bytes that grow by little-endian fields.
+// A byte buffer to which little-endian fields are appended.
 struct Bytes : std::vector<std::uint8_t> {
   template <class Number>
   Bytes& number(Number value) {
@@ -78,7 +78,7 @@ struct McapWriter::State {
   int descriptor = -1;
   bool has_failed = false;
   std::uint64_t written = 0;
-  std::uint32_t sum = 0;  // of all that was written
+  std::uint32_t sum = 0;  // CRC-32 of all bytes written so far
   Bytes chunk;
   Span chunk_time, time;
   std::uint64_t messages = 0;
@@ -86,7 +86,7 @@ struct McapWriter::State {
   std::vector<std::uint16_t> used_in_chunk;
   std::vector<std::uint8_t> packed;
   std::uint32_t schemas = 0, chunks = 0;
-  // Records of the summary, by kind.
+  // Records for the summary, by kind.
   Bytes schema_records, channel_records, chunk_indexes;
 
   void require_open() const {
@@ -94,7 +94,7 @@ struct McapWriter::State {
     if (descriptor < 0) throw ContractError("recording " + path.string(), "closed", "open");
   }
 
-  // `known`: the checksum of the bytes, if it is known.
+  // Writes bytes; `known` is their checksum if it was computed before.
   void put(std::span<const std::uint8_t> bytes, std::optional<std::uint32_t> known = {}) {
     const std::uint32_t own = known ? *known : compute_crc(bytes);
     sum = static_cast<std::uint32_t>(::crc32_combine(sum, own, static_cast<z_off_t>(bytes.size())));

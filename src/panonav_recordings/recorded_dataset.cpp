@@ -28,7 +28,8 @@ std::string make_name_from_stamp(std::int64_t ns) {
   return std::to_string(seconds) + "_" + fraction.substr(1);
 }
 
-/// Both parts are exact, so that a stamp in seconds survives a round trip.
+/// Converts whole seconds and the rest separately, so that a stamp in seconds survives a round
+/// trip.
 double to_seconds(std::int64_t ns) {
   return static_cast<double>(ns / second_ns) +
          static_cast<double>(ns % second_ns) / static_cast<double>(second_ns);
@@ -37,7 +38,7 @@ double to_seconds(std::int64_t ns) {
 /// The pictures of one topic, read and decoded on demand.
 class RecordedPictures : public PictureStore {
  public:
-  /// `places` are those of messages of the types sensor_msgs/Image and CompressedImage.
+  /// `places` are the locations of messages of the types sensor_msgs/Image and CompressedImage.
   RecordedPictures(fs::path path, std::shared_ptr<const Recording> recording,
                    std::vector<MessageLocation> places);
   [[nodiscard]] Image read(std::size_t index) const override;
@@ -180,7 +181,7 @@ class EntryMaker {
   std::size_t too_tilted_ = 0;
 };
 
-/// Size and encoding of a picture message.
+/// Describes a picture message: size and encoding, or the format of a compressed one.
 std::string describe_picture(MessageBytes bytes, const RecordedTopic& topic) {
   if (topic.type == ros::CompressedImage::type) {
     return ros::read_message<ros::CompressedImage>(bytes, topic.encoding).format;

@@ -13,14 +13,14 @@
 
 namespace panonav::recordings {
 
-/// Reads a recording of topics (`Recording::open`) as a data set: the pictures of one topic, named
-/// by their stamps ("1700000000_250000000") and read when they are needed; `source` is their
-/// layout. docs/recordings.md has the rules for topics, stamps and frames. Odometry and
+/// Reads a recording of topics (`Recording::open`) as a data set of the pictures of one topic.
+/// Pictures are named by their stamps ("1700000000_250000000") and read when needed; `source` is
+/// their layout. docs/recordings.md has the rules for topics, stamps and frames. Odometry and
 /// "/ground_truth" are interpolated between messages at most a second apart; tilt comes from the
-/// only Imu with an orientation. Throws FileError: no or several topics of pictures and none named,
-/// a topic that is missing or of another type, named frames that no transforms connect, and what
-/// `Recording::open` throws. Cost: one pass over the messages. Memory: 400 bytes a picture and 80 a
-/// message.
+/// IMU topic, if there is exactly one. Throws FileError if there is no topic of pictures, or
+/// several and none is named; if a named topic is missing or of another type; if no transforms
+/// connect named frames; and as `Recording::open`. Cost: one pass over the messages. Memory: 400
+/// bytes a picture and 80 a message.
 [[nodiscard]] Dataset read_recording(const std::filesystem::path& path, PictureSource source,
                                      const InputOptions::Topics& topics = {});
 /// Reads an open recording; errors and entries name `path`.
@@ -32,14 +32,14 @@ namespace panonav::recordings {
 struct TopicSummary {
   RecordedTopic topic;               ///< its name, type and number of messages
   std::optional<TimeSpan> time;      ///< log times of its first and last message
-  std::optional<double> rate_hz;     ///< mean, of two messages or more
-  std::optional<std::string> shows;  ///< of pictures: the first one's size and encoding, or format
+  std::optional<double> rate_hz;     ///< mean; nullopt for one message
+  std::optional<std::string> shows;  ///< format or size and encoding of the first picture
 };
 
 /// Contents of a recording.
 struct RecordingSummary {
-  std::vector<TopicSummary> topics;  ///< by name
-  std::optional<TimeSpan> time;      ///< from the first message to the last; empty without messages
+  std::vector<TopicSummary> topics;   ///< by name
+  std::optional<TimeSpan> time;       ///< nullopt without messages
   std::vector<std::string> warnings;  ///< what was damaged or left out, a line each
 };
 

@@ -88,7 +88,8 @@ class FilesRecording : public Recording {
                 const std::function<void(const MessageLocation&, std::span<const std::uint8_t>)>&
                     use) const override {
     const Filter filter = make_filter(topics, within);
-    // The remaining messages of a block. Blocks are opened as time reaches them.
+    // Messages of a block that are still to be passed on. A block is opened when the time reaches
+    // its first message.
     struct Open {
       std::vector<MessageLocation> places;
       std::size_t next = 0;
@@ -164,7 +165,8 @@ class FilesRecording : public Recording {
     return filter;
   }
 
-  // Appends; `listed`: number of places in addition to `places`.
+  // Appends the locations in a block that pass the filter. `listed` is the number of locations held
+  // elsewhere, for the limit.
   void list(const Block& block, const Filter& filter, std::vector<MessageLocation>& places,
             std::size_t listed = 0) const {
     if (block.time.begin_ns > filter.within.end_ns || block.time.end_ns < filter.within.begin_ns) {
@@ -195,7 +197,8 @@ class FilesRecording : public Recording {
                       "is damaged: an index names another message than the "
                       "one that is there");
     }
-    // rosbag2 can pack each message. CDR begins with a zero.
+    // rosbag2 can pack each message with Zstandard, whose magic number differs from CDR in the
+    // first byte, which is 0 there.
     constexpr std::array<std::uint8_t, 4> zstd_magic{0x28, 0xB5, 0x2F, 0xFD};
     if (topics_[place.topic].encoding == MessageEncoding::cdr && message.bytes.size() >= 4 &&
         std::ranges::equal(message.bytes.first(4), zstd_magic)) {
@@ -215,7 +218,7 @@ class FilesRecording : public Recording {
   RecordingLimits limits_;
   std::vector<std::vector<std::uint32_t>> topics_of_files_;
   std::vector<RecordedTopic> topics_;
-  std::vector<Block> blocks_;  // in the order in which they begin
+  std::vector<Block> blocks_;  // sorted by their first time
   std::optional<TimeSpan> time_;
 };
 
@@ -231,7 +234,8 @@ FileKind detect_kind(const fs::path& path) {
   if (text.starts_with(bag_magic)) return FileKind::bag;
   if (text.starts_with("#ROSBAG V") || text.starts_with("#ROSRECORD V")) return FileKind::old_bag;
   if (text.starts_with("\x28\xB5\x2F\xFD") && path.extension() == ".zstd") return FileKind::packed;
-  // Databases of other programs, such as memory files, carry the mark of their program.
+  // SQLite files have an application id at byte 68. It is 0 in files of rosbag2, but not in those
+  // of other programs, such as memory files.
   constexpr std::size_t mark_at = 68;
   if (text.starts_with(std::string_view("SQLite format 3\0", 16)) &&
       text.substr(mark_at, 4) == std::string_view("\0\0\0\0", 4)) {
@@ -242,7 +246,7 @@ FileKind detect_kind(const fs::path& path) {
 
 std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLimits& limits);
 
-/// A new empty file in the folder for temporary ones.
+/// Creates an empty file in the folder for temporary files; removes its name in the destructor.
 class UnnamedFile {
  public:
   explicit UnnamedFile(const std::string& packed_file) {
@@ -265,7 +269,8 @@ class UnnamedFile {
   fs::path path_;
 };
 
-/// The unpacked copy stays readable after its name is removed, until it is closed.
+/// Unpacks a compressed file and opens the copy. The name of the copy is removed at once; it stays
+/// readable until it is closed.
 std::unique_ptr<RecordingFile> open_packed(const fs::path& path, const RecordingLimits& limits) {
   const UnnamedFile copy(path.string());
   std::error_code unknown;
@@ -333,7 +338,7 @@ std::unique_ptr<const Recording> Recording::open(const fs::path& path,
   if (!is_rosbag2_folder(path)) {
     files.push_back(open_file(path, limits));
   } else {
-    // The other files of a recording are there where one is not.
+    // If one file of a recording cannot be opened, the others are still read.
     for (const fs::path& file : read_rosbag2_folder(path)) {
       try {
         files.push_back(open_file(file, limits));

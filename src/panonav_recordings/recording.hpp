@@ -20,11 +20,11 @@ enum class MessageEncoding {
 };
 
 /// A topic of a recording: all channels (MCAP) or connections (ROS 1) of one name, type and
-/// encoding. A topic that changes its type is two.
+/// encoding. A topic whose type changes is listed once for each type.
 struct RecordedTopic {
   std::string name;  ///< "/camera/image/compressed"
-  /// "sensor_msgs/CompressedImage"; ROS 2's "sensor_msgs/msg/CompressedImage" has the same name
-  /// here.
+  /// ROS 1's name of the type, such as "sensor_msgs/CompressedImage", also for ROS 2's
+  /// "sensor_msgs/msg/CompressedImage".
   std::string type;
   MessageEncoding encoding = MessageEncoding::other;  ///< serialisation of its messages
   std::uint64_t messages = 0;                         ///< number of messages
@@ -34,9 +34,9 @@ struct RecordedTopic {
 struct MessageLocation {
   std::int64_t time_ns = 0;  ///< time of recording (log time)
   std::uint32_t topic = 0;   ///< index into `Recording::topics()`
-  std::uint32_t file = 0;    ///< these three are internal to the recording
-  std::uint64_t block = 0;   ///< number of a chunk in its file; 0 without chunks
-  std::uint64_t offset = 0;  ///< of the message within it, or its row
+  std::uint32_t file = 0;    ///< this and the next two are internal
+  std::uint64_t block = 0;   ///< number of the chunk in its file, or 0
+  std::uint64_t offset = 0;  ///< of the message within the chunk, or its row id
   friend bool operator==(const MessageLocation&, const MessageLocation&) = default;
 };
 
@@ -47,27 +47,27 @@ struct TimeSpan {
   friend bool operator==(const TimeSpan&, const TimeSpan&) = default;
 };
 
-/// Limits for reading a file. Apart from one list of places (32 bytes a message) a reader keeps one
-/// chunk, packed and unpacked, and up to 16 MiB of others.
+/// Limits for reading a file. Memory: a reader holds one list of locations (32 bytes for each
+/// message), one chunk, packed and unpacked, and up to 16 MiB of other chunks.
 struct RecordingLimits {
-  std::size_t chunk_bytes = 256U << 20U;  ///< of a chunk or message unpacked; at most 4 GiB
+  std::size_t chunk_bytes = 256U << 20U;  ///< of an unpacked chunk or message, <= 4 GiB
   std::size_t messages = 50'000'000;      ///< number of messages listed at a time
-  /// Unpacked size of a file that is packed as a whole; never more than half of the free space of
-  /// the folder for temporary files (TMPDIR).
+  /// Unpacked size of a compressed file (.zstd), and never more than half of the free space in the
+  /// folder for temporary files (TMPDIR).
   std::uint64_t file_bytes = std::uint64_t{32} << 30U;
 };
 
-/// Messages of topics with the times at which they were recorded: an MCAP file, a ROS 1 bag
-/// (version 2.0), a .db3 file of rosbag2, or a folder of rosbag2 with one or several files. Files
-/// that are packed as a whole (.zstd) are unpacked into a temporary file.
+/// Messages of topics, with the times at which they were recorded. Formats: an MCAP file, a ROS 1
+/// bag (version 2.0), a .db3 file of rosbag2, or a folder of rosbag2 with one or several files.
+/// Compressed files (.zstd) are unpacked into a temporary file.
 ///
-/// A file that was cut off or damaged gives what comes before the damage, and chunks whose checksum
-/// is wrong are left out; `warnings` says so.
+/// A file that is cut off or damaged is read up to the damage, and chunks with a wrong checksum are
+/// skipped; `warnings` reports both.
 class Recording {
  public:
-  /// Opens a recording, whose kind is found by its first bytes, not by its name. Throws FileError
-  /// when the file is missing, of another kind or version, or nothing in it can be read. Cost: that
-  /// of the file's index; without one, one pass over the file.
+  /// Opens a recording; its first bytes, not its name, decide its format. Throws FileError if the
+  /// file is missing, has another format or version, or nothing of it can be read. Cost: reading
+  /// the index of the file, or the whole file if it has none.
   [[nodiscard]] static std::unique_ptr<const Recording> open(const std::filesystem::path& path,
                                                              const RecordingLimits& limits = {});
 
@@ -77,30 +77,30 @@ class Recording {
   [[nodiscard]] virtual const std::vector<RecordedTopic>& topics() const noexcept = 0;
   /// Returns the times of the first and the last message; nullopt without messages.
   [[nodiscard]] virtual std::optional<TimeSpan> time() const noexcept = 0;
-  /// Returns warnings about damaged or skipped parts, one line each. Reading can add more.
+  /// Returns warnings about damaged or skipped parts, one line each. Later reading can add more.
   [[nodiscard]] virtual std::vector<std::string> warnings() const = 0;
 
-  /// Returns the places of the messages of these topics within the span, by time; of one time, in
-  /// the order of the files. Throws FileError when there are more than the limit, ContractError on
-  /// an unknown topic. Chunks outside of the span are not read.
+  /// Returns the locations of the messages of these topics within the time span, sorted by time,
+  /// and at equal times by file. Throws FileError if there are more than the limit, ContractError
+  /// on an unknown topic. Chunks outside of the span are not read.
   [[nodiscard]] virtual std::vector<MessageLocation> places(
       std::span<const std::uint32_t> topics, std::optional<TimeSpan> within = {}) const = 0;
 
-  /// Returns the bytes of a message. Several threads may call at a time; fastest in the order of
-  /// `places`. Throws FileError when the message is in a damaged chunk.
+  /// Returns the bytes of a message. Several threads may call at a time. Reading in the order of
+  /// `places` is fastest. Throws FileError if the chunk of the message is damaged.
   [[nodiscard]] virtual std::vector<std::uint8_t> read(const MessageLocation& place) const = 0;
 
-  /// Passes the messages that `places` would list to `use`, in that order. Bytes are valid until
-  /// `use` returns. Damaged chunks are left out, with a warning. Needs no list of all messages:
-  /// only of those chunks that overlap in time.
+  /// Passes the messages that `places` would list to `use`, in the same order. Bytes are valid
+  /// until `use` returns. Damaged chunks are skipped with a warning. Memory: it lists only the
+  /// messages of chunks that overlap in time, not all.
   virtual void for_each(
       std::span<const std::uint32_t> topics, std::optional<TimeSpan> within,
       const std::function<void(const MessageLocation& place, std::span<const std::uint8_t> bytes)>&
           use) const = 0;
 };
 
-/// True if `Recording::open` would accept it: checks the first bytes of a file, or the
-/// metadata.yaml of a folder. Never throws; false for what cannot be read.
+/// True if `Recording::open` would accept the path, by the first bytes of a file or the
+/// metadata.yaml of a folder. Never throws; false if it cannot be read.
 [[nodiscard]] bool is_recording(const std::filesystem::path& path) noexcept;
 
 }  // namespace panonav::recordings

@@ -25,7 +25,7 @@ Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& fil
                                      const std::function<void()>& advance) {
   const Dataset::Fields shared = find_shared_fields(dataset);
   TemporaryFile unfinished(file);
-  // JPEG and PNG are packed already.
+  // JPEG and PNG data is compressed already.
   McapWriter writer(unfinished.path(), {.compression = McapCompression::none});
   TopicWriter<ros::CompressedImage> pictures(writer, "/camera/image/compressed");
   RobotTopics robot(writer, "world");
@@ -33,7 +33,7 @@ Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& fil
   for (std::size_t i = 0; i < dataset.entries.size(); ++i) {
     const DatasetEntry& entry = dataset.entries[i];
     const std::int64_t ns = to_nanoseconds(shared.stamps ? *entry.stamp_s : static_cast<double>(i));
-    log_ns = std::max(log_ns, ns);  // readers go by it, and the order of pictures stays
+    log_ns = std::max(log_ns, ns);  // never decreases: readers sort by it
     std::optional<ReferencePose> truth = entry.pose;
     if (truth && !shared.headings) truth->heading_rad.reset();
     robot.write(log_ns, ns, entry.odometry, entry.tilt, truth);

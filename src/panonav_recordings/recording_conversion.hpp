@@ -9,10 +9,10 @@ namespace panonav::recordings {
 
 /// Writes a data set, or a recording or video opened as one, as an MCAP file of ROS 2 messages
 /// (docs/formats.md, section "Recordings"); on failure no file is left. The bytes of JPEG and PNG
-/// files are copied; the camera layout is not stored. Headings are written only if every position
-/// has one; unless every image has a stamp, stamps are one second apart. Returns the fields that
-/// all images have. `advance` is called after each image. Throws FileError, and ContractError on
-/// stamps below 0 or beyond 2038.
+/// files are copied; the camera layout is not stored. Headings are written only if all positions
+/// have one, and stamps only if all images have one; else images are a second apart. Returns the
+/// fields that all images have. `advance` is called after each image. Throws FileError, and
+/// ContractError on stamps below 0 or beyond 2038.
 Dataset::Fields convert_to_recording(const Dataset& dataset, const std::filesystem::path& file,
                                      const std::function<void()>& advance = {});
 

@@ -23,7 +23,7 @@ bool is_video_file(const std::filesystem::path& path) {
   return is_video(path) && std::filesystem::is_regular_file(path, ignored);
 }
 
-/// Pictures that are not selected need not be decoded.
+/// Reads only the selected pictures of a video, because decoding the others would cost time.
 Dataset open_video(const std::filesystem::path& path, const PictureSource& source,
                    const InputOptions& options) {
   return read_video(path, source, options.selection);

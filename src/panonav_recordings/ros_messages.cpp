@@ -18,12 +18,12 @@ namespace panonav::recordings::ros {
 namespace {
 
 constexpr std::int64_t second_ns = 1'000'000'000;
-constexpr std::size_t encapsulation_bytes = 4;  // of CDR: representation, options
+constexpr std::size_t encapsulation_bytes = 4;  // of CDR: representation and options
 
 template <class M, class T>
 concept Is = std::same_as<std::remove_const_t<M>, T>;
 
-// The members of each message in the order of its .msg file; readers and writers are `a`.
+// Passes the members of each message to `a`, a Reader or a Writer, in the order of its .msg file.
 
 template <class A>
 void visit_fields(A& a, Is<Header> auto& m) {
@@ -139,7 +139,8 @@ Number swap_bytes(Number value) {
   return std::bit_cast<Number>(bytes);
 }
 
-// A value of n bytes starts at a multiple of n behind the encapsulation header; ROS 1 packs.
+// Returns the padding before a value: CDR aligns n bytes to multiples of n after the encapsulation
+// header, ROS 1 aligns nothing.
 std::size_t padding(bool aligned, std::size_t at, std::size_t size) {
   return aligned ? (size - (at - encapsulation_bytes) % size) % size : 0;
 }
@@ -174,7 +175,7 @@ class Reader {
     ns = second_ns * (cdr_ ? std::int64_t{static_cast<std::int32_t>(seconds)} : seconds) +
          nanoseconds;
   }
-  /// A DDS rounds its messages up to four bytes.
+  /// Throws ContractError if bytes are left over, except the padding to four bytes that DDS adds.
   void finish() const {
     const std::size_t left = bytes_.size() - at_;
     if (left > (cdr_ ? 3U : 0U)) {
@@ -205,7 +206,7 @@ class Reader {
   }
   void read_value(std::string& text) {
     auto bytes = take(number<std::uint32_t>());
-    if (cdr_ && !bytes.empty()) bytes = bytes.first(bytes.size() - 1);  // its final zero
+    if (cdr_ && !bytes.empty()) bytes = bytes.first(bytes.size() - 1);  // without its final zero
     text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
   void read_value(std::span<const std::uint8_t>& bulk) { bulk = take(number<std::uint32_t>()); }

@@ -14,12 +14,12 @@
 #include "panonav_recordings/recording.hpp"
 
 /// The messages of ROS that panonav reads and writes, as plain values. Members are named and
-/// ordered as in the .msg files, `type` is the type's name; a stamp is one number, `seq` of ROS 1
-/// is left out. Bulk data (pictures, clouds) is not owned; that of a
-/// message that was read belongs to the bytes it was read from.
+/// ordered as in the .msg files, and `type` is ROS 1's name of the type. A stamp is one number, and
+/// `seq` of ROS 1 is left out. Bulk data (pictures, clouds) is not owned: after `read_message` it
+/// points into the bytes that were read.
 namespace panonav::recordings::ros {
 
-/// The type std_msgs/Header: when, and in which frame.
+/// The type std_msgs/Header: a time and a frame of coordinates.
 struct Header {
   std::int64_t stamp_ns = 0;  ///< since 1970, or since the start of a simulation
   std::string frame_id;       ///< name of the frame of coordinates
@@ -47,26 +47,26 @@ struct Pose {
   Quaternion orientation;  ///< of unit length
 };
 
-/// Tolerance of the length of a quaternion that is read; the same as tf2's.
+/// Tolerance of the length of a quaternion that is read, which should be 1; the same as in tf2.
 inline constexpr double quaternion_tolerance = 0.1;
 
 /// Composes poses, or transforms parent_from_child: q_parent = position + orientation * q_child.
 [[nodiscard]] Pose operator*(const Pose& a_from_b, const Pose& b_from_c);
-/// Returns the pose of a in the frame of b. The orientation must be of unit length.
+/// Returns the inverse transform, b_from_a. The orientation must be of unit length.
 [[nodiscard]] Pose inverse(const Pose& a_from_b);
-/// Interpolates on the line between the positions and on the great circle between the orientations;
-/// `share` 0 gives the bits of `a`, 1 those of `b`; beyond them the motion continues.
+/// Interpolates positions linearly and orientations along the shorter rotation (slerp). `share` 0
+/// returns exactly `a`, 1 exactly `b`; values outside of 0 .. 1 extrapolate.
 [[nodiscard]] Pose between(const Pose& a, const Pose& b, double share);
-/// Returns a pose with the heading about the vertical, then roll and pitch as in `Tilt`:
-/// R_z(heading) R_y R_x.
+/// Returns the pose with this heading, then roll and pitch as in `Tilt`: R_z(heading) R_y(pitch)
+/// R_x(roll).
 [[nodiscard]] Pose to_pose(const Pose2& pose, const Tilt& tilt = {});
-/// Returns the pose seen from above: x, y and the yaw.
+/// Projects the pose to the floor: x, y and yaw.
 [[nodiscard]] Pose2 to_pose2(const Pose& pose);
-/// Returns roll and pitch, in radians, of any quaternion but zero.
+/// Returns roll and pitch, in radians, of any quaternion but zero, whatever its length.
 [[nodiscard]] Tilt to_tilt(const Quaternion& orientation);
 
-using Covariance3 = std::array<double, 9>;   ///< row-major; [0] = -1: there is no such measurement
-using Covariance6 = std::array<double, 36>;  ///< row-major, x y z and turns about x, y, z
+using Covariance3 = std::array<double, 9>;   ///< row-major; [0] = -1: no measurement
+using Covariance6 = std::array<double, 36>;  ///< row-major; x, y, z and rotations about them
 
 /// A picture as pixels.
 struct Image {
@@ -74,7 +74,7 @@ struct Image {
   Header header;                  ///< when it was taken; frame of the camera
   std::uint32_t height = 0;       ///< rows
   std::uint32_t width = 0;        ///< columns
-  std::string encoding;           ///< of the pixels, see `to_image`
+  std::string encoding;           ///< pixel encoding, see `to_image`
   std::uint8_t is_bigendian = 0;  ///< 1: numbers of several bytes begin with the most significant
   std::uint32_t step = 0;         ///< bytes from one row to the next
   std::span<const std::uint8_t> data;  ///< height x step bytes, rows from the top
@@ -94,34 +94,34 @@ struct Imu {
   static constexpr std::string_view type = "sensor_msgs/Imu";  ///< ROS 1's name of the type
   Header header;                                 ///< when it was measured; frame of the sensor
   Quaternion orientation;                        ///< of the sensor in a level frame
-  Covariance3 orientation_covariance{};          ///< of turns about x, y, z, rad^2
+  Covariance3 orientation_covariance{};          ///< of rotations about x, y, z, rad^2
   Vector3 angular_velocity;                      ///< rad/s
   Covariance3 angular_velocity_covariance{};     ///< rad^2/s^2
   Vector3 linear_acceleration;                   ///< m/s^2
   Covariance3 linear_acceleration_covariance{};  ///< m^2/s^4
 };
 
-/// A pose and how certain it is.
+/// A pose and its covariance.
 struct PoseWithCovariance {
   Pose pose;                 ///< in the frame of the message
   Covariance6 covariance{};  ///< m^2, m rad and rad^2
 };
 
-/// Pose of the robot by wheels, or by another estimate without a map.
+/// Pose of the robot by wheel odometry, or by another estimate that needs no map.
 struct Odometry {
   static constexpr std::string_view type = "nav_msgs/Odometry";  ///< ROS 1's name of the type
   Header header;                                                 ///< frame_id: of the odometry
-  std::string child_frame_id;                                    ///< of the robot
-  PoseWithCovariance pose;         ///< child_frame_id in the frame of the odometry
-  Vector3 linear_velocity;         ///< m/s, in the child frame
-  Vector3 angular_velocity;        ///< rad/s
+  std::string child_frame_id;                                    ///< frame of the robot
+  PoseWithCovariance pose;                                       ///< odometry_from_child
+  Vector3 linear_velocity;                                       ///< m/s, in the child frame
+  Vector3 angular_velocity;                                      ///< rad/s
   Covariance6 twist_covariance{};  ///< of both velocities, linear first
 };
 
 /// Pose of one frame in another at a time.
 struct TransformStamped {
   Header header;               ///< frame_id: the parent
-  std::string child_frame_id;  ///< of the child
+  std::string child_frame_id;  ///< the child frame
   Pose transform;              ///< parent_from_child
 };
 
@@ -147,7 +147,7 @@ struct PoseStamped {
   Pose pose;      ///< in the frame of the header
 };
 
-/// A pose at a time and how certain it is.
+/// A pose at a time and its covariance.
 struct PoseWithCovarianceStamped {
   /// ROS 1's name of the type.
   static constexpr std::string_view type = "geometry_msgs/PoseWithCovarianceStamped";
@@ -163,7 +163,7 @@ struct PoseArray {
   std::vector<Pose> poses;  ///< in the frame of the header
 };
 
-/// Poses one after the other, such as a plan.
+/// Poses in the order in which a robot passes them, such as a plan.
 struct Path {
   static constexpr std::string_view type = "nav_msgs/Path";  ///< ROS 1's name of the type
   Header header;                   ///< when it was made, and the frame of the poses
@@ -172,20 +172,20 @@ struct Path {
 
 /// One value of each point of a cloud.
 struct PointField {
-  std::string name;           ///< "x", "y", "z", or what the value means
+  std::string name;           ///< "x", "y", "z", or another quantity
   std::uint32_t offset = 0;   ///< bytes from the beginning of a point
   std::uint8_t datatype = 7;  ///< 2 UINT8, 6 UINT32, 7 FLOAT32, 8 FLOAT64
-  std::uint32_t count = 1;    ///< numbers of that type one after the other
+  std::uint32_t count = 1;    ///< number of values of that type
 };
 
-/// Points with values, packed.
+/// Points, each with the same fields, packed into bytes.
 struct PointCloud2 {
   /// ROS 1's name of the type.
   static constexpr std::string_view type = "sensor_msgs/PointCloud2";
   Header header;                       ///< when, and the frame of the points
   std::uint32_t height = 1;            ///< 1: the points have no order
   std::uint32_t width = 0;             ///< points in a row
-  std::vector<PointField> fields;      ///< what a point consists of
+  std::vector<PointField> fields;      ///< layout of a point
   std::uint8_t is_bigendian = 0;       ///< 1: numbers begin with the most significant byte
   std::uint32_t point_step = 0;        ///< bytes of a point
   std::uint32_t row_step = 0;          ///< bytes of a row: width x point_step
@@ -193,7 +193,7 @@ struct PointCloud2 {
   std::uint8_t is_dense = 1;           ///< 1: no value is NaN
 };
 
-/// A map of cells of floor.
+/// A map of the floor in square cells, occupied or free.
 struct OccupancyGrid {
   /// ROS 1's name of the type.
   static constexpr std::string_view type = "nav_msgs/OccupancyGrid";
@@ -203,7 +203,7 @@ struct OccupancyGrid {
   float resolution = 0.0F;         ///< m
   std::uint32_t width = 0;         ///< cells along x
   std::uint32_t height = 0;        ///< cells along y
-  Pose origin;                     ///< of the corner of cell (0, 0)
+  Pose origin;                     ///< pose of the corner of cell (0, 0)
   std::vector<std::int8_t> cells;  ///< row-major; 0 .. 100, -1 unknown
 };
 
@@ -219,18 +219,18 @@ struct DiagnosticStatus {
   std::string name;              ///< of the part
   std::string message;           ///< one line for people
   std::string hardware_id;       ///< of the device; may be empty
-  std::vector<KeyValue> values;  ///< figures behind the message
+  std::vector<KeyValue> values;  ///< details of the message
 };
 
 /// States of the parts of a robot.
 struct DiagnosticArray {
   /// ROS 1's name of the type.
   static constexpr std::string_view type = "diagnostic_msgs/DiagnosticArray";
-  Header header;                         ///< when; its frame means nothing
+  Header header;                         ///< time; its frame is unused
   std::vector<DiagnosticStatus> status;  ///< one for each part
 };
 
-/// A velocity in space.
+/// Linear and angular velocity in three dimensions.
 struct Twist {
   static constexpr std::string_view type = "geometry_msgs/Twist";  ///< ROS 1's name of the type
   Vector3 linear;                                                  ///< m/s, in the robot's frame
@@ -249,24 +249,24 @@ struct String {
   std::string data;                                            ///< UTF-8
 };
 
-/// Returns ROS 2's name of the `type` of a message: "sensor_msgs/msg/Image".
+/// Returns ROS 2's name of a message type: "sensor_msgs/msg/Image" for "sensor_msgs/Image".
 [[nodiscard]] std::string ros2_type_name(std::string_view type);
 
 /// Reads a message in ROS 1's serialisation or as CDR of either byte order (XCDR1, as ROS 2 writes
-/// it). Memory: at most some 20 times the bytes. Throws ContractError, one line, on bytes that end
-/// too early or too late, on stamps out of range and on poses (of Odometry, transforms, points and
-/// poses) that are not finite or whose quaternion is not near unit length.
+/// it). Memory: at most about 20 times the bytes. Throws ContractError of one line if bytes are
+/// missing or left over, a stamp is out of range, or a pose (of Odometry, transforms, points and
+/// poses) is not finite or its quaternion not near unit length.
 template <class Message>
 [[nodiscard]] Message read_message(std::span<const std::uint8_t> bytes, MessageEncoding encoding);
 
-/// Writes a message, little endian. Throws ContractError on a stamp that the encoding cannot hold
-/// (ROS 2: beyond 2038).
+/// Writes a message, little endian. Throws ContractError if the encoding cannot hold a stamp (ROS
+/// 2: beyond 2038).
 template <class Message>
 [[nodiscard]] std::vector<std::uint8_t> write_message(
     const Message& message, MessageEncoding encoding = MessageEncoding::cdr);
 
-/// Returns the "ros2msg" schema of a type above for MCAP: its definition, then those of all types
-/// that it is made of. Throws ContractError on another type.
+/// Returns the "ros2msg" schema of a type above for MCAP: its definition, followed by those of all
+/// types in it. Throws ContractError on another type.
 [[nodiscard]] std::string ros2_schema(std::string_view type);
 
 /// Returns the picture like `read_image`: one channel for grey, three for colour.
@@ -277,8 +277,9 @@ template <class Message>
 /// Throws ContractError on other encodings, sizes beyond the limits, a step shorter than a row and
 /// data of another length than height x step.
 [[nodiscard]] panonav::Image to_image(const Image& message, const ImageLimits& limits = {});
-/// Decodes a JPEG or PNG, distinguished by content. Errors name `name`. Throws ContractError on
-/// another format (compressedDepth, h264), FileError on bytes that cannot be decoded.
+/// Decodes a JPEG or PNG; the bytes, not `format`, decide which. Errors name `name`. Throws
+/// ContractError on another format (compressedDepth, h264), FileError on bytes that cannot be
+/// decoded.
 [[nodiscard]] panonav::Image to_image(const CompressedImage& message, std::string_view name,
                                       const ImageLimits& limits = {});
 

@@ -11,7 +11,7 @@ namespace {
 
 using Row = const std::uint8_t*;
 
-/// Pixels of `bytes` each; the channel that is read for red, green and blue, or one for grey.
+/// An encoding of pixels of `bytes` bytes; `order` has the channels that are red, green and blue.
 struct Encoding {
   std::string_view name;
   int bytes;
@@ -59,11 +59,11 @@ void convert_interleaved_row(Row row, const Encoding& from, int width, int chann
 void convert_deep_row(Row row, bool big_endian, int width, std::uint8_t* to) {
   for (int u = 0; u < width; ++u) {
     const int value = row[2 * u + (big_endian ? 0 : 1)] << 8 | row[2 * u + (big_endian ? 1 : 0)];
-    *to++ = static_cast<std::uint8_t>((value * 255 + 32895) >> 16);  // libpng's, exact
+    *to++ = static_cast<std::uint8_t>((value * 255 + 32895) >> 16);  // as libpng rounds
   }
 }
 
-// BT.601 in 1/256.
+// Converts YUV 4:2:2 by ITU-R BT.601, with coefficients in 1/256.
 void convert_yuv_row(Row row, const Encoding& from, int width, std::uint8_t* to) {
   for (int u = 0; u < width; ++u) {
     const Row pair = row + 4 * (u / 2);
@@ -76,8 +76,8 @@ void convert_yuv_row(Row row, const Encoding& from, int width, std::uint8_t* to)
   }
 }
 
-/// Each colour that a pixel lacks is the mean of its two or four neighbours of that colour; the
-/// picture is mirrored at its edges, which keeps the pattern.
+/// Interpolates a Bayer pattern: a missing colour is the mean of the two or four nearest pixels of
+/// that colour. The picture is mirrored at its edges, which keeps the pattern.
 void convert_bayer(const Image& message, Row data, const Encoding& from, panonav::Image& picture) {
   const int width = picture.width();
   const int height = picture.height();

@@ -49,7 +49,7 @@ Pose between(const Pose& a, const Pose& b, double share) {
   const Quaternion& r = b.orientation;
   const double cosine = dot(q, r) / std::sqrt(dot(q, q) * dot(r, r));
   const double angle = std::acos(std::min(std::abs(cosine), 1.0));
-  // The two quaternions of one orientation differ in sign; the shorter way counts.
+  // q and -q are the same orientation; the sign selects the shorter rotation.
   const double sign = cosine < 0.0 ? -1.0 : 1.0;
   constexpr double straight_rad = 1e-6;
   const double of_a = angle < straight_rad ? 1.0 - share : std::sin((1.0 - share) * angle);

@@ -15,8 +15,8 @@ struct Definition {
   std::string_view text;
 };
 
-// From ROS 2's common_interfaces, without comments (Apache-2.0). `uint8 FLOAT32=7` and the like are
-// constants, which have no bytes.
+// Definitions of ROS 2's common_interfaces, without comments (Apache-2.0). Lines such as `uint8
+// FLOAT32=7` are constants and take no bytes in a message.
 constexpr std::array definitions{
     Definition{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
     Definition{"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},

@@ -31,7 +31,7 @@ ros::PoseWithCovarianceStamped pose_message(const RunMoment& moment, std::int64_
                                             const std::string& frame) {
   ros::PoseWithCovarianceStamped message{{stamp_ns, frame}, {ros::to_pose(*moment.pose), {}}};
   if (!moment.covariance) return message;
-  // Rows and columns of x, y and heading within those of x, y, z and the three turns.
+  // Indices of x, y and heading among x, y, z and the rotations about x, y, z.
   constexpr std::array<std::size_t, 3> at{0, 1, 5};
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {

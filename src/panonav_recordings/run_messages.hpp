@@ -10,22 +10,24 @@
 #include "panonav_recordings/ros_messages.hpp"
 #include "panonav_recordings/run_recorder.hpp"
 
-/// The ROS messages of a moment, in files and on the wire. `frame` is that of its poses.
+/// Makes the ROS messages of a moment, for files and for publishing. `frame` is the frame of its
+/// poses.
 namespace panonav::recordings {
 
-/// Returns the pose of a moment that has one. The covariance is zero if the moment has none.
+/// Returns the pose of a moment, which must have one. The covariance is zero if the moment has
+/// none.
 [[nodiscard]] ros::PoseWithCovarianceStamped pose_message(const RunMoment& moment,
                                                           std::int64_t stamp_ns,
                                                           const std::string& frame);
-/// Returns a message of several level poses, such as particles or directions.
+/// Returns a message of several level poses, such as particles.
 [[nodiscard]] ros::PoseArray poses_message(const std::vector<Pose2>& poses, std::int64_t stamp_ns,
                                            const std::string& frame);
 /// Returns the state of the moment with all its values; the level is 0 if it is sure, else 1.
 [[nodiscard]] ros::DiagnosticArray diagnostics_message(const RunMoment& moment,
                                                        std::int64_t stamp_ns);
 
-/// x, y, z and one more value of each point, as float32. A message of it is valid until a point is
-/// added.
+/// Collects points as float32 for a cloud: x, y, z and one more value each. A message from it is
+/// valid until another point is added.
 struct PointValues {
   std::vector<float> values;  ///< four for each point
 
@@ -36,7 +38,8 @@ struct PointValues {
                                          const std::string& value_name) const;
 };
 
-/// Draws `count` particles evenly by weight, without randomness; all of them if there are fewer.
+/// Returns `count` poses at even steps of the cumulative weight, without randomness; all poses if
+/// there are at most `count`.
 [[nodiscard]] std::vector<Pose2> resample_systematically(const Particles& particles,
                                                          std::size_t count);
 

@@ -24,8 +24,8 @@ namespace panonav::recordings {
 
 namespace {
 
-/// Free where a camera has stood, with as much around it; nothing is known of the rest. Empty where
-/// the references are too far apart for a grid.
+/// Makes a grid whose cells within two cells of a reference are free and all others unknown.
+/// `nullopt` if the references are too far apart for a grid.
 std::optional<ros::OccupancyGrid> make_visited_grid(const std::vector<Point2>& positions,
                                                     std::int64_t stamp_ns) {
   constexpr double cell_m = 0.1;
@@ -43,7 +43,7 @@ std::optional<ros::OccupancyGrid> make_visited_grid(const std::vector<Point2>& p
   grid.width = static_cast<std::uint32_t>(columns);
   grid.height = static_cast<std::uint32_t>(rows);
   const Point2 corner{low_x.x_m - (around + 0.5) * cell_m, low_y.y_m - (around + 0.5) * cell_m};
-  // A little below the points, which viewers draw half under it otherwise.
+  // Slightly below the points; otherwise viewers hide half of each point.
   grid.origin.position = {corner.x_m, corner.y_m, -0.05};
   grid.cells.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), -1);
   for (const Point2& position : positions) {
@@ -61,7 +61,8 @@ std::optional<ros::OccupancyGrid> make_visited_grid(const std::vector<Point2>& p
   return grid;
 }
 
-/// Points along the edges, dense enough to look like lines, but few enough for viewers.
+/// Samples points along the edges, dense enough to look like lines, but at most about 100,000 for
+/// viewers.
 PointValues sample_edges(const std::vector<RunEdge>& edges) {
   constexpr double max_points = 1e5;
   double length_m = 0.0;
@@ -133,7 +134,7 @@ void describe(RunMoment& moment, const Place& place) {
     // 95 % of a circular normal distribution lie within 2.4477 standard deviations.
     const double deviation_m = *place.position->radius_m / 2.4477;
     const double variance = deviation_m * deviation_m;
-    // The heading has no stated accuracy: the variance of a uniform turn.
+    // The accuracy of the heading is unknown: this is the variance of a uniform angle.
     constexpr double any_turn = std::numbers::pi * std::numbers::pi / 3.0;
     moment.covariance = {variance, 0, 0, 0, variance, 0, 0, 0, any_turn};
   }
@@ -204,13 +205,13 @@ struct RunRecorder::Implementation {
     diagnostics.write(log_ns, ns, diagnostics_message(moment, ns));
   }
 
-  /// Frames as REP 105 has them: map, odom where there is odometry, base_link.
+  /// Writes the frames of REP 105: map, odom if there is odometry, and base_link.
   void write_transforms(const RunMoment& moment, std::int64_t ns) {
     ros::TFMessage tf;
     const auto add = [&](const char* parent, const char* child, const Pose2& parent_from_child) {
       tf.transforms.push_back({{ns, parent}, child, ros::to_pose(parent_from_child)});
     };
-    add("tf#/", "map", {});  // without it Rerun shows what is given in "map" nowhere
+    add("tf#/", "map", {});  // Rerun shows "map" only below this root
     if (moment.odometry) add("odom", "base_link", *moment.odometry);
     if (moment.odometry && moment.pose)
       add("map", "odom", *moment.pose * inverse(*moment.odometry));
@@ -224,7 +225,7 @@ struct RunRecorder::Implementation {
     for (const Pose2& pose : poses) cloud.add(pose.position(), pose.heading_rad);
     return cloud;
   }
-  /// Writes a path as PointCloud2 and as Path, whose poses have the stamp of their message.
+  /// Writes the plan as PointCloud2 and as Path; its poses have the stamp of the message.
   void write_plan(const std::vector<Pose2>& path, std::int64_t ns) {
     if (path.empty()) return;
     ros::Path message{{ns, "map"}, {}};
@@ -233,8 +234,8 @@ struct RunRecorder::Implementation {
     plan.write(log_ns, ns, message);
   }
 
-  /// Drops every second pose when there are many, so that a long run does not write all its poses
-  /// each time.
+  /// Writes the path driven so far. Each message has the whole path, so every second pose is
+  /// dropped once there are 1024.
   void write_path(std::int64_t ns, const Pose2& pose) {
     constexpr std::size_t max_poses = 1024;
     if (moments_on_path++ % path_every == 0) {
@@ -314,7 +315,7 @@ struct RunRecorder::Implementation {
   }
 
   RunRecorderOptions options;
-  McapWriter writer;  // the thread's, from here
+  McapWriter writer;  // used only by the thread, up to `failed`
   TopicWriter<ros::CompressedImage> pictures, panoramas, best_matches;
   TopicWriter<ros::TFMessage> transforms;
   TopicWriter<ros::PointCloud2> references, edges, particles, path_points, plan_points;
@@ -329,7 +330,7 @@ struct RunRecorder::Implementation {
   std::size_t moments_on_path = 0;
   std::size_t path_every = 1;
   std::int64_t log_ns = 0;
-  bool failed = false;  // to here
+  bool failed = false;  // last one used only by the thread
   std::mutex mutex;
   std::condition_variable has_work;
   std::condition_variable has_room;
@@ -346,7 +347,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& file, const RunRecorderOpt
 RunRecorder::~RunRecorder() {
   try {
     implementation_->close();
-  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): `close` would have said it
+  } catch (const Error&) {  // NOLINT(bugprone-empty-catch): only `close` reports it
   }
 }
 

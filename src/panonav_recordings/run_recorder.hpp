@@ -26,13 +26,13 @@ namespace panonav::recordings {
 struct RunEdge {
   Point2 from;                             ///< one end
   Point2 to;                               ///< the other
-  Link::Kind kind = Link::Kind::sequence;  ///< why they are joined
+  Link::Kind kind = Link::Kind::sequence;  ///< origin of the edge
 };
 
-/// Data of a reference besides its position.
+/// Name and heading of a reference; its position is in `RunMoment::references`.
 struct RunReference {
-  std::string name;                   ///< of the view
-  std::optional<double> heading_rad;  ///< at which it was taken; empty: unknown
+  std::string name;                   ///< name of the view
+  std::optional<double> heading_rad;  ///< heading when it was taken, if known
 };
 
 /// A region of the floor that belongs to an area of the memory.
@@ -44,7 +44,7 @@ struct RunRegion {
 /// A reference that was compared with the current view.
 struct RunComparison {
   std::size_t reference = 0;        ///< index into `RunMoment::references`
-  std::uint32_t dissimilarity = 0;  ///< as `Match`: less means more similar
+  std::uint32_t dissimilarity = 0;  ///< as `Match`: a smaller value is more similar
 };
 
 /// Direction and confidence of a home vector.
@@ -59,62 +59,62 @@ struct RunHoming {
 struct RunMoment {
   double stamp_s = 0.0;                       ///< seconds, ascending
   std::optional<Image> picture;               ///< as the camera delivered it
-  std::vector<std::uint8_t> encoded_picture;  ///< the same as PNG or JPEG; one of the two is enough
+  std::vector<std::uint8_t> encoded_picture;  ///< the same as PNG or JPEG; one is enough
   std::optional<Panorama> panorama;           ///< unwarped from the picture
-  std::vector<std::uint8_t> best_match;       ///< its thumbnail, PNG
-  std::optional<double> best_match_turn_rad;  ///< heading of the robot relative to it
+  std::vector<std::uint8_t> best_match;       ///< thumbnail of the reference, PNG
+  std::optional<double> best_match_turn_rad;  ///< heading of the robot relative to that reference
   std::optional<Pose2> pose;                  ///< of the robot
-  /// Of x, y and heading, row-major, m^2, m rad and rad^2.
+  /// Covariance of x, y and heading, row-major, in m^2, m rad and rad^2.
   std::optional<std::array<double, 9>> covariance;
   std::vector<Pose2> particles;  ///< of a filter, or a sample of them (`resample_systematically`)
   std::vector<PoseMode> modes;   ///< heaviest first; not in records
   std::vector<RunComparison> comparisons;  ///< not in records
   std::optional<RunHoming> homing;         ///< not in records
-  /// Times that the robot spent since the moment before, by stage, ms; not in records.
+  /// Duration of each stage of the robot's work since the previous moment, ms; not in records.
   std::vector<std::pair<std::string, double>> stages_ms;
-  std::optional<Pose2> odometry;       ///< absolute, in a frame of its own
+  std::optional<Pose2> odometry;       ///< pose in the odometry frame
   std::optional<Tilt> tilt;            ///< roll and pitch, measured
   std::optional<ReferencePose> truth;  ///< true pose of the robot, for comparison
-  // Members that stay valid until a later moment replaces them.
+  // These members stay valid until a later moment replaces them.
   std::vector<Point2> references;             ///< positions of the reference views
-  std::vector<RunReference> reference_views;  ///< of each, or empty; not in records
+  std::vector<RunReference> reference_views;  ///< one for each reference, or empty; not in records
   std::vector<RunRegion> regions;             ///< not in records
-  std::vector<std::vector<Point2>> walls;  ///< lines; outlines end where they begin; not in records
-  std::vector<RunEdge> edges;              ///< of the map that the references are in
+  std::vector<std::vector<Point2>> walls;  ///< polylines, closed if ends are equal; not in records
+  std::vector<RunEdge> edges;              ///< edges of the map of the references
   std::vector<Pose2> plan;                 ///< planned path
-  std::vector<Pose2> directions;  ///< places with the direction in which they send the robot
-  std::optional<Pose2> goal;      ///< destination of the robot
-  bool sure = false;              ///< diagnostics: fine, otherwise a warning
-  /// Probability of the estimated pose, or that the place is known: 0 .. 1.
+  std::vector<Pose2> directions;           ///< positions and the directions to drive there
+  std::optional<Pose2> goal;               ///< destination of the robot
+  bool sure = false;                       ///< true: diagnostics level 0; false: a warning
+  /// Probability, 0 .. 1, of the estimated pose, or that the place is known.
   std::optional<double> probability;
   std::string state;  ///< "localised", "unknown place", ...; empty: no diagnostics
   std::vector<std::pair<std::string, std::string>> values;  ///< further values of the diagnostics
 };
 
-/// Makes a moment of an observation. Without a stamp it gets `number` seconds.
+/// Makes a moment of an observation. Its stamp is that of the observation, else `number` seconds.
 [[nodiscard]] RunMoment make_moment(const Observation& observation, std::size_t number);
-/// Returns the positions of the views with a pose.
+/// Returns the positions of all views that have a pose.
 [[nodiscard]] std::vector<Point2> reference_positions(const VisualMemory& memory);
 
-/// Sets the members of a moment that a tracked estimate has.
+/// Sets pose, covariance, state and diagnostics of a moment from a tracked estimate.
 void describe(RunMoment& moment, const MonteCarloEstimate& estimate);
-/// Sets the members of a moment that a recognised place has: its pose if place, position and
-/// heading are known.
+/// Sets state, probability and diagnostics of a moment from a recognised place, and the pose if
+/// place, position and heading are known.
 void describe(RunMoment& moment, const Place& place);
 
-/// Options of a recorder for slow disks.
+/// Options of `RunRecorder` for a disk that is too slow.
 struct RunRecorderOptions {
-  /// Wait for the disk instead of leaving moments out; for runs that are not live.
+  /// True: `add` waits for the disk instead of dropping moments; for runs that are not live.
   bool wait = false;
-  std::size_t max_waiting = 64;  ///< moments
+  std::size_t max_waiting = 64;  ///< moments in the queue
 };
 
-/// Writes a run as MCAP with ROS 2 messages (CDR), which Rerun, Foxglove and Lichtblick open as it
-/// is: pictures as CompressedImage, references, edges, particles, plan and path as PointCloud2 and
-/// as PoseArray and Path, where the camera of the references has stood as OccupancyGrid, the pose
-/// as TF and PoseWithCovarianceStamped, the state as diagnostics (docs/formats.md). The result can
-/// be read as any recording (`read_recording`). A thread of its own packs and writes, so that a
-/// slow disk does not delay the robot: moments that are too many for it are left out and counted.
+/// Writes a run as MCAP with ROS 2 messages (CDR) for Rerun, Foxglove and Lichtblick. Pictures are
+/// CompressedImage; references, edges, particles, plan and path are PointCloud2, and also PoseArray
+/// or Path; visited floor is OccupancyGrid; the pose is TF and PoseWithCovarianceStamped; the state
+/// is diagnostics (docs/formats.md). `read_recording` can read the file. Its own thread packs and
+/// writes, so that a slow disk does not delay the robot; if `max_waiting` moments are queued,
+/// further ones are dropped and counted.
 class RunRecorder {
  public:
   /// Creates the file, or replaces it. Throws FileError.
@@ -123,10 +123,10 @@ class RunRecorder {
   RunRecorder(const RunRecorder&) = delete;
   RunRecorder& operator=(const RunRecorder&) = delete;
 
-  /// Adds a moment. Throws FileError when an earlier one could not be written; nothing is written
-  /// any more then.
+  /// Adds a moment. Throws FileError if an earlier one could not be written; nothing more is
+  /// written after that.
   void add(RunMoment moment);
-  /// Writes waiting moments and the end of the file. Throws FileError.
+  /// Writes the queued moments and the end of the file. Throws FileError.
   void close();
   [[nodiscard]] std::size_t left_out() const;  ///< Returns the number of moments left out.
 

@@ -25,13 +25,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Stamps of the images in the container's unit of time.
+/// Stamps of the images, in the time unit of the file.
 struct VideoIndex {
   double unit_s = 0.0;
   std::vector<std::int64_t> stamps;  ///< ascending
 };
 
-/// Returns the standard output of a program that ends by itself.
+/// Runs a program to its end and returns its standard output.
 std::string read_output(const std::vector<std::string>& arguments, const std::string& file) {
   constexpr std::size_t max_bytes = std::size_t{256} << 20;
   const auto child = start_ffmpeg(arguments, file);
@@ -81,7 +81,8 @@ std::optional<std::int64_t> parse_whole_number(std::string_view text) {
   return read_number(text, value) ? std::optional(value) : std::nullopt;
 }
 
-/// `entries` of the container's packets, or of its decoded frames where packets have no stamps.
+/// Lists stamps by ffprobe; `entries` selects those of packets or of decoded frames. `nullopt` if
+/// one has no stamp.
 std::optional<VideoIndex> read_index(const std::string& file, const std::string& entries) {
   const std::string text = read_output(
       {"ffprobe", "-v", "error", "-protocol_whitelist", "file,pipe", "-select_streams", "v:0",
@@ -121,7 +122,7 @@ std::optional<VideoIndex> read_index(const std::string& file, const std::string&
 
 class VideoStore final : public PictureStore {
  public:
-  /// `chosen`: the stamps of its pictures, by the selection.
+  /// `chosen` has the stamps of the selected pictures.
   VideoStore(std::string file, VideoIndex chosen, std::optional<double> every_s, ImageLimits limits)
       : file_(std::move(file)), chosen_(std::move(chosen)), every_s_(every_s), limits_(limits) {}
 
@@ -136,7 +137,7 @@ class VideoStore final : public PictureStore {
     if (frames_ && stamp_to_find > last_) {
       if (auto picture = decode_up_to(stamp_to_find)) return std::move(*picture);
     }
-    // Files that were cut cannot be sought in.
+    // Seeking can fail in cut files; the second pass decodes from the beginning.
     for (const bool sought : {true, false}) {
       if (!sought && number == 0) continue;
       start(number, sought);
@@ -164,7 +165,7 @@ class VideoStore final : public PictureStore {
     return std::nullopt;
   }
 
-  /// From the wanted picture on, those that were chosen: they alone are converted and piped.
+  /// Starts ffmpeg at a picture. It converts and sends only the selected pictures from there on.
   void start(std::size_t number, bool sought) const {
     const double first_s = seconds(chosen_.stamps[number]);
     constexpr double rounding_s = 1e-4;
@@ -189,7 +190,7 @@ class VideoStore final : public PictureStore {
     last_ = std::numeric_limits<std::int64_t>::min();
   }
 
-  /// Threads ask for pictures a little out of order.
+  /// Keeps a decoded picture, because threads request pictures slightly out of order.
   void hold(DecodedFrame&& frame) const {
     constexpr std::size_t max_bytes = std::size_t{256} << 20;
     constexpr std::size_t max_pictures = 32;

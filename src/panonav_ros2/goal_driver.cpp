@@ -152,7 +152,8 @@ void GoalDriver::stop_if_silent() {
                            " s; the robot is stopped until the next image");
 }
 
-/// Publishes the areas that ways are planned over, a number for each view.
+/// Publishes the areas over which paths are planned: one point per view with the number of its
+/// area.
 void GoalDriver::publish_areas() {
   recordings::PointValues cloud;
   const auto& planner = navigator_->planner();

@@ -15,37 +15,38 @@
 
 namespace panonav::ros2 {
 
-/// The memory of a node.
+/// The memory of a localisation node, opened for tracking.
 struct LoadedMemory {
   std::filesystem::path path;
   MemoryFile file;
   Tracker tracker;
 };
 
-/// Drives a robot to a goal or along a route, by velocities on `cmd_vel`, and reports on
-/// `~/goal/feedback` and `~/goal/result`. Used by the thread that localises, unless stated
+/// Drives a robot to a goal or along a route by velocities on `cmd_vel`, and reports on
+/// `~/goal/feedback` and `~/goal/result`. To be called by the localising thread, unless stated
 /// otherwise.
 class GoalDriver {
  public:
   GoalDriver(Participant& participant, const LocalisationNodeSetup& setup, WarningLog& log,
              const RobotMotion& motion, NowNs now_ns);
 
-  /// Ends the mission, and uses this memory for the next ones; it outlives *this or the next call.
+  /// Ends the mission and uses `memory` for the next ones; it must outlive this object or the next
+  /// call.
   void set_memory(const LoadedMemory& memory);
-  /// Returns the mission of a node that used the same memory and died.
+  /// Returns the unfinished mission of a node that used the same memory and died; nullopt if there
+  /// is none.
   [[nodiscard]] std::optional<Mission> load_interrupted_mission();
 
-  /// Begins a mission, replacing the one before. Throws Error, having reported it, when there is no
-  /// path.
+  /// Starts a mission and ends the previous one. Reports it and throws Error if there is no path.
   void start(const Mission& mission);
-  /// Sends the velocity for the picture, if there is a mission. `pose`: the camera's in the map,
-  /// `nullopt` if the robot is not localised.
+  /// Sends the velocity for this image if there is a mission. `pose` is the camera's pose in the
+  /// map, `nullopt` if the robot is not localised.
   void drive(const Observation& observation, const std::optional<Pose2>& pose);
-  /// Stops the robot and reports why, if there is a mission. Any thread may call, as long as no
-  /// other one is in a function above.
+  /// Stops the robot and reports why, if there is a mission. May be called from any thread, but not
+  /// while another thread is in a function above.
   void end(const std::string& why, std::uint8_t level = warning);
-  /// Stops the robot when no velocity was sent for `command_timeout_s`, whatever delays pictures.
-  /// Any thread may call.
+  /// Stops the robot if no velocity was sent for `command_timeout_s`, for whatever reason. May be
+  /// called from any thread.
   void stop_if_silent();
 
  private:
@@ -75,9 +76,9 @@ class GoalDriver {
   std::optional<MissionFile> mission_file_;
   Mission mission_;
   std::optional<RobotNavigator> navigator_;
-  std::optional<RouteDriver> route_driver_;  // instead of the navigator, along a route
+  std::optional<RouteDriver> route_driver_;  // used instead of the navigator along a route
 
-  mutable std::mutex mutex_;  // of these, and of the order of velocities
+  mutable std::mutex mutex_;  // guards the following members and the order of velocities
   bool has_mission_ = false;
   std::chrono::steady_clock::time_point last_command_;
 };

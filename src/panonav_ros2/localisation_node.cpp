@@ -75,7 +75,7 @@ struct LocalisationNode::Implementation {
         });
   }
 
-  // Called on the thread of `run`.
+  // Runs on the thread that calls `run`.
 
   void run() {
     std::thread worker([this] { work(); });
@@ -103,7 +103,8 @@ struct LocalisationNode::Implementation {
     if (!map_from_odom) return;
     const auto ahead_ns = static_cast<std::int64_t>(1e9 * setup.node.transform_tolerance_s);
     const std::int64_t stamp_ns = sensors.now_ns() + ahead_ns;
-    // Sends nothing while the clock stands still: TF accepts no two transforms of one time.
+    // Send nothing while the clock stands still, because TF does not accept two transforms with the
+    // same time.
     if (std::exchange(last_transform_ns, stamp_ns) == stamp_ns) return;
     transforms.publish({{{{stamp_ns, setup.frames.map},
                           setup.frames.odom,
@@ -118,7 +119,7 @@ struct LocalisationNode::Implementation {
     diagnostics.publish(recordings::diagnostics_message(moment, sensors.now_ns()));
   }
 
-  // Called on the worker thread.
+  // Runs on the worker thread.
 
   void work() {
     while (const auto work = queue.next()) {
@@ -136,7 +137,7 @@ struct LocalisationNode::Implementation {
   }
 
   void observe(std::span<const std::uint8_t> message) {
-    const auto came = Steady::now();
+    const auto arrival_time = Steady::now();
     auto [observation, stamp_ns] = sensors.decode(message);
     const auto moved = motion.wait_for(stamp_ns);
     if (!moved) {
@@ -153,7 +154,7 @@ struct LocalisationNode::Implementation {
     } else {
       moment = localiser.localise(std::move(observation), stamp_ns, *moved);
       if (moment.sure && moment.pose) ++localised;
-      const std::chrono::duration<double, std::milli> delay = Steady::now() - came;
+      const std::chrono::duration<double, std::milli> delay = Steady::now() - arrival_time;
       moment.values.emplace_back("delay_ms", format_fixed(delay.count(), 1));
       moment.values.emplace_back("dropped", std::to_string(queue.dropped()));
       moment.values.emplace_back("warnings", std::to_string(log.count()));
@@ -174,7 +175,7 @@ struct LocalisationNode::Implementation {
     return moment;
   }
 
-  /// Executes a command of `~/command`, and returns the answer.
+  /// Executes a command from `~/command` and returns the answer.
   std::string execute(const std::string& words) {
     const std::size_t blank = words.find(' ');
     const std::string command = words.substr(0, blank);
@@ -229,7 +230,7 @@ struct LocalisationNode::Implementation {
   Publisher<recordings::ros::TFMessage> transforms;
   Publisher<recordings::ros::DiagnosticArray> diagnostics;
   Publisher<recordings::ros::String> answers;
-  std::optional<Teacher> teacher;  // of the thread that works: instead of the localiser
+  std::optional<Teacher> teacher;  // used instead of the localiser; only by the worker thread
   std::atomic<std::size_t> pictures = 0, localised = 0, taught = 0;
   std::int64_t last_transform_ns = 0;
 };

@@ -50,10 +50,10 @@ void MemoryLocaliser::load_neighbour(const std::string& name) {
                         "the name of a file in the folder of the memory");
   }
   load(path);
-  motion_.set_map_from_path(std::nullopt);  // it was in the frame of the other memory
+  motion_.set_map_from_path(std::nullopt);  // it referred to the other memory
 }
 
-/// Takes over what changed in the memory, with the robot where it is.
+/// Reads the changes of the memory and keeps the robot's pose.
 void MemoryLocaliser::reload() {
   if (!loaded().tracker.is_held()) {
     if (loaded().tracker.refresh()) publish_references();
@@ -65,7 +65,7 @@ void MemoryLocaliser::reload() {
 }
 
 void MemoryLocaliser::load_interrupted_mission() {
-  interrupted_ = driver_.load_interrupted_mission();
+  interrupted_mission_ = driver_.load_interrupted_mission();
 }
 
 void MemoryLocaliser::add_view(const std::string& name) {
@@ -102,7 +102,7 @@ void MemoryLocaliser::start_at(const Pose2& map_from_base) {
 }
 
 void MemoryLocaliser::start_tracker_at(const Pose2& map_from_camera) {
-  constexpr double heading_deviation_rad = 0.1;  // about the largest error of a localised heading
+  constexpr double heading_deviation_rad = 0.1;  // about the largest error when localised
   Tracker& tracker = loaded().tracker;
   tracker.start_at(map_from_camera, 0.5 * tracker.localiser().model().spacing_m,
                    heading_deviation_rad);
@@ -110,7 +110,7 @@ void MemoryLocaliser::start_tracker_at(const Pose2& map_from_camera) {
 
 recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::int64_t stamp_ns,
                                                 const RobotMotion::Motion& moved) {
-  if (interrupted_) resume(*std::exchange(interrupted_, std::nullopt), moved);
+  if (interrupted_mission_) resume(*std::exchange(interrupted_mission_, std::nullopt), moved);
   Tracker& tracker = loaded().tracker;
   refresh_if_due();
   tracker.move_to(*observation.odometry);
@@ -128,16 +128,16 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
   return moment;
 }
 
-/// Takes over what other robots changed in a memory that is not held, from time to time.
+/// Reads the changes that other robots made in a memory on a server, at most every ten seconds.
 void MemoryLocaliser::refresh_if_due() {
-  constexpr std::chrono::seconds interval(10);  // a view that is new need not count at once
+  constexpr std::chrono::seconds interval(10);  // new views are not urgent
   const auto now = std::chrono::steady_clock::now();
   if (memory_->tracker.is_held() || now - last_refresh_ < interval) return;
   last_refresh_ = now;
   reload();
 }
 
-/// Takes the robot to be where its odometry puts it since the mission was stored.
+/// Continues a mission: starts at the pose that odometry gives since the mission was stored.
 void MemoryLocaliser::resume(const Mission& mission, const RobotMotion::Motion& now) {
   const Pose2 pose = mission.map_from_odom * now.odom_from_base;
   start_at(pose);
@@ -147,19 +147,21 @@ void MemoryLocaliser::resume(const Mission& mission, const RobotMotion::Motion& 
 
 void MemoryLocaliser::correct_motion(const Pose2& map_from_base, const Pose2& path_from_base,
                                      recordings::RunMoment& moment) {
-  const auto former = motion_.set_map_from_path(map_from_base * inverse(path_from_base));
-  if (!former) return;
-  const Pose2 before = *former * path_from_base;
+  const auto previous_map_from_path =
+      motion_.set_map_from_path(map_from_base * inverse(path_from_base));
+  if (!previous_map_from_path) return;
+  const Pose2 before = *previous_map_from_path * path_from_base;
   const double turn_rad = angle_difference(before.heading_rad, map_from_base.heading_rad);
   moment.values.emplace_back(
       "correction_m", format_fixed(distance(before.position(), map_from_base.position()), 4));
   moment.values.emplace_back("correction_rad", format_fixed(std::abs(turn_rad), 4));
 }
 
-/// Publishes a pose if the estimate is certain; particles and the best match if a node subscribes.
+/// Publishes the pose if the estimate is certain, and particles and the best match if there are
+/// subscribers.
 void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns,
                                        const PackedSignature& view) const {
-  constexpr std::size_t max_shown_particles = 500;  // of thousands, no more tell a person more
+  constexpr std::size_t max_shown_particles = 500;  // more would not show more
   const Tracker& tracker = memory_->tracker;
   if (last_pose_) poses_.publish(recordings::pose_message(moment, stamp_ns, setup_.frames.map));
   if (particles_.subscribers() > 0) {
@@ -174,7 +176,7 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
   }
 }
 
-/// Publishes the positions of the views, with the number of each.
+/// Publishes the positions of the views, each with its index.
 void MemoryLocaliser::publish_references() const {
   recordings::PointValues cloud;
   for (const PosedView& view : memory_->tracker.index()->posed_views()) {

@@ -15,30 +15,32 @@
 
 namespace panonav::ros2 {
 
-/// Localises a robot by a memory: corrects its motion, drives it by the driver, and publishes pose,
-/// particles, references and best match. Before the first `load`, functions throw Error.
+/// Localises a robot by a memory, corrects its motion, calls the driver with each image, and
+/// publishes pose, particles, references and best match. Until the first `load`, functions throw
+/// Error.
 class MemoryLocaliser {
  public:
   MemoryLocaliser(Participant& participant, const LocalisationNodeSetup& setup, RobotMotion& motion,
                   GoalDriver& driver, NowNs now_ns);
 
-  /// Loads a memory. If this throws, the one before stays.
+  /// Loads a memory. If this throws, the previous memory remains loaded.
   void load(std::filesystem::path path);
-  /// Loads another memory of the same folder only, so that a topic cannot open any file that the
-  /// node may read.
+  /// Loads another memory by its file name, only from the same folder, so that a message cannot
+  /// open every file that the node may read.
   void load_neighbour(const std::string& name);
-  /// Continues the mission of a node that died, beginning with the next picture.
+  /// Reads the mission of a node that died; the next image continues it.
   void load_interrupted_mission();
-  /// Adds the last picture to the memory as a view.
+  /// Adds the last image to the memory as a view at its estimated pose.
   void add_view(const std::string& name);
   void remove_view(const std::string& name);
 
   void start_globally();
   void start_at(const Pose2& map_from_base, double deviation_m, double heading_deviation_rad);
-  /// Starts at a pose with the uncertainty of poses in the map.
+  /// Starts at a pose whose uncertainty is that of localised poses in the map.
   void start_at(const Pose2& map_from_base);
 
-  /// Localises by a picture with odometry, that of the camera after `moved`. Returns the state.
+  /// Localises by an image; its odometry is the camera's pose after `moved`. Returns the state of
+  /// the run.
   [[nodiscard]] recordings::RunMoment localise(Observation observation, std::int64_t stamp_ns,
                                                const RobotMotion::Motion& moved);
 
@@ -64,10 +66,10 @@ class MemoryLocaliser {
   Publisher<recordings::ros::CompressedImage> best_matches_;
   Pose2 base_from_camera_;
   std::unique_ptr<LoadedMemory> memory_;
-  std::optional<Mission> interrupted_;  // until the first picture
+  std::optional<Mission> interrupted_mission_;  // continued at the first image
   std::optional<Observation> last_observation_;
   std::chrono::steady_clock::time_point last_refresh_ = std::chrono::steady_clock::now();
-  std::optional<Pose2> last_pose_;  // of the camera in the map; `nullopt`: not localised then
+  std::optional<Pose2> last_pose_;  // camera in the map; `nullopt`: not localised at last image
 };
 
 }  // namespace panonav::ros2

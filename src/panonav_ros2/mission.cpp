@@ -38,9 +38,9 @@ std::optional<Mission> read_mission(std::istream& in) {
   return mission;
 }
 
-/// When something happened, in one run of the system.
+/// A time since the boot of the system, and which boot.
 struct BootTime {
-  std::string boot;  ///< number of the run; empty: not known
+  std::string boot;  ///< boot id; empty: unknown
   double seconds = 0.0;
 };
 
@@ -53,8 +53,9 @@ BootTime read_boot_time() {
   return now;
 }
 
-/// Why the robot is not sent on by a mission that was written then; empty: it is.
-std::string find_fault(const BootTime& written, double file_age_s, double max_age_s) {
+/// Returns why a mission written at that time is not continued; empty if it is continued.
+std::string find_reason_not_to_continue(const BootTime& written, double file_age_s,
+                                        double max_age_s) {
   const BootTime now = read_boot_time();
   if (now.boot.empty() || written.boot != now.boot) {
     return " was written before the system was started";
@@ -100,13 +101,13 @@ std::optional<Mission> MissionFile::load(WarningLog& log) {
   const double age_s =
       std::chrono::duration<double>(fs::file_time_type::clock::now() - written).count();
   std::ifstream in(path_);
-  in.imbue(std::locale::classic());  // as it was written, whatever the host program has set
+  in.imbue(std::locale::classic());  // independent of the host program's locale
   auto mission = read_mission(in);
   std::string word;
   BootTime at;
   std::string fault = " is damaged";
   if (mission && in >> word >> at.boot >> at.seconds && word == "written") {
-    fault = find_fault(at, age_s, max_age_s_);
+    fault = find_reason_not_to_continue(at, age_s, max_age_s_);
     if (fault.empty()) return mission;
   }
   log.warn("mission", path_.string() + fault + "; the robot does not continue");

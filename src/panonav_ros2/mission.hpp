@@ -10,31 +10,29 @@
 
 namespace panonav::ros2 {
 
-/// Destination of a robot: a place of the map, or a route.
+/// Destination of a robot: a goal pose in the map, or a route.
 struct Mission {
   std::optional<Pose2> goal;
   std::string route;
-  std::optional<double> along_m = {};  ///< distance along the route
-  double min_correlation =
-      0.0;                   ///< lowest correlation, learnt by the route's follower; 0: learn it
-  Pose2 map_from_odom = {};  ///< when the mission was stored
+  std::optional<double> along_m = {};  ///< path length already driven
+  double min_correlation = 0.0;  ///< threshold learnt by the route's follower; 0: not yet learnt
+  Pose2 map_from_odom = {};      ///< when the mission was stored
 };
 
 /// Stores the mission of a running node in a file next to its memory, so that a restarted node
-/// continues it. The file says in which run of the system it was written, and when by a clock that
-/// nobody sets and that runs while the system sleeps.
+/// continues it. The file contains the boot id of the system and the time since boot, which cannot
+/// be set and includes suspended time.
 class MissionFile {
  public:
-  /// `max_age_s`: older missions are not continued; 0: nothing is stored.
+  /// `max_age_s` is the largest age of a mission that is continued; 0: nothing is stored.
   MissionFile(const std::filesystem::path& memory, double max_age_s);
 
-  /// Writes the mission if the last time is a second ago: the file's time of change shows when the
+  /// Writes the mission at most once per second. The file's modification time thus shows when the
   /// node died.
   void store_if_due(const Mission& mission, const std::optional<Pose2>& map_from_odom);
   void remove();
-  /// Reads the mission of another node. `nullopt` if there is no file; one that is too old, comes
-  /// from the future or from before the system was started, or is damaged is removed with a
-  /// warning.
+  /// Reads the mission of another node; `nullopt` if there is no file. A file that is too old, has
+  /// a time in the future, is from before the last boot, or is damaged is removed with a warning.
   [[nodiscard]] std::optional<Mission> load(WarningLog& log);
 
  private:

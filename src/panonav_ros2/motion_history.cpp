@@ -13,8 +13,9 @@ MotionHistory::Added MotionHistory::add(std::int64_t stamp_ns, const Pose2& odom
   if (!samples_.empty()) {
     const Sample& last = samples_.back();
     const std::int64_t step_ns = stamp_ns - last.stamp_ns;
-    if (step_ns <= 0 && step_ns > -late_ns) return Added::late;
-    // A robot may stand still for any time: only the distance counts.
+    if (step_ns <= 0 && step_ns > -max_late_ns) return Added::late;
+    // A robot may stand still for any time, so a gap in time is no restart; only the distance is
+    // checked.
     const double seconds = std::max(0.1, 1e-9 * static_cast<double>(step_ns));
     const bool jumped = distance(odom_from_base.position(), last.odom_from_base.position()) >
                         max_speed_m_s * seconds;
@@ -26,7 +27,7 @@ MotionHistory::Added MotionHistory::add(std::int64_t stamp_ns, const Pose2& odom
     }
   }
   samples_.push_back({stamp_ns, odom_from_base});
-  while (samples_.front().stamp_ns < stamp_ns - kept_ns || samples_.size() > max_samples) {
+  while (samples_.front().stamp_ns < stamp_ns - max_age_ns || samples_.size() > max_samples) {
     samples_.pop_front();
   }
   return added;

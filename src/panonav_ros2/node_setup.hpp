@@ -16,8 +16,8 @@ namespace panonav::ros2 {
 
 /// Source of the robot's motion.
 enum class MotionInput { odometry, tf };
-/// Message type of the pictures: "image" as sensor_msgs/Image, or "image/compressed" as
-/// CompressedImage.
+/// Message type of the images: sensor_msgs/Image on "image", or CompressedImage on
+/// "image/compressed".
 enum class PictureInput { raw, compressed };
 
 struct LocalisationNodeOptions {
@@ -32,12 +32,12 @@ struct LocalisationNodeOptions {
   double camera_x_m = 0.0;
   double camera_y_m = 0.0;
 
-  /// The camera is upright and faces forward.
+  /// Returns the pose of the camera, which is upright and faces forward.
   [[nodiscard]] Pose2 base_from_camera() const { return {camera_x_m, camera_y_m, 0.0}; }
 };
 void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor);
 
-/// Names of frames, by REP 105.
+/// Names of the frames, defaults as in REP 105.
 struct FrameNames {
   std::string map = "map";
   std::string odom = "odom";
@@ -50,14 +50,15 @@ struct LocalisationNodeSetup {
   FrameNames frames;
   LocalisationNodeOptions node;
   TrackerOptions tracker;
-  RobotNavigatorOptions navigator;  ///< of ways to a goal; its base of routes, too
-  /// The memory is a new one that the first drive makes, until the command "finish".
+  RobotNavigatorOptions navigator;  ///< for goals; its base options also for routes
+  /// Set if the first drive makes a new memory, until the command "finish".
   std::optional<TeacherOptions> teacher;
 };
 
-using NowNs = std::function<std::int64_t()>;  ///< time of the world that the robot is in
+using NowNs = std::function<std::int64_t()>;  ///< current time, simulated or of the system
 
-/// Throws ContractError unless a message on `topic` is in the frame that the parameters name.
+/// Throws ContractError unless `frame`, that of a message on `topic`, is `expected`, the name in
+/// the parameters.
 void require_frame(const std::string& topic, const std::string& frame, const std::string& expected);
 
 }  // namespace panonav::ros2

@@ -30,8 +30,8 @@ std::string environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-int domain_number(const ParticipantOptions& options) {
-  constexpr int max_domain = 232;  // whose UDP ports are below 65536
+int resolve_domain_number(const ParticipantOptions& options) {
+  constexpr int max_domain = 232;  // the highest with UDP ports below 65536
   if (options.domain) return *options.domain;
   const std::string text = environment("ROS_DOMAIN_ID");
   if (text.empty()) return 0;
@@ -52,7 +52,8 @@ int gid_bytes(const ParticipantOptions& options) {
   return std::ranges::find(old, distribution) == old.end() ? since_iron : before_iron;
 }
 
-/// "sensor_msgs/Image" is sensor_msgs::msg::dds_::Image_, "std_srvs/srv/Trigger_Request" is in srv.
+/// Returns the DDS name of a type: "sensor_msgs/Image" becomes sensor_msgs::msg::dds_::Image_,
+/// "std_srvs/srv/Trigger_Request" std_srvs::srv::dds_::Trigger_Request_.
 std::string dds_type_name(std::string_view type) {
   const std::size_t first = type.find('/');
   const std::size_t last = type.rfind('/');
@@ -61,7 +62,8 @@ std::string dds_type_name(std::string_view type) {
          "::dds_::" + std::string(type.substr(last + 1)) + "_";
 }
 
-/// Requests and replies of services have prefixes and endings of their own.
+/// Returns the DDS name of a topic; requests and replies of services have their own prefixes and
+/// suffixes.
 std::string dds_topic_name(const std::string& full, std::string_view type) {
   if (type.ends_with("_Request")) return "rq" + full + "Request";
   if (type.ends_with("_Response")) return "rr" + full + "Reply";
@@ -74,8 +76,8 @@ struct QosDeleter {
 using DdsQos = std::unique_ptr<dds_qos_t, QosDeleter>;
 
 DdsQos make_dds_qos(const Qos& options) {
-  // Differs from the default of 100 ms: defaults are not announced, and some peers
-  // (@foxglove/ros2) match only writers that announce how reliable they are.
+  // Use 99 ms instead of the default of 100 ms: default values are not announced, and some peers
+  // (@foxglove/ros2) match only writers that announce their reliability.
   constexpr dds_duration_t max_blocking = DDS_MSECS(99);
   DdsQos qos(dds_create_qos());
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, options.depth);
@@ -109,20 +111,21 @@ class CdrWriter {
   std::vector<std::uint8_t> bytes{0, 1, 0, 0};
 };
 
-/// Configures a domain, for all participants of this process in it.
+/// Configures a DDS domain for all participants of this process in it.
 class Domain {
  public:
   Domain(int number, const std::optional<bool>& localhost_only) {
     const bool local = localhost_only.value_or(environment("ROS_LOCALHOST_ONLY") == "1");
-    const std::string alone =
+    const std::string localhost_configuration =
         "<General><Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces></General>"
         "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
         "<Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>";
-    std::string configuration = "<CycloneDDS><Domain>" + (local ? alone : std::string()) +
+    std::string configuration = "<CycloneDDS><Domain>" +
+                                (local ? localhost_configuration : std::string()) +
                                 "<Discovery><MaxAutoParticipantIndex>64</MaxAutoParticipantIndex>"
                                 "</Discovery></Domain></CycloneDDS>";
-    const std::string of_user = environment("CYCLONEDDS_URI");
-    if (!of_user.empty()) configuration += "," + of_user;
+    const std::string user_configuration = environment("CYCLONEDDS_URI");
+    if (!user_configuration.empty()) configuration += "," + user_configuration;
     entity_ = dds_create_domain(static_cast<dds_domainid_t>(number), configuration.c_str());
     if (entity_ < 0) {
       throw Error("DDS: domain " + std::to_string(number) +
@@ -187,7 +190,7 @@ std::string full_name(std::string_view name, const ParticipantOptions& options) 
 
 struct Participant::Implementation {
   struct Subscription {
-    std::string topic;  // as the caller named it
+    std::string topic;  // as passed by the caller
     dds_entity_t dds_topic = 0;
     dds_entity_t reader = 0;
     Qos qos;
@@ -196,8 +199,8 @@ struct Participant::Implementation {
 
   Implementation(const ParticipantOptions& options_, Note note_)
       : options(options_), note(std::move(note_)) {
-    (void)full_name("~/name", options);  // node and namespace are names
-    const int number = domain_number(options);
+    (void)full_name("~/name", options);  // throws if node or namespace are not valid names
+    const int number = resolve_domain_number(options);
     domain = get_or_create_domain(number, options.localhost_only);
     const DdsQos qos(dds_create_qos());
     const std::string enclave = "enclave=/;";
@@ -250,7 +253,7 @@ struct Participant::Implementation {
                  "subscription");
   }
 
-  /// Announces the endpoints that there are now to the graph.
+  /// Announces the current endpoints to the ROS 2 graph.
   void announce() const {
     CdrWriter message;
     const auto gid = [&](dds_entity_t entity) {
@@ -271,13 +274,13 @@ struct Participant::Implementation {
     check_result(dds_write(graph, &bytes), "ros_discovery_info");
   }
 
-  void take(const Subscription& subscription) {
-    constexpr std::size_t at_once = 16;
-    std::array<ddsi_serdata*, at_once> samples{};
-    std::array<dds_sample_info_t, at_once> infos{};
+  void receive_messages(const Subscription& subscription) {
+    constexpr std::size_t max_batch = 16;
+    std::array<ddsi_serdata*, max_batch> samples{};
+    std::array<dds_sample_info_t, max_batch> infos{};
     for (int left = std::max(subscription.qos.depth, 1); left > 0;) {
       const int count = dds_takecdr(subscription.reader, samples.data(),
-                                    static_cast<std::uint32_t>(std::min<int>(left, at_once)),
+                                    static_cast<std::uint32_t>(std::min<int>(left, max_batch)),
                                     infos.data(), DDS_ANY_STATE);
       if (count <= 0) return;
       for (int i = 0; i < count; ++i) {
@@ -289,7 +292,7 @@ struct Participant::Implementation {
     }
   }
 
-  void serve(std::size_t index) {
+  void handle_reader(std::size_t index) {
     Subscription& subscription = subscriptions[index];
     dds_requested_incompatible_qos_status_t refused{};
     dds_get_requested_incompatible_qos_status(subscription.reader, &refused);
@@ -306,7 +309,7 @@ struct Participant::Implementation {
            " does not offer what is requested (QoS policy " +
            std::to_string(refused.last_policy_id) + "), and is not received");
     }
-    take(subscription);
+    receive_messages(subscription);
   }
 
   ParticipantOptions options;
@@ -370,7 +373,7 @@ void Participant::wait(std::chrono::nanoseconds longest) {
   for (int i = 0; i < std::min(count, static_cast<int>(ready.size())); ++i) {
     const dds_attach_t index = ready[static_cast<std::size_t>(i)];
     if (index >= 0) {
-      self.serve(static_cast<std::size_t>(index));
+      self.handle_reader(static_cast<std::size_t>(index));
     } else {
       bool was = false;
       dds_take_guardcondition(self.guard, &was);

@@ -19,7 +19,7 @@
 
 namespace panonav::ros2 {
 
-/// Quality of service of a topic, in the terms of ROS 2. Histories are keep-last.
+/// Quality of service of a topic, in the terms of ROS 2; the history is keep-last of `depth`.
 struct Qos {
   int depth = 5;
   bool reliable = true;
@@ -30,40 +30,44 @@ struct Qos {
 struct ParticipantOptions {
   std::string node = "panonav";
   std::string name_space = "/";
-  std::map<std::string, std::string> remappings;  ///< of names of topics and services
+  std::map<std::string, std::string> remappings;  ///< of topic and service names
   std::optional<int> domain;                      ///< `nullopt`: ROS_DOMAIN_ID, or 0
-  std::optional<bool> localhost_only;             ///< `nullopt`: as ROS_LOCALHOST_ONLY says
-  /// Length of ids in messages about the graph: 24 up to Humble, 16 later. `nullopt`: as ROS_DISTRO
-  /// says, 16 without it.
+  std::optional<bool> localhost_only;             ///< `nullopt`: by ROS_LOCALHOST_ONLY
+  /// Length of ids in messages about the graph: 24 up to Humble, 16 later. `nullopt`: by
+  /// ROS_DISTRO, 16 if it is not set.
   std::optional<int> gid_bytes;
 };
 
-/// Returns the full name of a topic or service: relative names are in the namespace, those after ~
-/// in that of the node; then remappings apply. Throws ContractError on what is no name in ROS 2.
+/// Returns the full name of a topic or service: relative names are in the namespace, names that
+/// begin with ~ in that of the node; then remappings apply. Throws ContractError on an invalid
+/// name.
 [[nodiscard]] std::string full_name(std::string_view name, const ParticipantOptions& options);
 
-/// A node on a ROS 2 graph: topics by name and message type over DDS, seen by `ros2 node list`.
-/// Messages are bytes of CDR here; a callback must accept any bytes, and throws nothing. Any thread
-/// may write; everything else happens on one thread.
+/// A node on a ROS 2 graph, listed by `ros2 node list`, with topics by name and message type over
+/// DDS. Messages are CDR bytes; callbacks must accept any bytes and not throw. Any thread may
+/// write; everything else happens on one thread.
 class Participant {
  public:
   using Receive = std::function<void(std::span<const std::uint8_t> cdr)>;
 
-  /// `note` reports peers that offer less than was requested. Throws Error when DDS cannot begin.
+  /// `note` reports publishers whose quality of service is not compatible. Throws Error if DDS
+  /// cannot start.
   Participant(const ParticipantOptions& options, Note note);
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  /// Calls `receive` from `wait`. `type` as "sensor_msgs/Image". A reliable subscription becomes a
-  /// best-effort one as soon as a publisher offers no more: then it receives from both kinds.
+  /// Calls `receive` for each message, from `wait`. `type` as "sensor_msgs/Image". If a publisher
+  /// offers only best effort, a reliable subscription becomes best effort, which receives from both
+  /// kinds.
   void subscribe(const std::string& topic, std::string_view type, const Qos& qos, Receive receive);
-  /// Returns the number of publishers of a subscribed topic that match now.
+  /// Returns the number of publishers that currently match a subscribed topic.
   [[nodiscard]] std::size_t publishers(const std::string& topic) const;
 
   class Writer {
    public:
-    /// Throws Error when DDS does not accept it, as when a reliable subscriber is far behind.
+    /// Throws Error if DDS does not accept the message, for example because a reliable subscriber
+    /// is far behind.
     void write(std::span<const std::uint8_t> cdr) const;
     [[nodiscard]] std::size_t subscribers() const;
 
@@ -74,12 +78,12 @@ class Participant {
   };
   [[nodiscard]] Writer advertise(const std::string& topic, std::string_view type, const Qos& qos);
 
-  /// Waits for messages and passes the received ones, at most `Qos::depth` of a topic, to the
-  /// callbacks. Returns at the latest after `longest`, or once `stop` was called.
+  /// Waits for messages and passes the received ones, at most `Qos::depth` per topic, to the
+  /// callbacks. Returns after `longest` at the latest, or when `stop` is called.
   void wait(std::chrono::nanoseconds longest);
-  /// Waits for messages until `stop` is called, and calls `tick` once in each period.
+  /// Waits for messages until `stop` is called, and calls `tick` once per period.
   void run(std::chrono::duration<double> period_s, const std::function<void()>& tick);
-  /// Stops for good. May be called from any thread.
+  /// Ends `run` permanently. May be called from any thread.
   void stop() noexcept;
 
  private:
@@ -102,8 +106,9 @@ class Publisher {
   Participant::Writer writer_;
 };
 
-/// Subscribes to messages of one type: `use` takes each, and its bytes if it wants them. Bytes that
-/// are no such message, and errors that `use` throws, become warnings with the topic in front.
+/// Subscribes to messages of one type. `use` is called with each message, and with its bytes if it
+/// has a second parameter. Bytes that cannot be decoded, and errors that `use` throws, become
+/// warnings that name the topic.
 template <class Message, class Use>
 void subscribe(Participant& participant, WarningLog& log, const std::string& topic, const Qos& qos,
                Use use) {

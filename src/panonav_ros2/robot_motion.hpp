@@ -12,8 +12,7 @@
 
 namespace panonav::ros2 {
 
-/// Combines the odometry of the robot with the last pose that was found in the map. For several
-/// threads.
+/// Combines the robot's odometry with the last pose found in the map. Thread-safe.
 class RobotMotion {
  public:
   using Motion = MotionHistory::Motion;
@@ -27,7 +26,7 @@ class RobotMotion {
     const std::lock_guard lock(mutex_);
     return history_.newest_ns();
   }
-  /// Waits up to 0.3 s for the odometry of that time, which may still arrive. `nullopt` if it does
+  /// Waits up to 0.3 s for the odometry at this time, which may still arrive; `nullopt` if it does
   /// not.
   [[nodiscard]] std::optional<Motion> wait_for(std::int64_t stamp_ns) {
     std::unique_lock lock(mutex_);
@@ -38,7 +37,7 @@ class RobotMotion {
     });
     return found;
   }
-  /// Ends the waiting.
+  /// Ends the current and all later waits.
   void stop() {
     const std::lock_guard lock(mutex_);
     is_stopped_ = true;
@@ -54,20 +53,22 @@ class RobotMotion {
     return tilt_;
   }
 
-  /// Sets the frame of the odometry without jumps (`Motion::path_from_base`) in the map; `nullopt`:
-  /// unknown. Returns what it was.
+  /// Sets the pose, in the map, of the frame of odometry without jumps (`Motion::path_from_base`);
+  /// `nullopt` if unknown. Returns the previous one.
   std::optional<Pose2> set_map_from_path(const std::optional<Pose2>& map_from_path) {
     const std::lock_guard lock(mutex_);
     return std::exchange(map_from_path_, map_from_path);
   }
-  /// Sets the same by the pose of the robot now; without odometry nothing changes.
+  /// Sets this frame such that the robot is now at `map_from_base`; does nothing before the first
+  /// odometry.
   void set_pose(const Pose2& map_from_base) {
     const std::lock_guard lock(mutex_);
     if (const auto now = history_.newest()) {
       map_from_path_ = map_from_base * inverse(now->path_from_base);
     }
   }
-  /// `nullopt` before the first odometry, and as long as the robot was not found in the map.
+  /// Returns the current pose in the map; `nullopt` before the first odometry, and until the robot
+  /// is found in the map.
   [[nodiscard]] std::optional<Pose2> map_from_base() const {
     const std::lock_guard lock(mutex_);
     const auto now = history_.newest();

@@ -32,7 +32,7 @@ std::pair<std::string, std::string> parse_sides(const std::string& text, const s
   return {text.substr(0, at), text.substr(at + 2)};
 }
 
-void set(Parameters& parameters, RosArguments::Parameter parameter) {
+void set_or_replace(Parameters& parameters, RosArguments::Parameter parameter) {
   const auto found = std::ranges::find(parameters, parameter.name, &RosArguments::Parameter::name);
   if (found == parameters.end()) {
     parameters.push_back(std::move(parameter));
@@ -41,7 +41,8 @@ void set(Parameters& parameters, RosArguments::Parameter parameter) {
   }
 }
 
-/// YAML has more forms of true and false than the options have.
+/// Returns a scalar as text; YAML's additional forms of true and false, which options do not have,
+/// become "true" and "false".
 std::string to_text_value(const YAML::Node& node, const std::string& name,
                           const std::string& where) {
   if (!node.IsScalar()) throw FileError(where, name + " has a value that is not a text or number");
@@ -50,16 +51,17 @@ std::string to_text_value(const YAML::Node& node, const std::string& name,
   return text == "False" || text == "FALSE" ? "false" : text;
 }
 
-/// Throws YAML's exceptions on invalid parameters. `nodes_left` bounds the expansion of aliases.
-void flatten(const YAML::Node& node, const std::string& name, const std::string& where, int depth,
-             int& nodes_left, Parameters& parameters) {
+/// Sets parameters from a YAML value; nested maps give names with dots. `nodes_left` limits the
+/// expansion of aliases. Throws YAML's exceptions.
+void flatten_parameters(const YAML::Node& node, const std::string& name, const std::string& where,
+                        int depth, int& nodes_left, Parameters& parameters) {
   if (depth > max_depth) throw FileError(where, name + " is nested too deeply");
   if (--nodes_left < 0) throw FileError(where, "has more than 10,000 parameters");
   if (node.IsMap()) {
     for (const auto& entry : node) {
       const auto inner = entry.first.as<std::string>();
-      flatten(entry.second, name.empty() ? inner : name + "." + inner, where, depth + 1, nodes_left,
-              parameters);
+      flatten_parameters(entry.second, name.empty() ? inner : name + "." + inner, where, depth + 1,
+                         nodes_left, parameters);
     }
     return;
   }
@@ -69,11 +71,11 @@ void flatten(const YAML::Node& node, const std::string& name, const std::string&
   } else {
     parameter.values.push_back(to_text_value(node, name, where));
   }
-  set(parameters, std::move(parameter));
+  set_or_replace(parameters, std::move(parameter));
 }
 
-/// A file may hold parameters of many nodes. Keys are names of nodes, with or without a namespace,
-/// "/**" all nodes, "/**/name" those of a name.
+/// Reads the parameters of one node from a file, which may contain those of many nodes. Keys are
+/// node names, with or without namespace; "/**" means all nodes, "/**/name" all nodes of this name.
 void read_parameter_file(const std::string& path, const std::string& node,
                          const std::string& name_space, Parameters& parameters) {
   const auto bytes = read_file(path, max_file_bytes);
@@ -88,15 +90,15 @@ void read_parameter_file(const std::string& path, const std::string& node,
                         "{ros__parameters: {NAME: VALUE}}");
       }
       int nodes_left = max_nodes;
-      flatten(of_node["ros__parameters"], "", path, 0, nodes_left, parameters);
+      flatten_parameters(of_node["ros__parameters"], "", path, 0, nodes_left, parameters);
     };
     const std::array<std::string, 4> from_wide_to_narrow{"/**", "/**/" + node, node,
                                                          inside + "/" + node};
     for (const std::string& key : from_wide_to_narrow) {
-      if (key == node && !inside.empty()) continue;  // of the node in the root namespace
+      if (key == node && !inside.empty()) continue;  // means the node in the root namespace
       if (root[key]) take(root[key]);
     }
-    // NAMESPACE: {NODE: {ros__parameters: ...}}
+    // Also accept the form NAMESPACE: {NODE: {ros__parameters: ...}}.
     if (!inside.empty() && root[inside] && root[inside].IsMap() && root[inside][node]) {
       take(root[inside][node]);
     }
@@ -105,7 +107,7 @@ void read_parameter_file(const std::string& path, const std::string& node,
   }
 }
 
-/// An option of ROS with its value, as typed after --ros-args.
+/// A ROS option with its value, as typed after --ros-args.
 struct RosOption {
   std::string flag;
   std::string value;
@@ -114,7 +116,8 @@ struct RosOption {
   }
 };
 
-/// Appends the arguments outside `--ros-args ... --` to `others`, and returns the options inside.
+/// Appends the arguments outside of `--ros-args ... --` to `others`, and returns the options
+/// inside.
 std::vector<RosOption> split_options(std::span<const std::string> words,
                                      std::vector<std::string>& others) {
   std::vector<RosOption> options;
@@ -143,7 +146,7 @@ std::vector<RosOption> split_options(std::span<const std::string> words,
   return options;
 }
 
-/// Removes "NODE:" from a name. Returns false if it is for another node.
+/// Removes the prefix "NODE:" from a name. Returns false if it names another node.
 bool is_for_node(std::string& name, const std::string& node) {
   const std::size_t colon = name.find(':');
   if (colon == std::string::npos) return true;
@@ -157,7 +160,7 @@ void read_parameter(const RosOption& option, const std::string& node, Parameters
   if (!is_for_node(name, node)) return;
   try {
     int nodes_left = max_nodes;
-    flatten(YAML::Load(value), name, option.flag, 0, nodes_left, parameters);
+    flatten_parameters(YAML::Load(value), name, option.flag, 0, nodes_left, parameters);
   } catch (const YAML::Exception& error) {
     throw ContractError("value of " + name, "'" + to_readable_line(shorten_middle(value, 80)) + "'",
                         std::string("YAML: ") + to_readable_line(error.what()));
@@ -180,12 +183,12 @@ RosArguments read_ros_arguments(std::span<const std::string> words, const std::s
     if (!is_for_node(from, node)) continue;
     read.remappings.insert_or_assign(from == "__name" ? "__node" : from, to);
   }
-  const auto renamed = [&](const std::string& key, const std::string& initial) {
+  const auto find_new_name = [&](const std::string& key, const std::string& initial) {
     const auto found = read.remappings.find(key);
     return found == read.remappings.end() ? initial : found->second;
   };
-  const std::string own_node = renamed("__node", node);
-  const std::string own_space = renamed("__ns", name_space);
+  const std::string own_node = find_new_name("__node", node);
+  const std::string own_space = find_new_name("__ns", name_space);
   for (const RosOption& option : options) {
     if (option.matches({"--params-file"})) {
       read_parameter_file(option.value, own_node, own_space, read.parameters);

@@ -23,7 +23,7 @@ SensorTopics::SensorTopics(Participant& participant, const LocalisationNodeOptio
   if (options.use_sim_time) {
     subscribe<recordings::ros::Clock>(
         participant, log, "/clock", {.depth = 10, .reliable = false},
-        [this](const recordings::ros::Clock& clock) { sim_ns_ = clock.clock_ns; });
+        [this](const recordings::ros::Clock& clock) { simulated_time_ns_ = clock.clock_ns; });
   }
   if (options.motion == MotionInput::odometry) {
     subscribe<recordings::ros::Odometry>(participant, log, "odom", {.depth = sensor_depth},
@@ -48,7 +48,7 @@ SensorTopics::SensorTopics(Participant& participant, const LocalisationNodeOptio
 }
 
 std::int64_t SensorTopics::now_ns() const {
-  if (options_.use_sim_time) return sim_ns_;
+  if (options_.use_sim_time) return simulated_time_ns_;
   return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
@@ -96,13 +96,14 @@ void SensorTopics::receive(const recordings::ros::Odometry& odometry) {
 void SensorTopics::receive(const recordings::ros::TFMessage& message) {
   std::optional<std::int64_t> stamp_ns;
   for (const recordings::ros::TransformStamped& each : message.transforms) {
-    if (each.child_frame_id == frames_.odom) continue;  // what the node sends itself
+    if (each.child_frame_id == frames_.odom) continue;  // published by this node itself
     tree_.set(each);
     if (each.header.stamp_ns > 0) stamp_ns = std::max(stamp_ns.value_or(0), each.header.stamp_ns);
   }
   const auto odom_from_base = tree_.lookup(frames_.odom, frames_.base);
   if (!odom_from_base || !stamp_ns) return;
-  // Transforms that others send meanwhile, of wheels, say, bring no news of the base.
+  // Skip messages without a newer stamp: other transforms, for example of wheels, contain no new
+  // motion of the base.
   if (std::exchange(has_transform_, true) && *stamp_ns <= motion_.newest_ns()) return;
   add_motion("/tf", *stamp_ns, *odom_from_base);
 }
@@ -121,7 +122,7 @@ void SensorTopics::receive(const recordings::ros::Imu& imu) {
 
 void SensorTopics::receive_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr) {
   if (last_picture_ns_ && stamp_ns <= *last_picture_ns_ &&
-      stamp_ns > *last_picture_ns_ - MotionHistory::late_ns) {
+      stamp_ns > *last_picture_ns_ - MotionHistory::max_late_ns) {
     log_.warn("order of images",
               picture_topic() + ": a stamp is not after the one before it; the image is left out");
     return;

@@ -14,21 +14,21 @@
 
 namespace panonav::ros2 {
 
-/// Subscribes to the robot's sensors (odometry or TF, tilt, images, the time of a simulation),
-/// checks the messages and passes them on. Runs on the thread that serves the participant.
+/// Subscribes to the robot's sensors (odometry or TF, tilt, images, simulated time), checks the
+/// messages and passes them on. Runs on the participant's thread.
 class SensorTopics {
  public:
   SensorTopics(Participant& participant, const LocalisationNodeOptions& options,
                const FrameNames& frames, WarningLog& log, RobotMotion& motion, WorkQueue& queue);
 
-  /// Returns the time of the robot's world, from any thread.
+  /// Returns the current time, simulated or of the system. May be called from any thread.
   [[nodiscard]] std::int64_t now_ns() const;
   [[nodiscard]] std::string picture_topic() const;
-  [[nodiscard]] std::string motion_source() const;  ///< "topic odom", for messages to people
-  /// Warns of inputs that several programs publish.
+  [[nodiscard]] std::string motion_source() const;  ///< "topic odom", for messages to users
+  /// Warns if several programs publish the same input.
   void check_publishers() const;
-  /// Decodes the message of a picture, which is named by its topic; with its stamp in ns. Throws as
-  /// `ros::to_image`.
+  /// Decodes an image message; the observation is named by its topic. Returns it with its time
+  /// stamp in ns. Throws as `ros::to_image`.
   [[nodiscard]] std::pair<Observation, std::int64_t> decode(
       std::span<const std::uint8_t> message) const;
 
@@ -49,7 +49,7 @@ class SensorTopics {
   FrameTree tree_;
   bool has_transform_ = false;
   std::optional<std::int64_t> last_picture_ns_;
-  std::atomic<std::int64_t> sim_ns_ = 0;
+  std::atomic<std::int64_t> simulated_time_ns_ = 0;
 };
 
 }  // namespace panonav::ros2

@@ -28,7 +28,7 @@ void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor) {
 
 namespace {
 
-/// The message refers to the pixels of the picture.
+/// Makes a message that refers to the pixels of `picture`, which must outlive it.
 recordings::ros::Image make_message(const Image& picture, std::int64_t stamp_ns) {
   const auto width = static_cast<std::uint32_t>(picture.width());
   const bool is_grey = picture.channels() == 1;
@@ -122,7 +122,7 @@ struct SimulatedRobot::Implementation {
     camera_work.add([this, stamp_ns, pose = base.pose()] { take_picture(stamp_ns, pose); });
   }
 
-  /// Renders on a thread of its own, so that the simulation does not wait for an image.
+  /// Renders an image; runs on a separate thread, so that the simulation does not wait.
   void take_picture(std::int64_t stamp_ns, const Pose2& pose) {
     try {
       const Image picture = surroundings.picture(pose, Random(seed, ++picture_number).next());

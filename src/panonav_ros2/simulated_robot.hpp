@@ -20,8 +20,8 @@ struct SimulatedRobotOptions {
 };
 void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor);
 
-/// Start pose, obstacles and pictures of a robot. `picture` is called on a thread of its own, one
-/// picture at a time.
+/// Start pose, obstacles and images of a simulated robot. `picture` is called on a separate thread,
+/// one image at a time.
 struct SimulatedSurroundings {
   Pose2 start;
   std::function<bool(Point2 place)> is_free;
@@ -30,8 +30,8 @@ struct SimulatedSurroundings {
 
 /// A simulated robot with the ROS 2 interface of a real one, in simulated time. It publishes
 /// /clock, odom, odom -> base_link on /tf, images on image and, for evaluation, ground_truth; it
-/// subscribes to cmd_vel and set_pose (PoseStamped), which moves the robot without changing its
-/// odometry. Obstacles stop it.
+/// subscribes to cmd_vel and to set_pose (PoseStamped), which moves the robot without its odometry
+/// noticing. Obstacles stop it.
 class SimulatedRobot {
  public:
   /// Throws OptionError, and as `Participant`.
@@ -44,7 +44,7 @@ class SimulatedRobot {
 
   /// Runs until `stop` is called.
   void run();
-  /// May be called from any thread.
+  /// Makes `run` return. May be called from any thread.
   void stop();
 
  private:

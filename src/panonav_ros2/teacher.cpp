@@ -28,16 +28,16 @@ Teacher::Teacher(std::filesystem::path memory, const TeacherOptions& options)
 
 void Teacher::make_mapper() {
   Executor alone;
-  mapper_.emplace(
-      MemoryFile::create(path_, make_memory_header(waiting_, options_.pictures, options_.signature,
-                                                   options_.preprocessing, alone)),
-      options_.pictures);
-  for (const Observation& first : std::exchange(waiting_, {})) mapper_->add(first);
+  mapper_.emplace(MemoryFile::create(
+                      path_, make_memory_header(scale_observations_, options_.pictures,
+                                                options_.signature, options_.preprocessing, alone)),
+                  options_.pictures);
+  for (const Observation& first : std::exchange(scale_observations_, {})) mapper_->add(first);
 }
 
 void Teacher::add(Observation observation) {
-  // Half of the usual spacing of grids of views: views measure steps of this length themselves, and
-  // a robot that returns finds a view near.
+  // Half of the usual spacing of reference grids: views must be near enough for visual odometry
+  // between them, and a returning robot finds a view nearby.
   constexpr double step_m = 0.25;
   constexpr double turn_rad = 0.3;
   const Pose2 pose = observation.odometry.value();
@@ -52,13 +52,14 @@ void Teacher::add(Observation observation) {
   if (mapper_) {
     mapper_->add(observation);
   } else {
-    waiting_.push_back(std::move(observation));
-    if (waiting_.size() == Memoriser::scale_views) make_mapper();
+    scale_observations_.push_back(std::move(observation));
+    if (scale_observations_.size() == Memoriser::scale_views) make_mapper();
   }
   nodes_.push_back(pose);
 }
 
-/// Moves each line as the nodes before and after it moved, weighted by its position between them.
+/// Corrects each line's pose by the corrections of the nodes before and after it, weighted by its
+/// position between them, and stores the route.
 void Teacher::store_lines(const TopologicalMap& map) {
   RouteRecorder recorder(
       MemoryFile::open(path_, Access::read_write), options_.pictures,
@@ -67,13 +68,13 @@ void Teacher::store_lines(const TopologicalMap& map) {
     const std::size_t before = line.node;
     const std::size_t after = std::min(before + 1, nodes_.size() - 1);
     Pose2& pose = line.encoded.pose;
-    const auto moved_with = [&](std::size_t node) {
+    const auto corrected_by_node = [&](std::size_t node) {
       return map.nodes[node].pose * inverse(nodes_[node]) * pose;
     };
     const double from_m = distance(nodes_[before].position(), pose.position());
     const double to_m = distance(nodes_[after].position(), pose.position());
     const double share = from_m > 0.0 ? from_m / (from_m + to_m) : 0.0;
-    pose = interpolate(moved_with(before), moved_with(after), share);
+    pose = interpolate(corrected_by_node(before), corrected_by_node(after), share);
     recorder.add(std::move(line.encoded));
   }
   (void)recorder.finish();
@@ -83,7 +84,7 @@ Pose2 Teacher::finish() {
   if (nodes_.empty()) throw ContractError("views that were taught", 0.0, "1 or more");
   if (!mapper_) make_mapper();
   const TopologicalMap map = mapper_->finish().map;
-  mapper_.reset();  // the file is another one's now
+  mapper_.reset();  // closes the file
   if (options_.route) store_lines(map);
   return map.nodes.back().pose * inverse(nodes_.back());
 }

@@ -10,32 +10,33 @@
 
 namespace panonav::ros2 {
 
-using Note = std::function<void(const std::string& line)>;  ///< is called from any thread
+using Note = std::function<void(const std::string& line)>;  ///< called from any thread
 
-/// Reports warnings: of each kind at most one in ten seconds, with the number of those between.
-/// For several threads.
+/// Reports warnings, at most one per kind in ten seconds, with the number of suppressed ones.
+/// Thread-safe.
 class WarningLog {
  public:
   explicit WarningLog(Note note) : note_(std::move(note)) {}
 
-  /// `kind`: one of few.
+  /// `kind` identifies similar warnings; there must be few kinds.
   void warn(const std::string& kind, const std::string& line) {
     constexpr std::chrono::seconds min_interval(10);
     const std::lock_guard lock(mutex_);
     ++count_;
     const auto now = std::chrono::steady_clock::now();
     const auto [found, is_new] = kinds_.try_emplace(kind);
-    auto& [reported, held_back] = found->second;
+    auto& [reported, suppressed_count] = found->second;
     if (!is_new && now - reported < min_interval) {
-      ++held_back;
+      ++suppressed_count;
       return;
     }
     note_("warning: " + line +
-          (held_back > 0 ? " (and " + std::to_string(held_back) + " times before)" : ""));
+          (suppressed_count > 0 ? " (and " + std::to_string(suppressed_count) + " times before)"
+                                : ""));
     found->second = {now, 0};
   }
 
-  /// Returns the number of all warnings, reported or not.
+  /// Returns the number of all warnings, including suppressed ones.
   [[nodiscard]] std::size_t count() const {
     const std::lock_guard lock(mutex_);
     return count_;
@@ -44,7 +45,7 @@ class WarningLog {
  private:
   struct Kind {
     std::chrono::steady_clock::time_point reported;
-    std::size_t held_back = 0;  // since then
+    std::size_t suppressed_count = 0;  // suppressed warnings since then
   };
   Note note_;
   mutable std::mutex mutex_;

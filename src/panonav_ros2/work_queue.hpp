@@ -16,18 +16,18 @@
 
 namespace panonav::ros2 {
 
-/// Hands work to the thread that localises: requests in their order, and the newest picture.
+/// Passes work to the localising thread: requests in order, and the newest image.
 class WorkQueue {
  public:
-  /// A request, or the message of a picture where that is empty.
+  /// A request, or an image message if `request` is empty.
   struct Work {
     std::function<void()> request;
     std::vector<std::uint8_t> picture;
   };
 
-  /// Appends a request. Throws Error when 16 of them wait.
+  /// Appends a request. Throws Error if 16 requests are waiting.
   void add(std::function<void()> request) {
-    constexpr std::size_t max_requests = 16;  // more than people send while one is worked on
+    constexpr std::size_t max_requests = 16;  // more than users send while one is processed
     const std::lock_guard lock(mutex_);
     if (requests_.size() >= max_requests) {
       throw Error("too many requests at a time; this one is left out");
@@ -36,7 +36,7 @@ class WorkQueue {
     changed_.notify_all();
   }
 
-  /// Takes a picture in place of the one that waits, which is dropped.
+  /// Stores an image message; it replaces one that is still waiting, which is dropped.
   void set_picture(std::span<const std::uint8_t> message) {
     const std::lock_guard lock(mutex_);
     last_picture_came_ = std::chrono::steady_clock::now();
@@ -45,7 +45,7 @@ class WorkQueue {
     changed_.notify_all();
   }
 
-  /// Waits for work, requests first. `nullopt` once `stop` was called.
+  /// Waits for work and returns it, requests first; `nullopt` after `stop` was called.
   [[nodiscard]] std::optional<Work> next() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return is_stopped_ || picture_ || !requests_.empty(); });
@@ -62,12 +62,12 @@ class WorkQueue {
     changed_.notify_all();
   }
 
-  [[nodiscard]] std::size_t dropped() const {  ///< Number of pictures.
+  [[nodiscard]] std::size_t dropped() const {  ///< Number of dropped images.
     const std::lock_guard lock(mutex_);
     return dropped_;
   }
 
-  /// Returns the time since the last picture arrived; before the first, since the queue was made.
+  /// Returns the time since the last image arrived; before the first image, since construction.
   [[nodiscard]] std::chrono::nanoseconds time_without_picture() const {
     const std::lock_guard lock(mutex_);
     return std::chrono::steady_clock::now() - last_picture_came_;

@@ -31,10 +31,10 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr std::size_t max_connections = 256;
-/// Memory of one connection, for the head and pieces of its answer: libmicrohttpd allocates no
-/// more.
+/// Memory of libmicrohttpd for one connection: the head, and pieces of its answer.
 constexpr std::size_t connection_bytes = 4 * max_head_bytes;
-/// Send buffer of the system for a slow reader: longer queues arrive too late to be of use.
+/// Send buffer of the system for a slow reader; with a larger one, streamed parts would arrive too
+/// late to be useful.
 constexpr int send_buffer_bytes = 256 * 1024;
 constexpr unsigned request_timeout_s = 5;
 constexpr unsigned idle_timeout_s = 30;  ///< between two requests of a trusted client
@@ -42,7 +42,7 @@ constexpr double min_body_bytes_per_s = 100e3;
 constexpr milliseconds tick_interval(400);
 
 enum class Stage {
-  idle,  ///< nothing has come of the next request
+  idle,  ///< no byte of the next request yet
   reading,
   answering,
 };
@@ -51,8 +51,8 @@ struct Connection {
   MHD_Connection* handle = nullptr;
   int socket = -1;
   Stage stage = Stage::idle;
-  Clock::time_point heard = Clock::now();  ///< last time that something came or was answered
-  Clock::time_point due = heard + std::chrono::seconds(request_timeout_s);  ///< then it is late
+  Clock::time_point heard = Clock::now();  ///< of the last received bytes or stage change
+  Clock::time_point due = heard + std::chrono::seconds(request_timeout_s);  ///< late after this
   bool trusted = false;  ///< sent a head that `judge_head` trusts
   bool evicted = false;
   bool suspended = false;  ///< waits for `more` or `later`
@@ -71,7 +71,8 @@ struct Connection {
     const bool is_pause = stage == Stage::idle && trusted;
     due = heard + std::chrono::seconds(is_pause ? idle_timeout_s : request_timeout_s);
   }
-  /// Gives a body the time for `bytes` more; time is not saved up by who was quick.
+  /// Extends the deadline of a body by the time for `bytes` more, but never to more than the
+  /// time-out from now.
   void extend_deadline(std::size_t bytes) {
     heard = Clock::now();
     due = std::min(due + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
@@ -79,16 +80,16 @@ struct Connection {
                    heard + std::chrono::seconds(request_timeout_s));
   }
   [[nodiscard]] bool is_late() const {
-    // libmicrohttpd sees who takes nothing of an answer.
+    // During answers, libmicrohttpd itself detects clients that accept nothing.
     return stage != Stage::answering && Clock::now() > due;
   }
-  /// Order in which connections make room for others; nullopt: this one stays.
+  /// Rank in which connections are evicted to make room, lowest first; nullopt: not evicted.
   [[nodiscard]] std::optional<int> eviction_rank() const {
     if (evicted || (trusted && stage == Stage::answering)) return std::nullopt;
     if (!trusted) return 0;
     return stage == Stage::idle ? 1 : 2;
   }
-  /// libmicrohttpd closes the connection when it reads its end.
+  /// Shuts the socket; libmicrohttpd closes the connection when it reads the end.
   void evict() {
     evicted = true;
     resume();
@@ -127,7 +128,7 @@ ssize_t read_more(void* connection, std::uint64_t /*position*/, char* buffer, st
   return static_cast<ssize_t>(count);
 }
 
-/// Queues `answer` with `headers` (each ended by "\r\n") and takes its `more`.
+/// Queues an answer with `headers` (each ended by "\r\n"), and moves its `more` to the connection.
 MHD_Result put(Connection& one, HttpAnswer answer, std::string_view headers) {
   one.enter(Stage::answering);
   const auto status = static_cast<unsigned>(answer.status);
@@ -176,8 +177,9 @@ bool is_same_secret(std::string_view sent, std::string_view secret) {
   return differing == 0;
 }
 
-/// libmicrohttpd parses requests and sends answers on a thread of ours. It knows time-outs between
-/// two bytes alone, and makes no room: late requests and the oldest strangers are evicted here.
+/// Runs libmicrohttpd, which parses requests and sends answers, on a thread of ours. Its time-outs
+/// only limit the gap between two bytes, and it makes no room for new connections, so late requests
+/// and the oldest strangers are evicted here.
 struct HttpServer::Implementation {
   Implementation(const HttpServerOptions& server_options, Handler request_handler)
       : options(server_options), handler(std::move(request_handler)) {
@@ -188,7 +190,7 @@ struct HttpServer::Implementation {
                   "; allowed: an IPv4 address of this machine, and a port that is free (0 finds " +
                   "one)");
     }
-    // Signals are for the threads that expect them.
+    // The thread blocks all signals, so that they reach the threads that expect them.
     sigset_t all;
     sigset_t before;
     sigfillset(&all);
@@ -215,7 +217,7 @@ struct HttpServer::Implementation {
         MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_SUPPRESS_DATE_NO_CLOCK, 0, nullptr,
         nullptr, &take, this, MHD_OPTION_SOCK_ADDR, reinterpret_cast<sockaddr*>(&place),
         MHD_OPTION_STRICT_FOR_CLIENT, is_lenient_version() ? 0 : 1,
-        // Evicted connections exist a moment longer.
+        // Evicted connections still exist for a moment.
         MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(2 * max_connections),
         MHD_OPTION_CONNECTION_TIMEOUT, request_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
         connection_bytes, MHD_OPTION_NOTIFY_CONNECTION, &connect_or_close, this,
@@ -231,7 +233,7 @@ struct HttpServer::Implementation {
 
   void serve() {
     const int events = MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
-    std::optional<Clock::time_point> last;  // when the last answers are to be sent
+    std::optional<Clock::time_point> last;  // when to stop sending answers
     Clock::time_point ticked{};
     while (!last || (Clock::now() < *last && is_sending_answers())) {
       std::array<pollfd, 2> waiting{pollfd{wake, POLLIN, 0}, pollfd{events, POLLIN, 0}};
@@ -255,7 +257,8 @@ struct HttpServer::Implementation {
     MHD_run(daemon);
   }
 
-  /// Gets the answer that a connection waits for; evicts it if it is late or its client has left.
+  /// Calls `later` of a connection that waits for it; evicts the connection if it is late or its
+  /// client has left.
   static void tick(Connection& one) {
     if (one.evicted) return;
     if (!one.suspended) {
@@ -268,8 +271,8 @@ struct HttpServer::Implementation {
     one.resume();
   }
 
-  /// Starts the time of a request with its first byte. libmicrohttpd skips bytes that begin none;
-  /// here they are refused, such as a TLS handshake.
+  /// Starts the time-out of a request at its first byte. libmicrohttpd skips bytes that cannot
+  /// begin a request, such as a TLS handshake; here they are refused.
   static void check_first_byte(Connection& one) {
     char first = 0;
     if (one.stage != Stage::idle || one.evicted ||
@@ -329,8 +332,8 @@ struct HttpServer::Implementation {
     MHD_set_connection_option(handle, MHD_CONNECTION_OPTION_TIMEOUT, idle_timeout_s);
   }
 
-  /// Is called with the head, with each piece of the body, at its end, and again when a connection
-  /// that was suspended continues.
+  /// Called by libmicrohttpd with the head, with each piece of the body, at its end, and again when
+  /// a suspended connection is resumed.
   static MHD_Result take(void* self, MHD_Connection* handle, const char* path, const char* method,
                          const char* version, const char* data, std::size_t* size,
                          void** /*request*/) {
@@ -365,7 +368,7 @@ struct HttpServer::Implementation {
     HeadVerdict verdict = judge(one.request);
     one.trusted = one.trusted || verdict.is_trusted;
     if (verdict.refusal) return put(one, std::move(*verdict.refusal), options.headers);
-    one.enter(Stage::reading);  // the body has its own time
+    one.enter(Stage::reading);  // the body has its own time-out
     return MHD_YES;
   }
 
@@ -377,7 +380,8 @@ struct HttpServer::Implementation {
     }
   }
 
-  /// True if the received bytes of all bodies and `more` bytes exceed the limit.
+  /// True if a further `more` bytes of bodies would exceed the limit; for 0, if the limit is
+  /// reached.
   [[nodiscard]] bool exceeds_body_limit(std::size_t more) const {
     std::size_t bytes = more;
     for (const Connection& one : connections) bytes += one.request.body.size();
@@ -395,7 +399,7 @@ struct HttpServer::Implementation {
     one.request.body += piece;
   }
 
-  /// Sets `answer` or `later`.
+  /// Calls the handler and sets `answer` or `later`.
   void answer_request(Connection& one) {
     if (one.later) return;
     one.enter(Stage::answering);
@@ -412,7 +416,7 @@ struct HttpServer::Implementation {
   const Handler handler;
   const int wake = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   MHD_Daemon* daemon = nullptr;
-  std::list<Connection> connections;  // of the thread; the oldest first
+  std::list<Connection> connections;  // used only by the thread; oldest first
   std::atomic<bool> ended = false;
   std::thread thread;
 };

@@ -20,7 +20,7 @@ MemoryWatch::FileState MemoryWatch::read_state(const std::filesystem::path& path
   for (std::size_t i = 0; i < files.size(); ++i) {
     std::error_code missing;
     const auto size = std::filesystem::file_size(files[i], missing);
-    if (missing || size == 0) continue;  // who opens a file makes it an empty log
+    if (missing || size == 0) continue;  // opening a file can create an empty log
     const auto written = std::filesystem::last_write_time(files[i], missing);
     if (!missing) state[i] = {written, size};
   }

@@ -35,8 +35,8 @@ using nlohmann::ordered_json;
 constexpr std::size_t max_picture_bytes = std::size_t{16} << 20U;
 constexpr std::size_t max_in_flight_bytes = std::size_t{64} << 20U;
 constexpr std::size_t max_waiting_bytes = std::size_t{128} << 20U;
-/// Deadline of an answer, after which its client is asked to retry: longer than the silence of a
-/// memory's server and the time of a full queue.
+/// Deadline of an answer, after which the client gets status 503 and should retry. It is longer
+/// than a memory's server may be silent and than a full queue takes.
 constexpr std::chrono::seconds request_deadline(30);
 constexpr std::chrono::seconds time_for_last_answers(5);
 constexpr ImageLimits picture_limits{
@@ -62,20 +62,20 @@ HttpAnswer make_error(int status, std::string_view why) {
 }  // namespace
 
 struct LocalisationServer::Implementation {
-  /// A request that a memory answers, as long as its client waits.
+  /// A request to a memory; it is dropped when its client leaves.
   struct Job {
     std::string memory;
-    std::string picture;  ///< to be localised; empty: the thumbnail of `view` is asked for
+    std::string picture;  ///< to localise; empty: return thumbnail of `view`
     std::string view;
     Clock::time_point came = Clock::now();
-    std::atomic<bool> answered = false;  ///< then `answer` is there
+    std::atomic<bool> answered = false;  ///< true once `answer` is set
     HttpAnswer answer;
   };
-  /// Memories with threads of their own: those in files together, and each one on a server, which
-  /// may be silent for a while.
+  /// A group of memories with its own threads: one lane for all memory files, and one for each
+  /// memory on a server, because a server may be silent for a while.
   struct Lane {
     std::vector<std::string> memories;
-    std::condition_variable came;  // a job, or the end
+    std::condition_variable came;  // notified of a job or the end
     std::deque<std::pair<std::weak_ptr<Job>, std::size_t>> waiting;
     std::size_t waiting_bytes = 0;
     std::vector<std::thread> workers;
@@ -143,7 +143,7 @@ struct LocalisationServer::Implementation {
     server.reset();
   }
 
-  // ---- on the thread that speaks HTTP
+  // ---- on the HTTP thread
 
   HttpAnswer answer(HttpRequest request) {
     HttpAnswer result = dispatch(std::move(request));
@@ -154,7 +154,8 @@ struct LocalisationServer::Implementation {
     return result;
   }
 
-  /// Refuses strangers before their bodies are read. `/health` is for everybody and earns no trust.
+  /// Refuses requests without a valid token or origin before their bodies are read. Everybody may
+  /// read `/health`, but is not trusted for it.
   HeadVerdict judge(const HttpRequest& head) {
     if (head.path == "/health") return {};
     std::optional<HttpAnswer> refusal;
@@ -301,13 +302,13 @@ struct LocalisationServer::Implementation {
     return {.type = "text/plain; version=0.0.4; charset=utf-8", .content = std::move(text)};
   }
 
-  // ---- on the threads that answer
+  // ---- on the worker threads
 
   void work(Lane& lane) {
     std::unique_lock lock(mutex);
     while (true) {
       lane.came.wait(lock, [&] { return ending || !lane.waiting.empty(); });
-      if (lane.waiting.empty()) return;  // and it is ending
+      if (lane.waiting.empty()) return;  // the server is ending
       const auto job = lane.waiting.front().first.lock();
       lane.waiting_bytes -= lane.waiting.front().second;
       lane.waiting.pop_front();
@@ -320,7 +321,7 @@ struct LocalisationServer::Implementation {
       if (ending && from > last_answer) {
         answer = make_error(503, "the server is ending");
       } else if (job->came < one.failed) {
-        // Each would wait for a server that is silent.
+        // Otherwise each job would wait for the silent server in turn.
         answer = make_error(503, describe_unreadable(job->memory));
       } else {
         if (is_picture) queueing.add(from - job->came);
@@ -381,12 +382,12 @@ struct LocalisationServer::Implementation {
     }
   }
 
-  /// Reports the fault to the operator of the server: it may hold addresses, which clients must not
-  /// see.
+  /// Reports the fault to the operator only, because it may contain addresses, which clients must
+  /// not learn.
   HttpAnswer make_memory_error(int status, const std::string& name, const std::exception& error) {
     report_loss(name, to_readable_line(error.what()));
     const std::lock_guard lock(mutex);
-    // One picture that cannot be answered says nothing about the others.
+    // Only 503 concerns the whole memory; other errors concern this one request.
     if (status == 503) served.at(name).failed = Clock::now();
     return make_error(status, describe_unreadable(name));
   }
@@ -394,7 +395,8 @@ struct LocalisationServer::Implementation {
     return "the memory " + name + " cannot be read now; try again in a moment";
   }
 
-  /// Notes that a memory cannot be read, once until it is back. Returns true if it was noted.
+  /// Reports to `options.note` that a memory cannot be read, only once until it can be read again.
+  /// Returns true if it reported.
   bool report_loss(const std::string& name, const std::string& fault) {
     {
       const std::lock_guard lock(mutex);
@@ -405,7 +407,7 @@ struct LocalisationServer::Implementation {
     return true;
   }
 
-  // ---- on the thread of a lane that reads changed memories again
+  // ---- on the watcher thread of a lane, which reloads changed memories
 
   void watch(Lane& lane) {
     std::chrono::milliseconds pause = options.look_every;
@@ -416,7 +418,7 @@ struct LocalisationServer::Implementation {
         if (ending) return;
         lock.unlock();
         const auto from = Clock::now();
-        // A memory that grows all the time leaves time to answer.
+        // A memory that changes all the time must leave time for answers.
         if (update(name)) {
           pause = std::max(pause, std::chrono::duration_cast<std::chrono::milliseconds>(
                                       10 * (Clock::now() - from)));
@@ -426,7 +428,7 @@ struct LocalisationServer::Implementation {
     }
   }
 
-  /// Reads a memory again if it was changed. Returns true if it did, or tried.
+  /// Reloads a memory if it has changed. Returns true if it was reloaded, or that failed.
   bool update(const std::string& name) {
     Served& one = served.at(name);
     std::string fault;
@@ -456,15 +458,15 @@ struct LocalisationServer::Implementation {
 
   const LocalisationServerOptions options;
   mutable std::mutex mutex;
-  std::condition_variable ended;         // for the watchers
-  std::map<std::string, Served> served;  // names stay; `watch` is of the lane's watcher
-  std::list<Lane> lanes{1};              // the first of the memories in files
+  std::condition_variable ended;         // notified at the end, for the watchers
+  std::map<std::string, Served> served;  // keys are fixed; only watchers use `watch`
+  std::list<Lane> lanes{1};              // the first has all memory files
   std::map<std::string, Lane*> lane_by_memory;
   std::map<int, std::uint64_t> refused;
   Histogram answering;
   Histogram queueing;
   bool ending = false;
-  Clock::time_point last_answer;  // when it is ending
+  Clock::time_point last_answer;  // deadline once it is ending
   std::optional<HttpServer> server;
 };
 

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <string>
 
-/// Text of the page that Prometheus reads.
+/// Metrics as text in the format of Prometheus.
 namespace panonav::server {
 
-/// Counts durations by how long they were.
+/// A histogram of durations.
 class Histogram {
  public:
   void add(std::chrono::steady_clock::duration duration);
@@ -16,14 +16,15 @@ class Histogram {
   [[nodiscard]] std::string text(const std::string& name) const;
 
  private:
-  /// Upper ends of the buckets, chosen: an answer takes some milliseconds.
+  /// Upper bounds of the buckets, chosen because an answer takes some milliseconds.
   static constexpr std::array bounds_s{0.001, 0.002, 0.005, 0.01, 0.02, 0.05,
                                        0.1,   0.2,   0.5,   1.0,  2.0,  5.0};
   std::array<std::uint64_t, bounds_s.size() + 1> counts_{};
   double sum_s_ = 0.0;
 };
 
-/// Returns the two lines that begin a metric. `type`: "counter", "gauge" or "histogram".
+/// Returns the two lines (HELP and TYPE) that begin a metric. `type` is "counter", "gauge" or
+/// "histogram".
 [[nodiscard]] std::string describe_metric(const std::string& name, const std::string& type,
                                           const std::string& help);
 

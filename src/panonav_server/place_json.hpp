@@ -6,8 +6,8 @@
 
 namespace panonav::server {
 
-/// Returns a place as JSON for the command and the server, as docs/formats.md describes it; unknown
-/// values are null.
+/// Converts a place to JSON for the command and the server (docs/formats.md); unknown values are
+/// null.
 [[nodiscard]] nlohmann::ordered_json place_json(const Place& place);
 
 }  // namespace panonav::server

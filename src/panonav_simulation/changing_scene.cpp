@@ -13,7 +13,7 @@ namespace panonav::simulation {
 
 namespace {
 
-bool is_building(std::string name) {
+bool is_building_part(std::string name) {
   std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
   return name.find("wall") != std::string::npos || name.find("floor") != std::string::npos ||
          name.find("ground") != std::string::npos;
@@ -46,14 +46,14 @@ ChangingScene::ChangingScene(Scene scene, std::uint64_t seed)
   for (const Mesh& mesh : scene_.meshes) {
     for (const Vector3& v : mesh.vertices) all.add(v);
   }
-  floor_ = {scene_.floor_low, scene_.floor_high};
-  all_ = {{all.low_m[0], all.low_m[1]}, {all.high_m[0], all.high_m[1]}};
-  std::map<std::string, std::vector<std::size_t>> named;
+  floor_area_ = {scene_.floor_low, scene_.floor_high};
+  scene_extent_ = {{all.low_m[0], all.low_m[1]}, {all.high_m[0], all.high_m[1]}};
+  std::map<std::string, std::vector<std::size_t>> meshes_by_object;
   for (std::size_t i = 0; i < scene_.meshes.size(); ++i) {
-    named[scene_.meshes[i].object].push_back(i);
+    meshes_by_object[scene_.meshes[i].object].push_back(i);
   }
-  for (auto& [name, meshes] : named) {
-    if (name.empty() || is_building(name)) continue;
+  for (auto& [name, meshes] : meshes_by_object) {
+    if (name.empty() || is_building_part(name)) continue;
     Extent extent;
     for (const std::size_t i : meshes) {
       for (const Vector3& v : scene_.meshes[i].vertices) extent.add(v);
@@ -71,12 +71,13 @@ std::size_t ChangingScene::moved() const noexcept {
       objects_, [](const Object& object) { return object.centre != object.first_centre; }));
 }
 
-bool ChangingScene::can_stand(const Object& object, Point2 centre) const {
+bool ChangingScene::is_valid_position(const Object& object, Point2 centre) const {
   const double r = object.radius_m;
-  // Furniture of built-in scenes stands around the floor that is driven on.
-  const FloorArea& room = scene_.drivable.empty() ? floor_ : all_;
+  // In built-in scenes furniture is around the drivable floor areas, so the whole extent of the
+  // scene is allowed.
+  const FloorArea& room = scene_.drivable.empty() ? floor_area_ : scene_extent_;
   if (distance_to_area_m(room, centre) > distance_to_area_m(room, object.centre)) return false;
-  // An object that already reaches into a drivable area may stay there, but not move farther in.
+  // An object that already overlaps a drivable area may move, but not farther into the area.
   for (const FloorArea& area : scene_.drivable) {
     if (distance_to_area_m(area, centre) < std::min(r, distance_to_area_m(area, object.centre)))
       return false;
@@ -89,7 +90,8 @@ bool ChangingScene::can_stand(const Object& object, Point2 centre) const {
 
 void ChangingScene::simulate_day(double share) {
   for (Object& object : objects_) {
-    // Numbers are drawn for every object, so that objects do not depend on each other.
+    // Draw the same random numbers for every object, so that its motion does not depend on other
+    // objects.
     const bool moves = random_.uniform() < share;
     bool placed = false;
     for (int attempt = 0; attempt < 40; ++attempt) {
@@ -99,7 +101,7 @@ void ChangingScene::simulate_day(double share) {
       if (!moves || placed) continue;
       const Point2 centre{object.centre.x_m + step * std::cos(angle),
                           object.centre.y_m + step * std::sin(angle)};
-      if (!can_stand(object, centre)) continue;
+      if (!is_valid_position(object, centre)) continue;
       object.centre = centre;
       object.turn_rad += turn;
       placed = true;

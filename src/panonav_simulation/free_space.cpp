@@ -85,23 +85,24 @@ FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
   require(static_cast<double>(columns_) * rows_ <= 1e8, "cells of the floor",
           static_cast<double>(columns_) * rows_, "<= 100000000; use larger cells");
 
-  // Obstacles just outside the floor's rectangle count too, so the raster has a margin.
+  // Obstacles just outside the floor's rectangle also limit the clearance, so the raster has a
+  // margin.
   const int margin = static_cast<int>(std::ceil(options.robot_radius_m / cell_m_)) + 2;
   const Raster raster{{low_.x_m - margin * cell_m_, low_.y_m - margin * cell_m_},
                       cell_m_,
                       columns_ + 2 * margin,
                       rows_ + 2 * margin};
-  const auto inner = [&](Cell cell) {
+  const auto raster_index = [&](Cell cell) {
     return static_cast<std::size_t>(cell.j + margin) * static_cast<std::size_t>(raster.columns) +
            static_cast<std::size_t>(cell.i + margin);
   };
   const double z = options.floor_height_m;
   const auto obstacles =
-      occupied_cells(scene, raster, z + options.step_height_m, z + options.robot_height_m);
+      find_occupied_cells(scene, raster, z + options.step_height_m, z + options.robot_height_m);
   const auto floor =
-      occupied_cells(scene, raster, z - options.step_height_m, z + options.step_height_m);
+      find_occupied_cells(scene, raster, z - options.step_height_m, z + options.step_height_m);
   const bool has_floor = std::find(floor.begin(), floor.end(), 1) != floor.end();
-  const auto distances = distance_to_cells(obstacles, raster);
+  const auto distances = compute_distances_to_cells(obstacles, raster);
 
   const std::size_t cells = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   obstacle_.resize(cells);
@@ -111,14 +112,14 @@ FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
     for (int i = 0; i < columns_; ++i) {
       const Cell cell{i, j};
       const std::size_t k = index(cell);
-      obstacle_[k] = obstacles[inner(cell)];
-      // Between any point of this cell and any of the obstacle's cell: half a diagonal less at
-      // either end.
+      obstacle_[k] = obstacles[raster_index(cell)];
+      // Cell centres overestimate the distance between any points of the two cells by up to half a
+      // diagonal at each end.
       const double clearance =
-          cell_m_ * (static_cast<double>(distances[inner(cell)]) - std::numbers::sqrt2);
+          cell_m_ * (static_cast<double>(distances[raster_index(cell)]) - std::numbers::sqrt2);
       clearance_m_[k] = static_cast<float>(std::max(0.0, clearance));
       free_[k] = clearance >= options.robot_radius_m && obstacle_[k] == 0 &&
-                 (!has_floor || floor[inner(cell)] != 0) && is_drivable(scene, centre(cell));
+                 (!has_floor || floor[raster_index(cell)] != 0) && is_drivable(scene, centre(cell));
     }
   }
   keep_connected_component(seed);
@@ -139,7 +140,8 @@ void FreeSpace::keep_connected_component(std::optional<Point2> seed) {
         const Cell cell = open.back();
         open.pop_back();
         ++sizes[number];
-        // Steps go across edges only: a robot does not squeeze through a corner.
+        // Connect cells across edges only, because a robot cannot pass diagonally between two
+        // obstacles.
         for (std::size_t n = 0; n < 4; ++n) {
           const Cell next{cell.i + neighbours[n].di, cell.j + neighbours[n].dj};
           if (next.i < 0 || next.j < 0 || next.i >= columns_ || next.j >= rows_) continue;
@@ -193,7 +195,7 @@ double FreeSpace::clearance_m(Point2 position) const noexcept {
 }
 
 bool FreeSpace::is_free_between(Point2 a, Point2 b) const noexcept {
-  // Every cell that the segment passes, by the parameters where it crosses the cells' borders.
+  // Visit every cell on the segment, ordered by the parameters at which it crosses cell borders.
   if (!is_free(a) || !is_free(b)) return false;
   Cell cell = *cell_at(a);
   const Cell end = *cell_at(b);
@@ -237,7 +239,7 @@ Pose2 FreeSpace::random_pose(Random& random) const {
   pose.x_m = middle.x_m + random.uniform(-half, half);
   pose.y_m = middle.y_m + random.uniform(-half, half);
   pose.heading_rad = wrap_angle(random.uniform(-std::numbers::pi, std::numbers::pi));
-  // At the very edge of a cell rounding may fall into the next one.
+  // Rounding may move a point at the edge of a cell into the next one.
   if (!is_free(pose.position())) {
     pose.x_m = middle.x_m;
     pose.y_m = middle.y_m;
@@ -249,9 +251,9 @@ std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) 
   if (!is_free(a) || !is_free(b)) return std::nullopt;
   const Cell start = *cell_at(a);
   const Cell goal = *cell_at(b);
-  constexpr float unknown = std::numeric_limits<float>::infinity();
-  std::vector<float> cost(free_.size(), unknown);
-  std::vector<std::uint8_t> came_by(free_.size(), 0);
+  constexpr float unreached = std::numeric_limits<float>::infinity();
+  std::vector<float> cost(free_.size(), unreached);
+  std::vector<std::uint8_t> arrival_direction(free_.size(), 0);
   const auto estimate = [goal](Cell cell) {
     const auto di = static_cast<float>(std::abs(cell.i - goal.i));
     const auto dj = static_cast<float>(std::abs(cell.j - goal.j));
@@ -260,7 +262,8 @@ std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) 
   struct Entry {
     float total;
     std::uint32_t cell;
-    // The lower index first among equals: the same path on every machine.
+    // Prefers the lower cell index among equal costs, so that the path is the same on every
+    // machine.
     bool operator<(const Entry& other) const {
       return total != other.total ? total > other.total : cell > other.cell;
     }
@@ -279,21 +282,21 @@ std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) 
       const Cell next{cell.i + neighbours[n].di, cell.j + neighbours[n].dj};
       if (next.i < 0 || next.j < 0 || next.i >= columns_ || next.j >= rows_) continue;
       if (free_[index(next)] == 0) continue;
-      // A diagonal step needs both cells beside it.
+      // A diagonal step requires both adjacent cells to be free.
       if (n >= 4 && (free_[index({next.i, cell.j})] == 0 || free_[index({cell.i, next.j})] == 0))
         continue;
-      const float through = cost[k] + neighbours[n].length;
-      if (!(through < cost[index(next)])) continue;
-      cost[index(next)] = through;
-      came_by[index(next)] = n;
-      open.push({through + estimate(next), static_cast<std::uint32_t>(index(next))});
+      const float cost_through_cell = cost[k] + neighbours[n].length;
+      if (!(cost_through_cell < cost[index(next)])) continue;
+      cost[index(next)] = cost_through_cell;
+      arrival_direction[index(next)] = n;
+      open.push({cost_through_cell + estimate(next), static_cast<std::uint32_t>(index(next))});
     }
   }
   if (closed[index(goal)] == 0) return std::nullopt;
 
   std::vector<Point2> cells{b};
   for (Cell cell = goal; index(cell) != index(start);) {
-    const Neighbour& step = neighbours[came_by[index(cell)]];
+    const Neighbour& step = neighbours[arrival_direction[index(cell)]];
     cell = {cell.i - step.di, cell.j - step.dj};
     cells.push_back(centre(cell));
   }
@@ -304,10 +307,10 @@ std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) 
 }
 
 std::vector<Point2> FreeSpace::shorten_path(std::vector<Point2> path) const {
-  // Connects each way point with the last one visible from it; then the same from the other end
-  // with new points between, until the path becomes hardly shorter.
+  // Connect each way point with the last one visible from it; then repeat from the other end with
+  // added intermediate points, until the path becomes hardly shorter.
   constexpr int max_rounds = 20;
-  constexpr double worthwhile = 1e-3;
+  constexpr double min_relative_gain = 1e-3;
   double length = path_length_m(path);
   for (int round = 0; round < max_rounds; ++round) {
     std::vector<Point2> tight{path.front()};
@@ -318,7 +321,7 @@ std::vector<Point2> FreeSpace::shorten_path(std::vector<Point2> path) const {
       from = to;
     }
     const double before = std::exchange(length, path_length_m(tight));
-    const bool done = round > 1 && length > (1.0 - worthwhile) * before;
+    const bool done = round > 1 && length > (1.0 - min_relative_gain) * before;
     if (done && round % 2 == 0) return tight;
     path.clear();
     for (std::size_t i = 0; i < tight.size(); ++i) {

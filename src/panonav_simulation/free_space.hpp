@@ -14,45 +14,44 @@
 
 namespace panonav::simulation {
 
-/// Size of a robot and of the steps that it drives over.
+/// Size of a robot, and the height of the steps that it can drive over.
 struct FreeSpaceOptions {
-  double robot_radius_m = 0.2;  ///< >= 0; the robot is taken for a cylinder
-  double robot_height_m =
-      0.6;  ///< what stands between the step height and this height is in the way
-  double step_height_m = 0.05;  ///< lower things (floor, carpet, sill) are driven over
+  double robot_radius_m = 0.2;  ///< >= 0; the robot is modelled as a cylinder
+  double robot_height_m = 0.6;  ///< surfaces between step and robot height are obstacles
+  double step_height_m = 0.05;  ///< lower things (carpet, sill) can be driven over
   double floor_height_m = 0.0;  ///< z of the floor
-  double cell_m = 0.025;        ///< of the map that is searched
+  double cell_m = 0.025;        ///< of the map
 };
 void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
 
-/// Returns the options of a robot of this radius that is as high as its camera and drives over a
-/// twelfth of that.
+/// Returns the options of a robot with this radius that is as high as its camera and drives over
+/// steps of a twelfth of this height.
 [[nodiscard]] FreeSpaceOptions free_space_options(double robot_radius_m, double camera_height_m);
 
-/// Returns the options of the robot that a scene is made for.
+/// Returns the options of the robot for which a scene is made.
 [[nodiscard]] FreeSpaceOptions free_space_options(const Scene& scene);
 
-/// The free space of a robot in a scene: inside `floor_low .. floor_high` and the
-/// `drivable` areas if there are any; on something to stand on (a surface within the step height of
-/// the floor), unless the scene has no floor at all; and with no surface within the robot's radius
-/// between step height and robot height. Only one connected component is kept, so that every free
-/// place can be reached from every other: the one of `seed`, or else the largest.
+/// The free space of a robot in a scene: positions inside `floor_low .. floor_high` and the
+/// `drivable` areas, if any; with a surface to stand on within the step height of the floor, unless
+/// the scene has no floor at all; and without a surface between step height and robot height within
+/// the robot's radius. Only one connected component is kept, so that every free position can be
+/// reached from every other: the one that contains `seed`, or the largest without `seed`.
 ///
 /// Computed on a map of square cells; whole cells are free or not. Distances to obstacles are never
 /// overestimated and underestimated by at most 1.5 cells. Building costs O(cells + triangle area).
 class FreeSpace {
  public:
-  /// Throws OptionError on options out of range, ContractError when the scene is not valid, its
+  /// Throws OptionError on options out of range, and ContractError if the scene is not valid, its
   /// floor is larger than 100 million cells, nothing is free, or `seed` is not free.
   explicit FreeSpace(const Scene& scene, const FreeSpaceOptions& options = {},
                      std::optional<Point2> seed = std::nullopt);
 
-  /// True if the middle of the robot may be there. False outside the map.
+  /// True if the centre of the robot can be at `position`; false outside the map.
   [[nodiscard]] bool is_free(Point2 position) const noexcept;
   /// Returns a lower bound of the distance from `position` to the nearest obstacle; 0 outside the
   /// map.
   [[nodiscard]] double clearance_m(Point2 position) const noexcept;
-  /// True if every place on the straight line is free.
+  /// True if the whole straight line from `a` to `b` is free.
   [[nodiscard]] bool is_free_between(Point2 a, Point2 b) const noexcept;
 
   [[nodiscard]] double area_m2() const noexcept;  ///< of all free cells
@@ -61,17 +60,18 @@ class FreeSpace {
   /// Returns the upper right corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 high() const noexcept { return high_; }
 
-  /// Returns the free places of a regular grid over the floor.
+  /// Returns the free positions of a regular grid over the floor.
   [[nodiscard]] std::vector<GridPosition> grid(double spacing_m,
                                                GridOrder order = GridOrder::raster) const;
-  /// Draws a pose uniformly over the free area, any heading.
+  /// Draws a pose uniformly over the free area, with a uniform heading.
   [[nodiscard]] Pose2 random_pose(Random& random) const;
-  /// Returns way points of a short path through free places, first `a`, last `b`; nullopt if one of
-  /// them is not free. Shortest on the 8-connected map, then pulled tight. O(cells log cells).
+  /// Returns a short path through free positions as way points, from `a` to `b`; nullopt if one of
+  /// these is not free. Shortest on the 8-connected cells, then shortened by straight lines.
+  /// O(cells log cells).
   [[nodiscard]] std::optional<std::vector<Point2>> shortest_path(Point2 a, Point2 b) const;
 
-  /// Draws a map, one pixel a cell, y upwards: free white, too near to something grey,
-  /// obstacles black, the rest dark grey.
+  /// Draws a map with one pixel per cell, y upwards: free cells white, cells too near to obstacles
+  /// grey, obstacles black, all others dark grey.
   [[nodiscard]] Image picture() const;
 
  private:

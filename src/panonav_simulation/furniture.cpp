@@ -9,8 +9,8 @@ namespace panonav::simulation {
 
 namespace {
 
-/// Adds a lamp as large as a window, 0.8 m inside of the middle of the window, which is at the
-/// share `middle` of the wall.
+/// Adds a lamp as large as a window, 0.8 m inside the room from the window's centre, which is at
+/// the fraction `middle` of the wall.
 void add_daylight(SceneBuilder& builder, Point2 from, Point2 to, double middle, double height_m) {
   const double length = distance(from, to);
   const double in_x = -(to.y_m - from.y_m) / length;
@@ -27,11 +27,11 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
                                       Point2{room.low.x_m, room.high.y_m}};
   builder.add_floor(builder.add_textured_material(
-                        noise_texture(random, 256, tint(random, 0.25, 0.5, 0.15), 0.12)),
+                        noise_texture(random, 256, sample_colour(random, 0.25, 0.5, 0.15), 0.12)),
                     room.low, room.high, 1.5);
-  builder.add_ceiling(builder.add_plain_material(tint(random, 0.75, 0.9, 0.03)), room.low,
+  builder.add_ceiling(builder.add_plain_material(sample_colour(random, 0.75, 0.9, 0.03)), room.low,
                       room.high, height_m, 1.0);
-  // Windows are in one wall: the room is bright on one side.
+  // Windows are in one wall only, so the room is brighter on that side.
   const std::size_t outer_wall = random.index(4);
   for (std::size_t i = 0; i < 4; ++i) {
     const Point2 from = corners[i];
@@ -40,10 +40,11 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
     const std::string wall = "wall " + std::to_string(i);
     builder.add_wall(wall,
                      builder.add_textured_material(
-                         noise_texture(random, 256, tint(random, 0.45, 0.85, 0.12), 0.07)),
+                         noise_texture(random, 256, sample_colour(random, 0.45, 0.85, 0.12), 0.07)),
                      from, to, height_m, 2.5);
-    builder.add_on_wall(wall + " skirting", builder.add_plain_material(tint(random, 0.1, 0.3, 0.1)),
-                        from, to, 0.0, length, 0.0, 0.08, 0.005);
+    builder.add_on_wall(wall + " skirting",
+                        builder.add_plain_material(sample_colour(random, 0.1, 0.3, 0.1)), from, to,
+                        0.0, length, 0.0, 0.08, 0.005);
     double along = random.uniform(0.2, 0.8);
     while (along < length - 0.6) {
       const double kind = random.uniform();
@@ -59,10 +60,10 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
                             std::min(height_m - 0.3, 2.1));
       } else if (i != outer_wall && kind < 0.25) {
         width = std::min(0.9, length - along - 0.1);
-        builder.add_on_wall(
-            name,
-            builder.add_textured_material(door_texture(random, 128, tint(random, 0.2, 0.7, 0.3))),
-            from, to, along, width, 0.0, 2.05);
+        builder.add_on_wall(name,
+                            builder.add_textured_material(
+                                door_texture(random, 128, sample_colour(random, 0.2, 0.7, 0.3))),
+                            from, to, along, width, 0.0, 2.05);
       } else if (kind < 0.8) {
         width = std::min(random.uniform(0.5, 1.2), length - along - 0.1);
         const double bottom = random.uniform(0.7, 1.3);
@@ -100,7 +101,7 @@ void add_desk(SceneBuilder& builder, const std::string& name, const Footing& foo
   builder.add_box(name, screen, dark, footing, {random.uniform(-0.3, 0.3), 0.1, 0.80},
                   {0.5, 0.06, 0.34});
   for (int i = 0; i < 3; ++i) {
-    const int paper = builder.add_plain_material(tint(random, 0.1, 0.95, 0.3));
+    const int paper = builder.add_plain_material(sample_colour(random, 0.1, 0.95, 0.3));
     const Vector3 size{random.uniform(0.08, 0.3), random.uniform(0.08, 0.3),
                        random.uniform(0.02, 0.3)};
     const Vector3 at{random.uniform(-0.6, 0.6), random.uniform(-0.25, 0.25), 0.74};
@@ -129,7 +130,7 @@ void add_shelf(SceneBuilder& builder, const std::string& name, const Footing& fo
   const int wood = builder.add_textured_material(
       wood_texture(random, 128, vary_colour(random, builder.palette().wood)));
   builder.add_box(name, wood, wood, footing, {0.0, 0.0, 0.0}, {width_m, 0.32, height_m}, 0.8);
-  // Books stand on both sides, a little before the wood.
+  // Books are on both long sides, slightly in front of the wood.
   for (const double side : {-1.0, 1.0}) {
     const int books = builder.add_textured_material(bookshelf_texture(random, 256, boards));
     const Footing face{footing.centre, footing.turn_rad + (side > 0.0 ? std::numbers::pi : 0.0)};
@@ -149,12 +150,12 @@ void add_shelf(SceneBuilder& builder, const std::string& name, const Footing& fo
 void add_wardrobe(SceneBuilder& builder, const std::string& name, const Footing& footing,
                   double width_m, double height_m) {
   Random& random = builder.random();
-  const Colour colour = tint(random, 0.08, 0.85, 0.2);
+  const Colour colour = sample_colour(random, 0.08, 0.85, 0.2);
   const int front = builder.add_textured_material(noise_texture(random, 128, colour, 0.12, 2.5));
   const int gap =
       builder.add_plain_material({0.4F * colour[0], 0.4F * colour[1], 0.4F * colour[2]});
   builder.add_box(name, front, front, footing, {0.0, 0.0, 0.0}, {width_m, 0.45, height_m}, 1.6);
-  // Gaps between the doors stand out a little on both long sides.
+  // Gaps between the doors protrude slightly on both long sides.
   const int doors = std::max(2, static_cast<int>(width_m / 0.55));
   for (int i = 1; i < doors; ++i) {
     const double x = width_m * (static_cast<double>(i) / doors - 0.5);
@@ -179,7 +180,7 @@ void add_cabinet(SceneBuilder& builder, const std::string& name, const Footing& 
 
 void add_plant(SceneBuilder& builder, const std::string& name, Point2 centre) {
   Random& random = builder.random();
-  const int pot = builder.add_plain_material(tint(random, 0.2, 0.6, 0.3));
+  const int pot = builder.add_plain_material(sample_colour(random, 0.2, 0.6, 0.3));
   const int leaves =
       builder.add_textured_material(foliage_texture(random, 128, {0.2F, 0.38F, 0.15F}));
   builder.add_cylinder(name, pot, centre, 0.0, 0.3, 0.18, 12, 0.7);
@@ -195,9 +196,9 @@ void add_crate(SceneBuilder& builder, const std::string& name, const Footing& fo
                Vector3 size) {
   Random& random = builder.random();
   const int side = builder.add_textured_material(
-      random.uniform() < 0.5 ? wood_texture(random, 128, tint(random, 0.3, 0.8, 0.25))
+      random.uniform() < 0.5 ? wood_texture(random, 128, sample_colour(random, 0.3, 0.8, 0.25))
                              : poster_texture(random, 128));
-  const int top = builder.add_plain_material(tint(random, 0.2, 0.8, 0.2));
+  const int top = builder.add_plain_material(sample_colour(random, 0.2, 0.8, 0.2));
   builder.add_box(name, side, top, footing, {0.0, 0.0, 0.0}, size);
 }
 
@@ -217,7 +218,8 @@ void add_tree(SceneBuilder& builder, const std::string& name, const TreeKind& ki
   const double trunk = 0.3 * height_m;
   builder.add_cylinder(name, kind.bark, centre, 0.0, trunk + 0.5,
                        0.05 * height_m * random.uniform(0.6, 1.0), 10, 1.3);
-  // The crown: a few clumps of leaves, pushed to all sides, so that a tree has a shape of its own.
+  // The crown consists of a few clumps of leaves at random offsets, so that each tree has its own
+  // shape.
   const double crown = height_m - trunk;
   const int clumps = 4 + static_cast<int>(random.index(3));
   for (int i = 0; i < clumps; ++i) {

@@ -32,9 +32,10 @@ LineCamera make_line_camera(double height_m, int columns) {
   UnwarperOptions cylinder{.rows = 3, .columns = 2 * columns};
   cylinder.elevations = ElevationBand{-line.half_band_rad, line.half_band_rad};
   LineCamera result{camera, Unwarper(camera, cylinder), {}, line, height_m, 0.0, {}, {}};
-  // Applies the sensor as to whole images.
+  // Angle between neighbouring rays, by which textures are filtered.
   result.spread_rad = 1.0 / (camera.rim_radius_px * 2.0 / 3.0) / rays_per_axis;
-  // An unwarper interpolates between the pixels next to a point.
+  // Pixels at this distance are still needed, because an unwarper interpolates between neighbouring
+  // pixels.
   constexpr double neighbours_px = 1.5;
   const double low = compute_radius_px(camera, -line.half_band_rad);
   const double high = compute_radius_px(camera, line.half_band_rad);
@@ -47,7 +48,8 @@ LineCamera make_line_camera(double height_m, int columns) {
         continue;
       }
       result.pixels.push_back(static_cast<std::size_t>(v * camera.image_size.width + u));
-      // Sheared both ways, as the renderer does it, so that no two rays share a line.
+      // Shear the grid of rays both ways, as the renderer does, so that no two rays share a row or
+      // column.
       constexpr double n = rays_per_axis;
       for (int j = 0; j < rays_per_axis; ++j) {
         for (int i = 0; i < rays_per_axis; ++i) {

@@ -15,9 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int max_sdf_depth = 32;  // of models in models and frames in frames; files have up to 5
+constexpr int max_sdf_depth = 32;  // nested models or frames; real files have up to 5
 
-// Inverts a rotation and translation.
+// Returns the inverse of a rigid transform.
 Affine3 inverse(const Affine3& b_from_a) {
   const auto& m = b_from_a.matrix;
   Affine3 result{{m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]}, {}};
@@ -26,8 +26,8 @@ Affine3 inverse(const Affine3& b_from_a) {
   return result;
 }
 
-// Normalises a name: "Ground Plane" and ".../ground_plane" are one, as Gazebo's database and its
-// servers differ.
+// Normalises a model name: "Ground Plane" and ".../ground_plane" are the same model, written
+// differently by Gazebo's database and its servers.
 std::string normalise_model_name(std::string_view uri) {
   std::string name(uri.substr(uri.find_last_of('/') + 1));
   for (auto at = name.find("%20"); at != std::string::npos; at = name.find("%20"))
@@ -36,8 +36,8 @@ std::string normalise_model_name(std::string_view uri) {
   return to_lower_case(name);
 }
 
-// Returns one of the two models of Gazebo's database that nearly all worlds take from there; else
-// null.
+// Returns one of the two models of Gazebo's database that nearly all worlds include, the sun or the
+// ground plane; a null node for other names.
 pugi::xml_node find_well_known_model(std::string_view uri) {
   static const pugi::xml_document sun = parse_xml(
       "<sdf><light name='sun' type='directional'><pose>0 0 10 0 0 0</pose>"
@@ -52,11 +52,11 @@ pugi::xml_node find_well_known_model(std::string_view uri) {
                                   : pugi::xml_node();
 }
 
-bool has_name_of(pugi::xml_node part, std::initializer_list<std::string_view> names) {
+bool is_element_named(pugi::xml_node part, std::initializer_list<std::string_view> names) {
   return std::ranges::find(names, std::string_view(part.name())) != names.end();
 }
 
-// Returns the pose of a frame in its model or world; nullopt if there is none of this name.
+// Returns the pose of a frame in its model or world; nullopt if no frame has this name.
 std::optional<Affine3> scope_from_frame(pugi::xml_node scope, std::string_view name,
                                         int depth = 0) {
   if (name.empty() || name == "__model__" || name == "world") return Affine3{};
@@ -64,13 +64,14 @@ std::optional<Affine3> scope_from_frame(pugi::xml_node scope, std::string_view n
   const auto split = name.find("::");
   for (const pugi::xml_node& part : scope) {
     if (part.attribute("name").value() != name.substr(0, split)) continue;
-    if (!has_name_of(part, {"link", "model", "frame", "joint"})) continue;
+    if (!is_element_named(part, {"link", "model", "frame", "joint"})) continue;
     std::string base(find_pose_frame(part));
-    if (base.empty() && has_name_of(part, {"joint"})) base = child_text(part, "child");
-    if (base.empty() && has_name_of(part, {"frame"})) base = part.attribute("attached_to").value();
+    if (base.empty() && is_element_named(part, {"joint"})) base = child_text(part, "child");
+    if (base.empty() && is_element_named(part, {"frame"}))
+      base = part.attribute("attached_to").value();
     const auto scope_from_base = scope_from_frame(scope, base, depth + 1);
     if (!scope_from_base) return std::nullopt;
-    const Affine3 scope_from_part = *scope_from_base * read_pose(pose_element(part));
+    const Affine3 scope_from_part = *scope_from_base * read_pose(find_pose_element(part));
     if (split == std::string_view::npos) return scope_from_part;
     const auto inner = scope_from_frame(part, name.substr(split + 2), depth + 1);
     return inner ? std::optional(scope_from_part * *inner) : std::nullopt;
@@ -79,11 +80,12 @@ std::optional<Affine3> scope_from_frame(pugi::xml_node scope, std::string_view n
 }
 
 bool is_renderable(const Vector3& v) {
-  constexpr double reach_m = 1e6;  // single precision tells 6 cm apart there
-  return std::abs(v.x_m) <= reach_m && std::abs(v.y_m) <= reach_m && std::abs(v.z_m) <= reach_m;
+  constexpr double max_coordinate_m = 1e6;  // single precision resolves 6 cm there
+  return std::abs(v.x_m) <= max_coordinate_m && std::abs(v.y_m) <= max_coordinate_m &&
+         std::abs(v.z_m) <= max_coordinate_m;
 }
 
-// Returns the light of the lamps on a point of the floor.
+// Returns the light of ambient and lamps on a point of the floor.
 double light_on_floor(const Scene& scene, double x_m, double y_m, double floor_m) {
   double light = scene.ambient;
   for (const PointLight& lamp : scene.lights) {
@@ -97,9 +99,9 @@ double light_on_floor(const Scene& scene, double x_m, double y_m, double floor_m
   return light;
 }
 
-// Scales the light of Gazebo's lamps, which add up beyond white, so that it is 1 on the brightest
-// floor under a lamp, if it is more.
-void set_exposure(Scene& scene) {
+// Scales down all light if it is above 1 (white) at the brightest point of the floor under a lamp,
+// because Gazebo's lamps add up.
+void limit_floor_brightness(Scene& scene) {
   const double floor_m = extent(scene)->first.z_m;
   double brightest = scene.ambient;
   for (const PointLight& lamp : scene.lights) {
@@ -116,9 +118,9 @@ void set_exposure(Scene& scene) {
   for (DirectionalLight& sun : scene.directional_lights) sun.intensity *= scale;
 }
 
-// Sets the floor to the extent of the bodies; a ground plane counts only where there is nothing
-// else.
-void set_floor(Scene& scene, const std::vector<std::size_t>& planes) {
+// Sets the floor area to the extent of all meshes except ground planes; to that of the planes if
+// there is nothing else.
+void set_floor_extent(Scene& scene, const std::vector<std::size_t>& planes) {
   Scene bodies;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     if (std::ranges::find(planes, i) == planes.end()) bodies.meshes.push_back(scene.meshes[i]);
@@ -128,9 +130,9 @@ void set_floor(Scene& scene, const std::vector<std::size_t>& planes) {
   scene.floor_high = {bounds->second.x_m, bounds->second.y_m};
 }
 
-// Context in which an element of a world is read.
-struct Place {
-  pugi::xml_node scope;  // the model or world whose frames its pose may name
+// Context for reading one element of a world.
+struct ElementContext {
+  pugi::xml_node scope;  // model or world whose frames the pose may name
   Affine3 world_from_scope;
   SdfOrigin origin;
 };
@@ -140,20 +142,22 @@ class WorldReader {
   WorldReader(const fs::path& world, const GazeboOptions& options)
       : world_(world), context_(world, options) {
     scene_.camera_height_m = options.camera_height_m;
-    scene_.ambient = 0.4F;  // SDF's own defaults
+    scene_.ambient = 0.4F;  // defaults of SDF
     scene_.background = {0.7F, 0.7F, 0.7F};
   }
 
   Scene read() {
-    const pugi::xml_node root = context_.files.sdf(world_);
+    const pugi::xml_node root = context_.files.read_sdf_root(world_);
     opened_.push_back(world_.lexically_normal());
     const pugi::xml_node world = root.child("world");
     const pugi::xml_node top = world ? world : root;
     const pugi::xml_node named = world ? world : root.child("model");
     scene_.name = named ? named.attribute("name").value() : world_.stem().string();
-    const pugi::xml_node look = top.child("scene");
-    if (const auto ambient = read_colour(look, "ambient")) scene_.ambient = brightness(*ambient);
-    if (const auto background = read_colour(look, "background")) scene_.background = *background;
+    const pugi::xml_node scene_element = top.child("scene");
+    if (const auto ambient = read_colour(scene_element, "ambient"))
+      scene_.ambient = brightness(*ambient);
+    if (const auto background = read_colour(scene_element, "background"))
+      scene_.background = *background;
     add_parts(top, {top, {}, {world_.parent_path(), {}}});
     const std::vector<std::string> warnings = context_.warning_lines();
     if (scene_.meshes.empty()) {
@@ -161,18 +165,20 @@ class WorldReader {
                       "shows nothing: no visual with a shape" +
                           (warnings.empty() ? std::string() : "; left out: " + warnings.front()));
     }
-    set_floor(scene_, visuals_.planes());
-    set_exposure(scene_);
+    set_floor_extent(scene_, visuals_.planes());
+    limit_floor_brightness(scene_);
     for (const std::string& warning : warnings)
       scene_.warnings.push_back(world_.string() + ": " + warning);
     return std::move(scene_);
   }
 
  private:
-  // Returns the pose of a part; `world_from_parent` where it names no frame.
-  Affine3 world_from(pugi::xml_node part, const Affine3& world_from_parent, const Place& place) {
+  // Returns the pose of a part; relative to `world_from_parent` if the part names no frame, or an
+  // unknown one.
+  Affine3 world_from(pugi::xml_node part, const Affine3& world_from_parent,
+                     const ElementContext& place) {
     const std::string_view frame = find_pose_frame(part);
-    const Affine3 written = read_pose(pose_element(part));
+    const Affine3 written = read_pose(find_pose_element(part));
     if (frame.empty()) return world_from_parent * written;
     if (const auto scope_from_base = scope_from_frame(place.scope, frame))
       return place.world_from_scope * *scope_from_base * written;
@@ -182,13 +188,14 @@ class WorldReader {
     return world_from_parent * written;
   }
 
-  // Adds models, lights and includes, in the order of the file.
-  void add_parts(pugi::xml_node parent, const Place& place) {
+  // Adds all models, lights and includes of `parent`, in the order of the file.
+  void add_parts(pugi::xml_node parent, const ElementContext& place) {
     for (const pugi::xml_node& part : parent) add_part(part, part, place);
   }
 
-  // `placed_by`: the part itself, or the <include> whose name and pose replace its own.
-  void add_part(pugi::xml_node part, pugi::xml_node placed_by, const Place& place) {
+  // Adds one part. `placed_by` is the part itself, or the <include> whose name and pose replace
+  // those of the part.
+  void add_part(pugi::xml_node part, pugi::xml_node placed_by, const ElementContext& place) {
     const std::string kind = part.name();
     const std::string& object = place.origin.object;
     std::string name = child_text(placed_by, "name");
@@ -201,71 +208,73 @@ class WorldReader {
       context_.try_to_add(thing, object, [&] { add_model(part, placed_by, name, place); });
     } else if (kind == "light") {
       context_.try_to_add(thing, object, [&] {
-        const pugi::xml_node posed = pose_element(placed_by) ? placed_by : part;
+        const pugi::xml_node posed = find_pose_element(placed_by) ? placed_by : part;
         add_light(part, world_from(posed, place.world_from_scope, place));
       });
-    } else if (has_name_of(part, {"actor", "population", "road"})) {
+    } else if (is_element_named(part, {"actor", "population", "road"})) {
       context_.warn(object, thing + " is left out: panonav shows nothing of this kind");
     }
   }
 
-  // Returns the root of the file that an <include> names, and that file; none for well-known
-  // models.
-  std::pair<pugi::xml_node, fs::path> open_include(const std::string& uri, const Place& place) {
+  // Returns the root of the file that an <include> names, and its path; an empty path for
+  // well-known models.
+  std::pair<pugi::xml_node, fs::path> open_include(const std::string& uri,
+                                                   const ElementContext& place) {
     constexpr int max_includes = 100000;
     const auto found = context_.find(uri, place.origin);
     if (!found) {
       const pugi::xml_node known = find_well_known_model(uri);
-      if (!known) throw Unusable{"it was not found in " + context_.files.places()};
+      if (!known) throw UnusablePart{"it was not found in " + context_.files.places()};
       return {known, {}};
     }
     std::error_code code;
     fs::path file = fs::is_directory(*found, code) ? GazeboFiles::find_description(*found) : *found;
     file = file.lexically_normal();
     if (std::ranges::find(opened_, file) != opened_.end())
-      throw Unusable{"it includes itself, directly or through other models"};
-    if (opened_.size() >= max_sdf_depth) throw Unusable{"it is included more than 32 models deep"};
+      throw UnusablePart{"it includes itself, directly or through other models"};
+    if (opened_.size() >= max_sdf_depth)
+      throw UnusablePart{"it is included more than 32 models deep"};
     if (++includes_ > max_includes)
-      throw Unusable{"the world includes more than 100000 models in all"};
-    return {context_.files.sdf(file), file};
+      throw UnusablePart{"the world includes more than 100000 models in all"};
+    return {context_.files.read_sdf_root(file), file};
   }
 
-  void add_include(pugi::xml_node include, const Place& place) {
+  void add_include(pugi::xml_node include, const ElementContext& place) {
     const auto [root, file] = open_include(child_text(include, "uri"), place);
-    Place inside = place;
-    if (!file.empty()) inside.origin.directory = file.parent_path();
-    // Gazebo takes the first as well.
+    ElementContext inner_context = place;
+    if (!file.empty()) inner_context.origin.directory = file.parent_path();
+    // Take the first model, light or actor, as Gazebo does.
     const pugi::xml_node part = root.find_child([](pugi::xml_node child) {
-      return has_name_of(child, {"model", "light", "actor"});
+      return is_element_named(child, {"model", "light", "actor"});
     });
-    if (!part) throw Unusable{"its file holds neither a model nor a light"};
+    if (!part) throw UnusablePart{"its file holds neither a model nor a light"};
     opened_.push_back(file);
-    add_part(part, include, inside);
+    add_part(part, include, inner_context);
     opened_.pop_back();
   }
 
   void add_model(pugi::xml_node model, pugi::xml_node placed_by, const std::string& name,
-                 const Place& place) {
-    Place inside = place;
-    inside.scope = model;
-    if (inside.origin.object.empty()) inside.origin.object = name;
-    inside.world_from_scope =
-        world_from(pose_element(placed_by) ? placed_by : model, place.world_from_scope, place);
+                 const ElementContext& place) {
+    ElementContext inner_context = place;
+    inner_context.scope = model;
+    if (inner_context.origin.object.empty()) inner_context.origin.object = name;
+    inner_context.world_from_scope =
+        world_from(find_pose_element(placed_by) ? placed_by : model, place.world_from_scope, place);
     std::string anchor = child_text(placed_by, "placement_frame");
     if (anchor.empty()) anchor = model.attribute("placement_frame").value();
     if (const auto model_from_anchor = scope_from_frame(model, anchor))
-      inside.world_from_scope = inside.world_from_scope * inverse(*model_from_anchor);
+      inner_context.world_from_scope = inner_context.world_from_scope * inverse(*model_from_anchor);
     for (const pugi::xml_node& link : model.children("link")) {
-      context_.try_to_add("link " + quote(link.attribute("name").value()), inside.origin.object,
-                          [&] { add_link(link, inside); });
+      context_.try_to_add("link " + quote(link.attribute("name").value()),
+                          inner_context.origin.object, [&] { add_link(link, inner_context); });
     }
-    add_parts(model, inside);
+    add_parts(model, inner_context);
   }
 
-  void add_link(pugi::xml_node link, const Place& place) {
+  void add_link(pugi::xml_node link, const ElementContext& place) {
     const Affine3 world_from_link = world_from(link, place.world_from_scope, place);
     for (const pugi::xml_node& part : link) {
-      if (!has_name_of(part, {"visual", "light"})) continue;
+      if (!is_element_named(part, {"visual", "light"})) continue;
       const std::string kind = part.name();
       context_.try_to_add(
           kind + " " + quote(part.attribute("name").value()), place.origin.object, [&] {
@@ -276,13 +285,14 @@ class WorldReader {
     }
   }
 
-  void add_visual(pugi::xml_node visual, const Affine3& world_from_visual, const Place& place) {
+  void add_visual(pugi::xml_node visual, const Affine3& world_from_visual,
+                  const ElementContext& place) {
     const std::size_t meshes_before = scene_.meshes.size();
     visuals_.add(visual, world_from_visual, place.origin);
     for (std::size_t i = meshes_before; i < scene_.meshes.size(); ++i) {
       if (std::ranges::all_of(scene_.meshes[i].vertices, is_renderable)) continue;
       scene_.meshes.resize(meshes_before);
-      throw Unusable{"it reaches farther than 1000 km"};
+      throw UnusablePart{"it reaches farther than 1000 km"};
     }
   }
 
@@ -303,13 +313,13 @@ class WorldReader {
     const auto factor = [&](const char* name, double otherwise) {
       return std::max(0.0, read_number(light.child("attenuation"), name, otherwise));
     };
-    // Gazebo's 1 / (c + l d + q d^2) is our intensity / (d^2 + radius^2) but for the linear term,
-    // which is taken into the quadratic one so that both agree at 2 m, about the way from a lamp to
-    // furniture. A lamp that does not fade is one of 100 m radius.
+    // Gazebo's 1 / (c + l d + q d^2) equals our intensity / (d^2 + radius^2) except for the linear
+    // term; it is added to the quadratic one so that both agree at 2 m, a typical distance from a
+    // lamp to furniture. A lamp without attenuation gets a radius of 100 m.
     const double c = factor("constant", 1.0);
     const double q = factor("quadratic", 0.0) + 0.5 * factor("linear", 1.0);
     const double fade = std::max(q, 1e-4 * c);
-    if (!(fade > 0.0)) throw Unusable{"it has no attenuation that is larger than 0"};
+    if (!(fade > 0.0)) throw UnusablePart{"it has no attenuation that is larger than 0"};
     scene_.lights.push_back({world_from_light.translation, static_cast<float>(strength / fade),
                              static_cast<float>(std::sqrt(c / fade))});
   }
@@ -318,7 +328,7 @@ class WorldReader {
   SdfContext context_;
   Scene& scene_ = context_.scene;
   SdfVisuals visuals_{context_};
-  std::vector<fs::path> opened_;  // the file that is read and those that include it
+  std::vector<fs::path> opened_;  // the file being read and those that include it
   int includes_ = 0;
 };
 

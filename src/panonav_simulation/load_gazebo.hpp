@@ -8,27 +8,27 @@
 
 namespace panonav::simulation {
 
-/// Options of reading a Gazebo world.
+/// Options for reading a Gazebo world.
 struct GazeboOptions {
-  TextureOptions textures{};  ///< how pictures on surfaces are read
-  /// Folders in which `model://NAME` is looked for, before the usual places: `models` beside the
-  /// world file and beside its folder, and these two folders themselves.
+  TextureOptions textures{};  ///< for textures of surfaces
+  /// Folders that are searched for `model://NAME` first. The usual places follow: `models` next to
+  /// the world file and next to its folder, and these two folders themselves.
   std::vector<std::filesystem::path> model_folders;
   double camera_height_m = 0.6;  ///< for Scene::camera_height_m
 };
 
-/// Returns the model folders that the user's Gazebo would use: GAZEBO_MODEL_PATH,
-/// GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH and SDF_PATH of the environment, in this order.
+/// Returns the model folders of the user's Gazebo installation, from the environment variables
+/// GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH and SDF_PATH, in this order.
 [[nodiscard]] std::vector<std::filesystem::path> gazebo_model_folders_of_environment();
 
 /// Reads a scene from a Gazebo world (SDF 1.0 and later; a file with a single model as well):
 /// visuals with their poses, scales, colours and textures; one object per top-level model.
 /// Approximations: coloured lamps become white ones of the same brightness; point and spot lights
-/// shine to all sides; light that adds up beyond white on the floor is scaled down as a whole.
-/// Visuals that are more than half transparent and invisible parts (collisions, joints, plugins)
-/// are left out. Whatever is missing, faulty or unknown (actors, height maps) is left out with one
-/// line in Scene::warnings. `model://sun` and `model://ground_plane` need no folder. Throws
-/// FileError on a world that is missing, no XML or shows nothing.
+/// shine to all sides; if their sum is brighter than white on the floor, all lights are scaled
+/// down. Visuals that are more than half transparent and invisible parts (collisions, joints,
+/// plugins) are left out. Parts that are missing, faulty or unknown (actors, height maps) are left
+/// out with one line each in Scene::warnings. `model://sun` and `model://ground_plane` need no
+/// folder. Throws FileError if the world is missing, is not XML or contains nothing visible.
 [[nodiscard]] Scene load_gazebo(const std::filesystem::path& world,
                                 const GazeboOptions& options = {});
 

@@ -30,13 +30,14 @@ Affine3 to_affine(const aiMatrix4x4& m) {
   return {{m.a1, m.a2, m.a3, m.b1, m.b2, m.b3, m.c1, m.c2, m.c3}, {m.a4, m.b4, m.c4}};
 }
 
-std::string lower_ending(const fs::path& path) {
+std::string lower_case_extension(const fs::path& path) {
   return to_lower_case(path.extension().string());
 }
 
-// Returns the rotation of the importer's axes to z up. COLLADA files are y up already.
-Affine3 correct_up_axis(UpAxis up, const fs::path& path) {
-  const std::string ending = lower_ending(path);
+// Returns the rotation from the importer's axes to z up. The importer already converts COLLADA
+// files to y up.
+Affine3 rotation_to_z_up(UpAxis up, const fs::path& path) {
+  const std::string ending = lower_case_extension(path);
   const bool y_up_format = ending == ".dae" || ending == ".gltf" || ending == ".glb";
   const bool y_up = up == UpAxis::y || (up == UpAxis::of_format && y_up_format);
   if (!y_up) return {};
@@ -60,16 +61,16 @@ Material convert_material(const aiMaterial& source, const fs::path& path, Textur
     if (material.texture || source.GetTexture(type, 0, &file) != AI_SUCCESS) continue;
     material.texture = textures.find(file.C_Str(), path.parent_path());
   }
-  // Formats differ in whether the colour tints the texture, and exporters write black or grey
-  // beside a texture that is meant to be shown unchanged.
+  // Show textures unchanged: formats differ in whether the colour tints the texture, and exporters
+  // often write black or grey with a texture.
   if (material.texture) material.colour = {1.0F, 1.0F, 1.0F};
   aiColor3D emissive;
   if (!material.texture && source.Get(AI_MATKEY_COLOR_EMISSIVE, emissive) == AI_SUCCESS) {
-    const auto shine = to_colour(emissive);
-    const float strength = std::max({shine[0], shine[1], shine[2]});
+    const auto emissive_colour = to_colour(emissive);
+    const float strength = std::max({emissive_colour[0], emissive_colour[1], emissive_colour[2]});
     const float body = std::max({material.colour[0], material.colour[1], material.colour[2]});
     if (strength > body) {
-      material.colour = shine;
+      material.colour = emissive_colour;
       material.emission = 1.0F;
     }
   }
@@ -107,7 +108,7 @@ bool is_finite(const Mesh& mesh) {
                      [](const auto& t) { return std::isfinite(t[0]) && std::isfinite(t[1]); });
 }
 
-struct Collector {
+struct MeshCollector {
   const aiScene& source;
   const fs::path& path;
   std::vector<Material> materials;
@@ -130,8 +131,8 @@ struct Collector {
   }
 };
 
-// Mesh files name others: materials, buffers. Those that are no regular files do not count as
-// there.
+// Opens the files that a mesh file names (materials, buffers); reports all but regular files as
+// missing.
 class RegularFiles final : public Assimp::DefaultIOSystem {
  public:
   Assimp::IOStream* Open(const char* file, const char* mode) override {
@@ -144,18 +145,18 @@ class RegularFiles final : public Assimp::DefaultIOSystem {
   }
 };
 
-// Collada as the importer refuses it: polygons with holes, blanks before the numbers of a colour.
-// The holes become part of the outline, each joined to it by a cut between the vertices that are
-// nearest to each other.
-class ColladaHoles {
+// Repairs COLLADA constructs that the importer rejects: polygons with holes, and blanks before the
+// numbers of a colour. Each hole is merged into the outline by a cut between the nearest pair of
+// vertices.
+class ColladaRepair {
  public:
-  explicit ColladaHoles(pugi::xml_node root) {
+  explicit ColladaRepair(pugi::xml_node root) {
     collect(root);
-    for (const pugi::xml_node& polygons : polygons_) join_holes(polygons);
+    for (const pugi::xml_node& polygons : polygons_) merge_holes(polygons);
   }
 
  private:
-  using Corner = std::vector<double>;  // the indices of one vertex, one for each input
+  using Corner = std::vector<double>;  // indices of one vertex, one per input
   using Outline = std::vector<Corner>;
 
   void collect(pugi::xml_node element) {
@@ -179,7 +180,8 @@ class ColladaHoles {
     if (!text.empty()) element.text().set(text.c_str());
   }
 
-  [[nodiscard]] pugi::xml_node source_of(pugi::xml_node element, std::string_view semantic) const {
+  [[nodiscard]] pugi::xml_node find_input_source(pugi::xml_node element,
+                                                 std::string_view semantic) const {
     for (const pugi::xml_node& input : element.children("input")) {
       if (input.attribute("semantic").value() != semantic) continue;
       const auto found = by_id_.find(input.attribute("source").value());
@@ -188,9 +190,9 @@ class ColladaHoles {
     return {};
   }
 
-  void join_holes(pugi::xml_node polygons) {
+  void merge_holes(pugi::xml_node polygons) {
     const pugi::xml_node array =
-        source_of(source_of(polygons, "VERTEX"), "POSITION").child("float_array");
+        find_input_source(find_input_source(polygons, "VERTEX"), "POSITION").child("float_array");
     positions_ = array ? parse_numbers(element_text(array)) : std::nullopt;
     inputs_ = 1;
     vertex_input_ = 0;
@@ -203,15 +205,15 @@ class ColladaHoles {
       if (std::string_view(input.attribute("semantic").value()) == "VERTEX") vertex_input_ = number;
     }
     for (pugi::xml_node polygon : polygons.children()) {
-      if (has_name(polygon, "ph")) join_holes_of_one(polygon);
+      if (has_name(polygon, "ph")) merge_holes_of_polygon(polygon);
     }
   }
 
-  // Turns a polygon with holes into one without.
-  void join_holes_of_one(pugi::xml_node polygon) const {
+  // Replaces a polygon with holes by an equivalent one without holes.
+  void merge_holes_of_polygon(pugi::xml_node polygon) const {
     Outline outline;
-    for (const pugi::xml_node& ring : polygon.children("p")) outline = corners(ring);
-    for (const pugi::xml_node& ring : polygon.children("h")) join(outline, corners(ring));
+    for (const pugi::xml_node& ring : polygon.children("p")) outline = parse_outline(ring);
+    for (const pugi::xml_node& ring : polygon.children("h")) join(outline, parse_outline(ring));
     std::string text;
     for (const Corner& corner : outline) {
       for (const double index : corner) text += std::to_string(std::lround(index)) + " ";
@@ -221,7 +223,7 @@ class ColladaHoles {
     set_text(polygon, text);
   }
 
-  [[nodiscard]] Outline corners(pugi::xml_node ring) const {
+  [[nodiscard]] Outline parse_outline(pugi::xml_node ring) const {
     const auto indices = parse_numbers(element_text(ring)).value_or(std::vector<double>{});
     Outline outline;
     for (std::size_t i = 0; i + inputs_ <= indices.size(); i += inputs_)
@@ -237,8 +239,8 @@ class ColladaHoles {
     return {p[0], p[1], p[2]};
   }
 
-  // Returns twice the area times the normal.
-  [[nodiscard]] Vector3 turn(const Outline& outline) const {
+  // Returns the normal of an outline, with twice its area as length.
+  [[nodiscard]] Vector3 area_normal(const Outline& outline) const {
     Vector3 sum{};
     for (std::size_t i = 0; i < outline.size(); ++i) {
       const Vector3 a = position(outline[i]);
@@ -252,8 +254,8 @@ class ColladaHoles {
 
   void join(Outline& outline, Outline hole) const {
     if (outline.empty() || hole.empty()) return;
-    const Vector3 a = turn(outline);
-    const Vector3 b = turn(hole);
+    const Vector3 a = area_normal(outline);
+    const Vector3 b = area_normal(hole);
     if (a.x_m * b.x_m + a.y_m * b.y_m + a.z_m * b.z_m > 0.0) std::reverse(hole.begin(), hole.end());
     constexpr std::size_t max_pairs = 10000000;
     if (outline.size() > max_pairs / hole.size()) throw Error("too many vertices around a hole");
@@ -288,7 +290,7 @@ class ColladaHoles {
 std::optional<std::string> repair_collada(const fs::path& path) {
   try {
     const pugi::xml_document document = parse_xml(read_scene_file(path));
-    const ColladaHoles joined(document.document_element());
+    const ColladaRepair joined(document.document_element());
     std::ostringstream text;
     text.imbue(std::locale::classic());
     document.save(text, "", pugi::format_raw | pugi::format_no_declaration);
@@ -303,19 +305,19 @@ std::optional<std::string> repair_collada(const fs::path& path) {
 const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) {
   const Key key{path.lexically_normal().string(), up};
   if (const auto known = files_.find(key); known != files_.end()) return known->second;
-  if (const auto known = faults_.find(key); known != faults_.end()) throw known->second;
+  if (const auto known = errors_.find(key); known != errors_.end()) throw known->second;
   try {
-    return files_.emplace(key, read_new(path, up)).first->second;
+    return files_.emplace(key, import_file(path, up)).first->second;
   } catch (const FileError& error) {
-    faults_.emplace(key, error);
+    errors_.emplace(key, error);
     throw;
   }
 }
 
-std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
+std::vector<FileMesh> MeshLibrary::import_file(const fs::path& path, UpAxis up) {
   require_scene_file(path);
   Assimp::Importer importer;
-  importer.SetIOHandler(new RegularFiles);  // the importer owns it
+  importer.SetIOHandler(new RegularFiles);  // the importer takes ownership
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
@@ -328,17 +330,17 @@ std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
                              aiProcess_ValidateDataStructure;
   const aiScene* source = importer.ReadFile(path.string(), steps);
   const std::string fault = importer.GetErrorString();
-  if (source == nullptr && lower_ending(path) == ".dae") {
+  if (source == nullptr && lower_case_extension(path) == ".dae") {
     if (const auto text = repair_collada(path))
       source = importer.ReadFileFromMemory(text->data(), text->size(), steps, "dae");
   }
   if (source == nullptr || source->mRootNode == nullptr)
     throw FileError(path.string(), "not a readable mesh file: " + to_readable_line(fault));
-  Collector collector{*source, path, {}, {}};
+  MeshCollector collector{*source, path, {}, {}};
   for (unsigned i = 0; i < source->mNumMaterials; ++i) {
     collector.materials.push_back(convert_material(*source->mMaterials[i], path, textures_));
   }
-  collector.visit(*source->mRootNode, correct_up_axis(up, path));
+  collector.visit(*source->mRootNode, rotation_to_z_up(up, path));
   if (collector.meshes.empty()) throw FileError(path.string(), "contains no triangles");
   return std::move(collector.meshes);
 }
@@ -358,8 +360,8 @@ Scene load_mesh(const fs::path& path, const MeshOptions& options) {
   const auto [low, high] = *extent(scene);
   scene.floor_low = {low.x_m, low.y_m};
   scene.floor_high = {high.x_m, high.y_m};
-  // Like a ceiling lamp: in the middle, a tenth below the top, as bright at the floor as the
-  // ambient light.
+  // Add a ceiling lamp: in the middle, a tenth of the height below the top, half as bright on the
+  // floor below as white.
   const double height = high.z_m - low.z_m;
   const double lamp = low.z_m + 0.9 * height;
   scene.lights.push_back({{0.5 * (low.x_m + high.x_m), 0.5 * (low.y_m + high.y_m), lamp},

@@ -12,7 +12,7 @@
 namespace panonav::simulation {
 
 /// Returns make(0) to make(count - 1), computed on the executor's threads. Each result must depend
-/// on its number alone.
+/// only on its index.
 template <typename Make>
 auto make_each(Executor& executor, std::size_t count, Make make) {
   using Made = std::invoke_result_t<Make, std::size_t>;
@@ -26,7 +26,7 @@ auto make_each(Executor& executor, std::size_t count, Make make) {
   return made;
 }
 
-/// Returns the processor time of the calling thread so far.
+/// Returns the processor time that the calling thread has used so far.
 [[nodiscard]] inline double get_thread_cpu_time_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -109,10 +109,10 @@ MappedRecording map_recording(const MappingRecording& recording, const MappingRu
                       recording.views.front().elevations());
   TopologicalMapper mapper(memory, options.mapping, options.odometry, options.closure);
   double total_s = 0.0;
-  std::size_t looked_at = 0;
+  std::size_t processed_views = 0;
   for (std::size_t i = 0; i < recording.views.size(); ++i) {
     if (options.max_nodes > 0 && result.number.size() == options.max_nodes) break;
-    ++looked_at;
+    ++processed_views;
     const FourierSignature view = first_components(recording.views[i], options.components);
     const auto start = Clock::now();
     OdometryView seen(view);
@@ -132,7 +132,7 @@ MappedRecording map_recording(const MappingRecording& recording, const MappingRu
   const auto start = Clock::now();
   mapper.finish();
   result.finish_s = seconds_since(start);
-  result.mean_step_s = (total_s + result.finish_s) / static_cast<double>(looked_at);
+  result.mean_step_s = (total_s + result.finish_s) / static_cast<double>(processed_views);
   result.map = mapper.map();
   for (std::size_t i = 0; i < result.number.size(); ++i) {
     result.estimate.push_back(result.map.nodes[i].pose.position());

@@ -14,10 +14,11 @@ namespace panonav::simulation {
 
 namespace {
 
-/// Returns the poses by node of the graph; NaN where the memory does not know them.
+/// Returns the true poses of the views, by node of the graph; NaN where the memory does not state
+/// them.
 std::vector<Pose2> collect_true_poses(const NavigationGraph& graph, const MemoryFile& file) {
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  constexpr std::size_t batch = 1024;  // views in memory at a time
+  constexpr std::size_t batch = 1024;  // views loaded at a time
   std::vector<Pose2> poses;
   for (std::size_t begin = 0; begin < graph.size(); begin += batch) {
     const auto views = graph.views().subspan(begin, std::min(batch, graph.size() - begin));
@@ -31,7 +32,7 @@ std::vector<Pose2> collect_true_poses(const NavigationGraph& graph, const Memory
   return poses;
 }
 
-/// Returns the median length of the edges between views at known positions; 0 without any.
+/// Returns the median length of the edges between views with known positions; 0 if there are none.
 double median_edge_m(const NavigationGraph& graph, const std::vector<Pose2>& truth) {
   std::vector<double> lengths;
   for (const NavigationGraph::Edge& edge : graph.edges()) {
@@ -101,12 +102,13 @@ MissionPlace make_mission_place(const std::string& scene, SimulatedWorldOptions 
   const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world.camera();
   const PictureSource source = mirror ? header.source : world.source();
   MissionPlace place = make_mission_place(world);
-  const SimulatedWorldOptions& settled = world.options();
-  place.sight = make_view_sensor(place.renderer, camera, settled.frame, settled.sensor,
-                                 std::make_shared<const ViewEncoder>(header, source), &executor,
-                                 std::move(report));
+  const SimulatedWorldOptions& final_options = world.options();
+  place.view_sensor = make_view_sensor(
+      place.renderer, camera, final_options.frame, final_options.sensor,
+      std::make_shared<const ViewEncoder>(header, source), &executor, std::move(report));
   if (const RouteSource* const route = robot.route()) {
-    place.line = [renderer = place.renderer, camera, frame = settled.frame, sensor = settled.sensor,
+    place.line = [renderer = place.renderer, camera, frame = final_options.frame,
+                  sensor = final_options.sensor,
                   encoder = std::make_shared<LineEncoder>(source, *route),
                   &executor](const Pose2& pose, std::uint64_t seed) {
       return encoder->line(take_picture(*renderer, pose, camera, frame, sensor, seed, executor));

@@ -25,15 +25,16 @@ HyperboloidalMirror::HyperboloidalMirror(const Camera& camera) : camera_(camera)
   rim_radius_mm_ = point.radius_mm;
   if (camera.inner_radius_px > 0.0 && reflect(camera.inner_radius_px, point) &&
       point.direction_z < 0.0) {
-    // The body is a disc around the lens, just large enough to fill the middle of the picture.
-    const double drop_mm = point.height_mm + focus_mm_;
-    body_radius_mm_ = point.radius_mm - drop_mm * point.direction_r / point.direction_z;
+    // The body is a disc around the lens, just large enough to fill the inner radius of the image.
+    const double height_above_lens_mm = point.height_mm + focus_mm_;
+    body_radius_mm_ =
+        point.radius_mm - height_above_lens_mm * point.direction_r / point.direction_z;
   }
 }
 
 bool HyperboloidalMirror::reflect(double radius_px, Point& point) const {
-  // A ray from the lens (0, -c) along (r, f) meets R^2 / a^2 - Z^2 / b^2 = -1 where
-  // p t^2 + q t - a^2 / b^2 = 0; its larger root is the upper sheet, which is the mirror.
+  // A ray from the lens (0, -c) along (r, f) meets R^2 / a^2 - Z^2 / b^2 = -1 where p t^2 + q t -
+  // a^2 / b^2 = 0. The larger root is on the upper sheet, which is the mirror.
   const double a2 = model_.a_mm * model_.a_mm;
   const double b2 = model_.b_mm * model_.b_mm;
   const double f = model_.focal_length_px;
@@ -44,7 +45,7 @@ bool HyperboloidalMirror::reflect(double radius_px, Point& point) const {
   const double t = (-q - root) / (2.0 * p);
   point.radius_mm = t * radius_px;
   point.height_mm = t * f - focus_mm_;
-  // Gradient of the surface: its normal, on the side of the lens.
+  // The surface normal is the normalised gradient, on the side of the lens.
   double normal_r = point.radius_mm / a2;
   double normal_z = -point.height_mm / b2;
   const double normal_length = std::hypot(normal_r, normal_z);
@@ -74,8 +75,9 @@ MirrorRay HyperboloidalMirror::trace(PixelPoint pixel) const {
   ray.direction = {point.direction_r * c, point.direction_r * s, point.direction_z};
   ray.target = MirrorTarget::world;
   if (point.direction_z < 0.0 && body_radius_mm_ > 0.0) {
-    const double drop_mm = point.height_mm + focus_mm_;
-    const double at_lens_mm = point.radius_mm - drop_mm * point.direction_r / point.direction_z;
+    const double height_above_lens_mm = point.height_mm + focus_mm_;
+    const double at_lens_mm =
+        point.radius_mm - height_above_lens_mm * point.direction_r / point.direction_z;
     if (at_lens_mm <= body_radius_mm_) {
       ray.target = MirrorTarget::camera_body;
       ray.body_radius = at_lens_mm / body_radius_mm_;

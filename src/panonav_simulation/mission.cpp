@@ -24,8 +24,8 @@ namespace panonav::simulation {
 
 namespace {
 
-// Smallest distance from obstacles at which references are recorded.
-constexpr double room_m = 0.2;
+// Smallest clearance, in addition to the robot's radius, of the references that are recorded.
+constexpr double min_reference_clearance_m = 0.2;
 // Largest distance between the lines of a route.
 constexpr double line_spacing_m = 0.1;
 
@@ -37,7 +37,7 @@ std::vector<FourierSignature> sense_views(const MissionPlace& place,
   });
 }
 
-// Makes a memory without views whose scale just fits the largest magnitude of these.
+// Makes an empty memory whose full scale is the largest magnitude of `views`, without component 0.
 VisualMemory make_empty_memory(const std::vector<FourierSignature>& views) {
   float largest = 0.0F;
   for (const FourierSignature& view : views) {
@@ -49,26 +49,26 @@ VisualMemory make_empty_memory(const std::vector<FourierSignature>& views) {
           views.front().elevations()};
 }
 
-// Records a route along the poses that the map has placed, from the first one in its largest
-// component until one is not.
+// Records a route along the mapped poses, from the first one in the map's largest component to the
+// last one before a gap.
 RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& poses,
                            const TopologicalMap& map, std::uint64_t seed, Executor& executor) {
-  struct Stop {
+  struct RouteStop {
     Pose2 truth;
     Pose2 mapped;
   };
-  std::vector<Stop> stops;
+  std::vector<RouteStop> stops;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     if (map.nodes[i].component != 0) {
       if (stops.empty()) continue;
       break;
     }
-    const Stop next{poses[i], map.nodes[i].pose};
+    const RouteStop next{poses[i], map.nodes[i].pose};
     if (stops.empty()) {
       stops.push_back(next);
       continue;
     }
-    const Stop last = stops.back();
+    const RouteStop last = stops.back();
     const double far_m = distance(last.mapped.position(), next.mapped.position());
     const int steps = std::max(1, static_cast<int>(std::ceil(far_m / line_spacing_m)));
     for (int k = 1; k <= steps; ++k) {
@@ -87,7 +87,7 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
   return route;
 }
 
-// Returns the length of the shortest path, or the straight distance where there is none.
+// Returns the length of the shortest path; the straight distance if there is no path.
 double shortest_path_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
   const auto way = space.shortest_path(from, to);
@@ -111,7 +111,7 @@ std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> make_li
 
 FourierSignature sense_view(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
                             const People* people) {
-  if (place.sight) return place.sight(pose, seed);
+  if (place.view_sensor) return place.view_sensor(pose, seed);
   Executor here(1);
   const double height_m = place.scene.camera_height_m;
   Panorama view =
@@ -127,7 +127,9 @@ RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m, std::
   std::vector<Pose2> poses;
   for (const GridPosition& at : place.free_space->grid(spacing_m)) {
     const double heading_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
-    if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
+    if (place.free_space->clearance_m(at.position) <
+        place.scene.robot_radius_m + min_reference_clearance_m)
+      continue;
     poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
   }
   const auto views = sense_views(place, poses, seed, executor);
@@ -164,7 +166,7 @@ RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose
     if (node.component != 0) continue;
     memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
   }
-  const double way_m = path_length_m(poses);
+  const double path_m = path_length_m(poses);
   NavigationGraph graph = graph_from_map_and_neighbours(map, memory, executor);
   std::vector<KnownRoute> routes;
   if (place.line) {
@@ -177,7 +179,7 @@ RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose
         make_known_route(record_route(place, poses, map, seed_of_lines, executor), placed));
   }
   return {std::move(memory), std::move(graph), poses,
-          way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),
+          path_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),
           std::move(routes)};
 }
 
@@ -196,15 +198,16 @@ MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
   validate(motion_);
 }
 
-bool MissionRobot::is_clear(Point2 from, Point2 to) const {
-  // A person who is already too near must not block it from moving away.
-  const bool somebody = people_.touch(to, robot_radius_m_) && !people_.touch(from, robot_radius_m_);
+bool MissionRobot::has_clear_path(Point2 from, Point2 to) const {
+  // A person who already touches the robot must not prevent it from moving away.
+  const bool person_in_path = people_.has_person_within(to, robot_radius_m_) &&
+                              !people_.has_person_within(from, robot_radius_m_);
   constexpr double fine_m = 0.01;
-  return !somebody && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
+  return !person_in_path && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
 }
 
 void MissionRobot::wait(double seconds) {
-  people_.pass(seconds, pose_.position(), robot_radius_m_);
+  people_.advance(seconds, pose_.position(), robot_radius_m_);
 }
 
 Pose2 MissionRobot::take_odometry() noexcept {
@@ -216,9 +219,9 @@ void MissionRobot::command(const Velocity& velocity) {
   const Pose2 commanded = integrate_velocity(velocity, base_.period_s);
   const Pose2 step = sample_step(commanded, motion_, random_);
   const Pose2 there = pose_ * step;
-  if (!is_clear(pose_.position(), there.position())) {
-    // In contact, the robot rotates but does not move. Wheels that slip while it rotates on the
-    // spot say nothing about obstacles ahead.
+  if (!has_clear_path(pose_.position(), there.position())) {
+    // In contact, the robot rotates but does not move. Contact during a rotation on the spot is no
+    // evidence of an obstacle ahead.
     obstacle_ |= commanded.x_m != 0.0 || commanded.y_m != 0.0;
     pose_.heading_rad = there.heading_rad;
     odometry_ = odometry_ * Pose2{0.0, 0.0, commanded.heading_rad};
@@ -230,23 +233,24 @@ void MissionRobot::command(const Velocity& velocity) {
 }
 
 std::optional<double> MissionRobot::find_free_direction(double direct_rad, double distance_m) {
-  const auto is_open = [&](double direction_rad, double way_m) {
+  const auto is_open = [&](double direction_rad, double path_m) {
     const Point2 there =
-        pose_ * Point2{way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)};
-    return is_clear(pose_.position(), there);
+        pose_ * Point2{path_m * std::cos(direction_rad), path_m * std::sin(direction_rad)};
+    return has_clear_path(pose_.position(), there);
   };
   if (is_open(direct_rad, distance_m)) {
-    side_ = 0;
+    detour_side_ = 0;
     return direct_rad;
   }
-  // Farther round it would turn back: whoever sends it must know that the way is shut.
-  constexpr int feelers_each_side = 6;
-  const auto aside = find_open_direction(
-      direct_rad, feelers_each_side, side_,
+  // Search up to 90 degrees on each side only: beyond that the robot would turn back, and the
+  // navigator must learn that the path is blocked.
+  constexpr int directions_per_side = 6;
+  const auto free_direction = find_open_direction(
+      direct_rad, directions_per_side, detour_side_,
       [&](double direction_rad) { return is_open(direction_rad, 0.5 * distance_m); });
-  side_ = aside ? aside->side : -side_;
-  if (!aside) return std::nullopt;
-  return wrap_angle(aside->direction_rad);
+  detour_side_ = free_direction ? free_direction->side : -detour_side_;
+  if (!free_direction) return std::nullopt;
+  return wrap_angle(free_direction->direction_rad);
 }
 
 bool MissionRobot::take_contact() noexcept {
@@ -255,14 +259,14 @@ bool MissionRobot::take_contact() noexcept {
 
 namespace {
 
-// Drives to a point by the nominal speeds until the robot is there, is stopped or runs out of time.
-// Returns true if it was stopped.
+// Drives to a point at nominal speed until the robot arrives, is stopped by contact or runs out of
+// time. Returns true if it was stopped.
 bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, double distance_m) {
   Point2 target{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
   constexpr double near_m = 0.003;
-  const double longest_s =
+  const double max_duration_s =
       2.0 * (std::numbers::pi / base.turn_rad_s + distance_m / base.speed_m_s) + 1.0;
-  for (double time_s = 0.0; time_s < longest_s; time_s += base.period_s) {
+  for (double time_s = 0.0; time_s < max_duration_s; time_s += base.period_s) {
     const double left_m = std::hypot(target.x_m, target.y_m);
     if (left_m <= near_m) return false;
     const Velocity velocity =
@@ -274,10 +278,11 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
   return false;
 }
 
-/// Returns the reference nearest to the Monte-Carlo estimate, if that is certain.
-class Estimator {
+/// Monte-Carlo localisation that returns the reference nearest to its estimate, or nullopt while it
+/// is not localised.
+class NearestReferenceEstimator {
  public:
-  Estimator(const VisualMemory& memory, const OdometryNoise& odometry)
+  NearestReferenceEstimator(const VisualMemory& memory, const OdometryNoise& odometry)
       : memory_(&memory), filter_(memory, {}, odometry) {}
 
   std::optional<ViewId> observe(const Pose2& moved, const FourierSignature& view) {
@@ -303,11 +308,11 @@ class Estimator {
   MonteCarloLocaliser filter_;
 };
 
-/// Runs missions of one robot one after the other.
-class Voyage {
+/// Runs consecutive missions of one robot.
+class MissionRunner {
  public:
-  Voyage(const MissionPlace& place, const RememberedPlace& remembered, const Pose2& start,
-         const MissionOptions& options, std::uint64_t seed)
+  MissionRunner(const MissionPlace& place, const RememberedPlace& remembered, const Pose2& start,
+                const MissionOptions& options, std::uint64_t seed)
       : place_(place),
         remembered_(remembered),
         options_(options),
@@ -323,8 +328,8 @@ class Voyage {
     const FreeSpace& space = *place_.free_space;
     MissionRun run;
     run.shortest_m = shortest_path_m(space, robot_.pose().position(), goal);
-    const double begins_at_m = robot_.travelled_m();
-    const double kidnapped_at_m = begins_at_m + 0.5 * run.shortest_m;
+    const double start_travelled_m = robot_.travelled_m();
+    const double kidnapping_travelled_m = start_travelled_m + 0.5 * run.shortest_m;
     navigator.set_goal(goal_view);
     for (;;) {
       run.path.push_back(robot_.pose());
@@ -340,10 +345,10 @@ class Voyage {
         const Point2 there = remembered_.truth.at(*remembered_.graph.node_of(*other)).position();
         run.shortest_m += shortest_path_m(space, here, there) - shortest_path_m(space, here, goal);
         goal = there;
-        continue;  // it looks again from here
+        continue;  // decide again at this pose
       }
       move(decision);
-      if (kidnapped_to && !run.kidnapped_at && robot_.travelled_m() >= kidnapped_at_m) {
+      if (kidnapped_to && !run.kidnapped_at && robot_.travelled_m() >= kidnapping_travelled_m) {
         run.kidnapped_at = run.path.size() - 1;
         run.shortest_m += shortest_path_m(space, kidnapped_to->position(), goal) -
                           shortest_path_m(space, robot_.pose().position(), goal);
@@ -351,7 +356,7 @@ class Voyage {
         obstacle_ = false;
       }
     }
-    run.travelled_m = robot_.travelled_m() - begins_at_m;
+    run.travelled_m = robot_.travelled_m() - start_travelled_m;
     run.end_distance_m = distance(robot_.pose().position(), goal);
     return run;
   }
@@ -363,7 +368,7 @@ class Voyage {
     RobotReport report{.obstacle = std::exchange(obstacle_, false)};
     const Pose2 moved = robot_.take_odometry();
     if (estimator_) {
-      // The navigator uses the estimate only where it is in doubt.
+      // The estimate is passed on only when the navigator is in doubt about the place.
       const auto estimate = estimator_->observe(moved, view);
       if (in_doubt_) report.estimate = estimate;
     }
@@ -390,7 +395,7 @@ class Voyage {
       obstacle_ =
           drive(robot_, options_.base, *free_rad, (is_direct ? 1.0 : 0.5) * decision.advance_m);
     }
-    // A person in the path may move away.
+    // Wait, because a person in the path may move away.
     constexpr double pause_s = 1.0;
     if (obstacle_ || decision.advance_m == 0.0) robot_.wait(pause_s);
   }
@@ -401,8 +406,8 @@ class Voyage {
   MissionRobot robot_;
   Random noise_of_views_;
   Random noise_of_lines_;
-  std::optional<Estimator> estimator_;
-  bool in_doubt_ = true;  // where it is, after the last step
+  std::optional<NearestReferenceEstimator> estimator_;
+  bool in_doubt_ = true;  // about the place, after the last step
   bool obstacle_ = false;
 };
 
@@ -414,14 +419,14 @@ void require_goal(const RememberedPlace& remembered, ViewId goal) {
 }  // namespace
 
 std::string explain_other_ends(const std::map<NavigationDecision::State, std::size_t>& ends,
-                               std::size_t wrongly, NavigationDecision::State expected) {
+                               std::size_t falsely_arrived, NavigationDecision::State expected) {
   std::string text;
   const auto add = [&](std::size_t count, const std::string& end) {
     if (count == 0) return;
     text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
   };
   if (expected == NavigationDecision::State::arrived)
-    add(wrongly, "report an arrival but are farther off");
+    add(falsely_arrived, "report an arrival but are farther off");
   for (const auto& [end, count] : ends) {
     if (end != expected) add(count, "end as " + std::string(name_of(end)));
   }
@@ -434,7 +439,7 @@ MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembe
                        const GoalSource& other_goal) {
   require_goal(remembered, mission.goal);
   navigator.forget_place();
-  return Voyage(place, remembered, mission.start, options, seed)
+  return MissionRunner(place, remembered, mission.start, options, seed)
       .run(navigator, mission.goal, mission.kidnapped_to, report_step, other_goal);
 }
 
@@ -444,11 +449,11 @@ std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlac
                                  std::uint64_t seed) {
   for (const ViewId goal : goals) require_goal(remembered, goal);
   navigator.forget_place();
-  Voyage voyage(place, remembered, start, options, seed);
+  MissionRunner voyage(place, remembered, start, options, seed);
   std::vector<MissionRun> runs;
   for (const ViewId goal : goals) {
     runs.push_back(voyage.run(navigator, goal, std::nullopt, {}, {}));
-    // A robot that ended lost must not begin from a place in which it did not believe itself.
+    // A robot that ended lost must relocalise, and not start from its last, doubtful estimate.
     if (runs.back().end == NavigationDecision::State::lost) navigator.forget_place();
   }
   return runs;
@@ -473,7 +478,7 @@ std::vector<Mission> sample_missions(const MissionPlace& place, const Remembered
   require(options.max_distance_m > 0.0, "distance from a reference", options.max_distance_m, "> 0");
   Random random(seed, 3);
   const FreeSpace& space = *place.free_space;
-  const auto anywhere = [&] {
+  const auto sample_pose = [&] {
     if (!std::isfinite(options.max_distance_m)) return space.random_pose(random);
     for (;;) {
       const Pose2& reference = remembered.truth[random.index(remembered.truth.size())];
@@ -489,8 +494,8 @@ std::vector<Mission> sample_missions(const MissionPlace& place, const Remembered
   const double min_m = 2.0 * remembered.spacing_m;
   while (missions.size() < static_cast<std::size_t>(options.count)) {
     const std::size_t goal = random.index(remembered.truth.size());
-    Mission mission{remembered.graph.view(goal), anywhere(), {}};
-    if (options.kidnapped) mission.kidnapped_to = anywhere();
+    Mission mission{remembered.graph.view(goal), sample_pose(), {}};
+    if (options.kidnapped) mission.kidnapped_to = sample_pose();
     if (distance(mission.start.position(), remembered.truth[goal].position()) < min_m) continue;
     missions.push_back(mission);
   }

@@ -15,33 +15,34 @@
 
 namespace panonav::simulation {
 
-/// Slack by which ratios of lengths that should be whole numbers may miss them: far above rounding,
-/// far below any grid.
+/// Relative tolerance when a length is divided by a spacing: far above rounding errors, far below
+/// any grid spacing.
 inline constexpr double rounding_slack = 1e-9;
 
 /// Returns poses every `spacing_m` along the polyline through the positions, from the first on;
-/// headings are interpolated. The end is included only where it falls on the spacing. Empty for an
-/// empty path. Throws ContractError unless spacing_m > 0.
+/// headings are interpolated. The end is included only if the length is a multiple of the spacing.
+/// An empty path gives no poses. Throws ContractError unless spacing_m > 0.
 [[nodiscard]] inline std::vector<Pose2> resample(std::span<const Pose2> path, double spacing_m) {
   require(spacing_m > 0.0 && std::isfinite(spacing_m), "spacing_m", spacing_m, "> 0");
   std::vector<Pose2> poses;
   if (path.empty()) return poses;
   poses.push_back(path.front());
-  double walked = 0.0;
+  double path_length_m = 0.0;
   for (std::size_t i = 1; i < path.size(); ++i) {
     const double segment = distance(path[i - 1].position(), path[i].position());
     for (;;) {
       const double next = spacing_m * static_cast<double>(poses.size());
-      if (!(next <= walked + segment + rounding_slack * spacing_m) || !(segment > 0.0)) break;
-      poses.push_back(
-          interpolate(path[i - 1], path[i], std::clamp((next - walked) / segment, 0.0, 1.0)));
+      if (!(next <= path_length_m + segment + rounding_slack * spacing_m) || !(segment > 0.0))
+        break;
+      poses.push_back(interpolate(path[i - 1], path[i],
+                                  std::clamp((next - path_length_m) / segment, 0.0, 1.0)));
     }
-    walked += segment;
+    path_length_m += segment;
   }
   return poses;
 }
 
-/// A place of a regular grid: column i along x, row j along y.
+/// A position of a regular grid: column i along x, row j along y.
 struct GridPosition {
   int i = 0;        ///< column along x, from 0
   int j = 0;        ///< row along y, from 0
@@ -49,13 +50,13 @@ struct GridPosition {
   friend bool operator==(const GridPosition&, const GridPosition&) = default;
 };
 
-/// Order in which `grid_positions` goes through the rows.
+/// Order in which `grid_positions` lists the positions.
 enum class GridOrder {
   raster,  ///< every row from low x to high x
-  zigzag,  ///< every second row backwards, as a robot would drive it [M04 section 4]
+  zigzag,  ///< every second row backwards [M04 section 4]
 };
 
-/// Returns the grid of `spacing_m` that fits into the rectangle, centred in it, rows from low y to
+/// Returns the positions of a grid of `spacing_m`, centred in the rectangle, rows from low y to
 /// high y. Throws ContractError unless low <= high and spacing_m > 0.
 [[nodiscard]] inline std::vector<GridPosition> grid_positions(Point2 low, Point2 high,
                                                               double spacing_m,
@@ -68,7 +69,7 @@ enum class GridOrder {
   };
   const int columns = steps("extent of the grid in x", high.x_m - low.x_m) + 1;
   const int rows = steps("extent of the grid in y", high.y_m - low.y_m) + 1;
-  constexpr double max_count = 1e7;  // as of random places
+  constexpr double max_count = 1e7;  // the limit for random poses, too
   require(static_cast<double>(rows) * columns <= max_count, "the option spacing_m", spacing_m,
           "a spacing with at most 10000000 places in the grid");
   const auto margin = [spacing_m](double extent, int count) {
@@ -89,20 +90,20 @@ enum class GridOrder {
   return positions;
 }
 
-/// True if a robot may stand at a place.
+/// True if the robot can be at a position.
 using FreePredicate = std::function<bool(Point2)>;
 
-/// Length and steps of a `random_walk`.
+/// Length and steps of a random walk.
 struct RandomWalkOptions {
   int poses = 100;                  ///< >= 1
   double step_m = 0.1;              ///< above 0
-  double turn_deviation_rad = 0.2;  ///< standard deviation of the turn at each step, >= 0
+  double turn_deviation_rad = 0.2;  ///< standard deviation of the turn per step, >= 0
 };
 
-/// Walks in straight steps with small random turns; where the next step would leave the free
-/// places, the robot turns to a random direction instead. Headings are along the step that led to a
-/// pose. Stops early when it is boxed in. Throws ContractError when `start` is not free or an
-/// option is out of range.
+/// Walks in straight steps with small random turns; if the next step is not free, the robot turns
+/// to a random direction instead. The heading of a pose is the direction of the step to it. Stops
+/// early if no free step is found. Throws ContractError if `start` is not free or an option is out
+/// of range.
 [[nodiscard]] inline std::vector<Pose2> random_walk(const Pose2& start,
                                                     const FreePredicate& is_free,
                                                     const RandomWalkOptions& options,
@@ -115,8 +116,9 @@ struct RandomWalkOptions {
     throw ContractError("start of a random walk",
                         "(" + to_text(start.x_m) + ", " + to_text(start.y_m) + ")", "a free place");
   }
-  // With a free sector of 5 degrees, 500 directions miss it once in a thousand times.
-  constexpr int tries = 500;
+  // If a sector of only 5 degrees is free, 500 random directions miss it with a probability of 0.1
+  // %.
+  constexpr int max_attempts = 500;
   const auto step_to = [&](const Pose2& from, double heading) -> std::optional<Pose2> {
     const Pose2 next{from.x_m + options.step_m * std::cos(heading),
                      from.y_m + options.step_m * std::sin(heading), wrap_angle(heading)};
@@ -127,7 +129,7 @@ struct RandomWalkOptions {
   while (static_cast<int>(walk.size()) < options.poses) {
     const Pose2& here = walk.back();
     auto next = step_to(here, here.heading_rad + random.normal(0.0, options.turn_deviation_rad));
-    for (int attempt = 0; !next && attempt < tries; ++attempt) {
+    for (int attempt = 0; !next && attempt < max_attempts; ++attempt) {
       next = step_to(here, random.uniform(-std::numbers::pi, std::numbers::pi));
     }
     if (!next) break;

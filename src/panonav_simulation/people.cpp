@@ -11,15 +11,16 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr double radius_m = 0.22;
-constexpr double height_m = 1.7;
-constexpr double pace_m_s = 0.8;
-// Distance that a person keeps from a robot, and time that it waits in front of one.
-constexpr double distance_kept_m = 0.15;
-constexpr double patience_s = 2.0;
+constexpr double person_radius_m = 0.22;
+constexpr double person_height_m = 1.7;
+constexpr double walking_speed_m_s = 0.8;
+// Distance that people keep from the robot, and time that they wait in front of it before they
+// choose another path.
+constexpr double min_robot_distance_m = 0.15;
+constexpr double max_wait_s = 2.0;
 
-// True if nothing that a robot would touch stands on the straight line.
-bool is_in_sight(const FreeSpace& space, Point2 from, Point2 to) {
+// True if no obstacle at the robot's height is on the straight line.
+bool has_line_of_sight(const FreeSpace& space, Point2 from, Point2 to) {
   constexpr double step_m = 0.05;
   const int steps = static_cast<int>(std::ceil(distance(from, to) / step_m));
   for (int i = 1; i < steps; ++i) {
@@ -41,9 +42,9 @@ People::People(std::shared_ptr<const FreeSpace> space, int count, std::uint64_t 
   }
 }
 
-bool People::touch(Point2 position, double at_most_m) const {
+bool People::has_person_within(Point2 position, double at_most_m) const {
   return std::ranges::any_of(people_, [&](const Person& person) {
-    return distance(person.position, position) < at_most_m + radius_m;
+    return distance(person.position, position) < at_most_m + person_radius_m;
   });
 }
 
@@ -54,10 +55,10 @@ void People::choose_path(Person& person) {
   std::ranges::reverse(person.way);
 }
 
-void People::pass(double seconds, Point2 robot, double robot_radius_m) {
+void People::advance(double seconds, Point2 robot, double robot_radius_m) {
   for (Person& person : people_) {
     if (person.way.empty()) choose_path(person);
-    double left_m = pace_m_s * seconds;
+    double left_m = walking_speed_m_s * seconds;
     while (left_m > 0.0 && !person.way.empty()) {
       const Point2 to = person.way.back();
       const double far_m = distance(person.position, to);
@@ -65,11 +66,11 @@ void People::pass(double seconds, Point2 robot, double robot_radius_m) {
       const Point2 there{person.position.x_m + share * (to.x_m - person.position.x_m),
                          person.position.y_m + share * (to.y_m - person.position.y_m)};
       const double apart_m = distance(there, robot);
-      // A person who is already near may move away.
-      if (apart_m < robot_radius_m + radius_m + distance_kept_m &&
+      // A person who is already too near may still walk away.
+      if (apart_m < robot_radius_m + person_radius_m + min_robot_distance_m &&
           apart_m < distance(person.position, robot)) {
         person.waited_s += seconds;
-        if (person.waited_s > patience_s) choose_path(person);
+        if (person.waited_s > max_wait_s) choose_path(person);
         break;
       }
       person.position = there;
@@ -81,24 +82,24 @@ void People::pass(double seconds, Point2 robot, double robot_radius_m) {
 
 void People::paint(Panorama& view, const Pose2& camera, double camera_height_m) const {
   if (!view.elevations()) return;
-  // The nearest are painted last: they hide those behind them.
+  // Draw the nearest people last, because they hide those behind them.
   std::vector<const Person*> seen;
   for (const Person& person : people_) {
-    if (is_in_sight(*space_, camera.position(), person.position)) seen.push_back(&person);
+    if (has_line_of_sight(*space_, camera.position(), person.position)) seen.push_back(&person);
   }
   const auto far_m = [&](const Person* person) {
-    return std::max(distance(camera.position(), person->position), 1.05 * radius_m);
+    return std::max(distance(camera.position(), person->position), 1.05 * person_radius_m);
   };
   std::ranges::stable_sort(seen, std::greater{}, far_m);
   for (const Person* person : seen) {
     const Point2 there = inverse(camera) * person->position;
     const double bearing_rad = std::atan2(there.y_m, there.x_m);
-    const double half_width_rad = std::asin(radius_m / far_m(person));
-    const double near_m = far_m(person) - radius_m;
+    const double half_width_rad = std::asin(person_radius_m / far_m(person));
+    const double near_m = far_m(person) - person_radius_m;
     const double feet_rad = std::atan2(-camera_height_m, near_m);
-    const double head_rad = std::atan2(height_m - camera_height_m, near_m);
-    // Trousers are darker than the clothes above.
-    const double belt_rad = std::atan2(0.55 * height_m - camera_height_m, near_m);
+    const double head_rad = std::atan2(person_height_m - camera_height_m, near_m);
+    // Trousers are darker than the upper clothes.
+    const double belt_rad = std::atan2(0.55 * person_height_m - camera_height_m, near_m);
     for (int c = 0; c < view.columns(); ++c) {
       if (std::abs(angle_difference(view.azimuth_rad(c), bearing_rad)) > half_width_rad) continue;
       for (int y = 0; y < view.rows(); ++y) {

@@ -12,9 +12,9 @@
 
 namespace panonav::simulation {
 
-/// People who walk about in a place: upright cylinders that go from one free position to another,
-/// the shortest way at a walking pace. Before the robot they stop; when it does not go away either,
-/// they choose another way. The same seed and the same robot give the same walks.
+/// People who walk about in a place: upright cylinders that walk between random free positions on
+/// shortest paths. They stop in front of the robot, and choose another path if it does not move
+/// away. The same seed and the same robot motion give the same walks.
 class People {
  public:
   /// Throws ContractError unless `count` >= 0.
@@ -22,19 +22,19 @@ class People {
 
   [[nodiscard]] std::size_t size() const noexcept { return people_.size(); }
   [[nodiscard]] Point2 position(std::size_t person) const { return people_.at(person).position; }
-  /// True if a person stands within `radius_m` of a position.
-  [[nodiscard]] bool touch(Point2 position, double radius_m) const;
-  /// Moves all people for a time while a robot stands somewhere.
-  void pass(double seconds, Point2 robot, double robot_radius_m);
-  /// Paints the visible people into the view of a camera `camera_height_m` above the floor. Changes
-  /// nothing if elevations are unknown.
+  /// True if a person is within `radius_m` of a position.
+  [[nodiscard]] bool has_person_within(Point2 position, double radius_m) const;
+  /// Moves all people for a time, during which the robot is at `robot`.
+  void advance(double seconds, Point2 robot, double robot_radius_m);
+  /// Draws the visible people into the view of a camera `camera_height_m` above the floor. Does
+  /// nothing if the elevations of the view are unknown.
   void paint(Panorama& view, const Pose2& camera, double camera_height_m) const;
 
  private:
   struct Person {
     Point2 position;
-    std::vector<Point2> way;  // the next point last
-    float brightness = 0.0F;  // of what is worn
+    std::vector<Point2> way;  // remaining way points, the next one last
+    float brightness = 0.0F;  // of the clothes
     double waited_s = 0.0;
   };
   void choose_path(Person& person);

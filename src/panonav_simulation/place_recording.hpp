@@ -17,17 +17,16 @@
 
 namespace panonav::simulation {
 
-/// A scene with its renderer, free space and camera. Shared by any number of runs on any number of
-/// threads.
+/// A scene with its renderer and free space, shared by any number of runs on any number of threads.
 struct SimulatedPlace {
   Scene scene;
-  std::shared_ptr<const FreeSpace> free_space;  ///< where the robot of the scene can be
+  std::shared_ptr<const FreeSpace> free_space;  ///< positions of the scene's robot
   std::shared_ptr<const Renderer> renderer;
 };
 
-/// Computes free space and light of a scene. `inside`: of free space in several components, a
-/// position in the component that is meant; empty: the largest. Throws ContractError as `FreeSpace`
-/// and `Renderer`.
+/// Computes free space and light of a scene. If the free space has several components, the one that
+/// contains `inside` is used; without `inside` the largest. Throws ContractError as `FreeSpace` and
+/// `Renderer`.
 [[nodiscard]] SimulatedPlace make_place(Scene scene, Executor& executor,
                                         std::optional<Point2> inside = std::nullopt);
 
@@ -36,8 +35,8 @@ struct PlacedView {
   Panorama panorama;
 };
 
-/// A simulated place as an experiment needs it: reference views on a grid, queries at random poses
-/// in between, and a camera for further views (`take_view`).
+/// A simulated place with reference views on a grid, queries at random poses, and the camera
+/// settings for further views (`take_view`).
 struct PlaceRecording : SimulatedPlace {
   std::uint64_t seed = 1;
   PanoramaRendering rendering;
@@ -45,43 +44,43 @@ struct PlaceRecording : SimulatedPlace {
   std::vector<PlacedView> references;
   std::vector<PlacedView> queries;
 
-  /// Returns the index of the reference view that is nearest in space.
+  /// Returns the index of the reference view nearest to `position`.
   [[nodiscard]] std::size_t nearest_reference(Point2 position) const;
 };
 
 struct PlaceRecordingOptions {
   std::string scene = "office";
-  std::uint64_t seed = 1;   ///< varies textures and furniture, and the noise
+  std::uint64_t seed = 1;   ///< of textures, furniture and noise
   double spacing_m = 0.25;  ///< of the reference grid
   int queries = 60;
   int rows = 80;
   int columns = 512;
 };
 
-/// Records references with heading 0 and queries at random headings, both with the sensor's noise.
+/// Records references with heading 0 and queries with random headings, both with sensor noise.
 [[nodiscard]] PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor);
-/// Records in a scene that the caller made or read; `options.scene` does not count. Throws
-/// ContractError when no place is free at this spacing.
+/// Records in a given scene; `options.scene` is ignored. Throws ContractError if no grid position
+/// is free at this spacing.
 [[nodiscard]] PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options,
                                           Executor& executor);
 
-/// Takes one more image in that place, at its camera height. The same pose, seed and sensor give
-/// the same bits; views may be taken from several threads.
+/// Takes one more view in the place, at its camera height. The same pose, seed and sensor give the
+/// same bits; may be called from several threads.
 [[nodiscard]] Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
                                  const SensorOptions& sensor = {});
-/// Takes it with another number of rows and columns over the same elevations.
+/// Takes a view with the rows, columns and elevations of `rendering`.
 [[nodiscard]] Panorama take_view(const PlaceRecording& place, const PanoramaRendering& rendering,
                                  const Pose2& pose, std::uint64_t seed,
                                  const SensorOptions& sensor = {});
 
-/// Takes the views at all these poses; view i is taken with `first_seed` + i.
+/// Takes a view at each pose; view i uses the seed `first_seed` + i.
 [[nodiscard]] std::vector<PlacedView> take_views(const PlaceRecording& place,
                                                  const PanoramaRendering& rendering,
                                                  const std::vector<Pose2>& poses,
                                                  std::uint64_t first_seed,
                                                  const SensorOptions& sensor, Executor& executor);
 
-/// Takes the queries again through another sensor.
+/// Takes all queries again with other sensor options.
 [[nodiscard]] std::vector<PlacedView> retake_queries(const PlaceRecording& place,
                                                      const SensorOptions& sensor,
                                                      std::uint64_t first_seed, Executor& executor);

@@ -11,7 +11,7 @@ namespace panonav::simulation {
 
 namespace {
 
-// Random streams of one recording.
+// Numbers of the random streams of one recording.
 constexpr std::uint64_t pose_stream = 0;
 constexpr std::uint64_t heading_stream = 1;
 
@@ -29,20 +29,22 @@ std::string format_point(Point2 p) {
 
 std::vector<Pose2> plan_tour(const Scene& scene, const FreeSpace& space,
                              std::span<const Point2> way_points, double spacing_m) {
-  std::vector<Point2> stations(way_points.begin(), way_points.end());
-  if (stations.empty() && !scene.tour.empty()) {
-    stations = scene.tour;
-    stations.push_back(stations.front());
+  std::vector<Point2> way_points_of_tour(way_points.begin(), way_points.end());
+  if (way_points_of_tour.empty() && !scene.tour.empty()) {
+    way_points_of_tour = scene.tour;
+    way_points_of_tour.push_back(way_points_of_tour.front());
   }
-  require(stations.size() >= 2, "waypoints of a tour", static_cast<double>(stations.size()),
-          ">= 2, or a scene that has a tour");
+  require(way_points_of_tour.size() >= 2, "waypoints of a tour",
+          static_cast<double>(way_points_of_tour.size()), ">= 2, or a scene that has a tour");
   std::vector<Pose2> line;
-  for (std::size_t i = 1; i < stations.size(); ++i) {
-    const auto way = space.is_free_between(stations[i - 1], stations[i])
-                         ? std::optional(std::vector<Point2>{stations[i - 1], stations[i]})
-                         : space.shortest_path(stations[i - 1], stations[i]);
+  for (std::size_t i = 1; i < way_points_of_tour.size(); ++i) {
+    const auto way =
+        space.is_free_between(way_points_of_tour[i - 1], way_points_of_tour[i])
+            ? std::optional(std::vector<Point2>{way_points_of_tour[i - 1], way_points_of_tour[i]})
+            : space.shortest_path(way_points_of_tour[i - 1], way_points_of_tour[i]);
     if (!way) {
-      const Point2 blocked = space.is_free(stations[i]) ? stations[i - 1] : stations[i];
+      const Point2 blocked =
+          space.is_free(way_points_of_tour[i]) ? way_points_of_tour[i - 1] : way_points_of_tour[i];
       throw ContractError("waypoint", format_point(blocked), "a free place of the scene");
     }
     for (const Point2 point : *way) line.push_back({point.x_m, point.y_m, 0.0});
@@ -91,7 +93,7 @@ void set_headings(std::vector<Pose2>& poses, const RecordingOptions& options, Ra
         poses[i].heading_rad = wrap_angle(random.uniform(-std::numbers::pi, std::numbers::pi));
         break;
       case RecordingHeading::path: {
-        // Along the chord between the neighbours on the path.
+        // Use the direction of the chord between the neighbours on the path.
         const std::size_t before = i == 0 ? 0 : i - 1;
         const std::size_t after = std::min(i + 1, where.size() - 1);
         if (distance(where[before].position(), where[after].position()) > 0.0) {
@@ -141,8 +143,9 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor) {
 
 Tilt sample_tilt(const FrameOptions& options, std::uint64_t seed) {
   Random random(seed, 1);
-  const double towards = random.uniform(-std::numbers::pi, std::numbers::pi);
-  return {options.tilt_rad * std::sin(towards), options.tilt_rad * std::cos(towards)};
+  const double tilt_direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+  return {options.tilt_rad * std::sin(tilt_direction_rad),
+          options.tilt_rad * std::cos(tilt_direction_rad)};
 }
 
 std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
@@ -159,7 +162,7 @@ std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& sp
   double stamp_s = 0.0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (i > 0) {
-      // Standing still still takes time: stamps ascend.
+      // Standing still also takes time, so that the stamps ascend.
       stamp_s += std::max(
           1e-3, distance(poses[i - 1].position(), poses[i].position()) / options.speed_m_s);
     }
@@ -191,10 +194,10 @@ Image take_picture(const Renderer& renderer, const Pose2& pose, const RecordingC
     return to_picture(take_panorama(renderer, pose, *rendering, options, sensor, seed, executor));
   }
   validate(options);
-  const auto& through = std::get<Camera>(camera);
-  return apply_sensor(renderer.render_image(make_viewpoint(pose, options, seed), through,
+  const auto& camera_model = std::get<Camera>(camera);
+  return apply_sensor(renderer.render_image(make_viewpoint(pose, options, seed), camera_model,
                                             options.rays_per_axis, executor),
-                      through, sensor, seed);
+                      camera_model, sensor, seed);
 }
 
 void record(const Renderer& renderer, std::span<const RecordedPose> poses,

@@ -20,91 +20,92 @@ namespace panonav::simulation {
 
 /// Poses at which a simulated robot takes its images.
 enum class RecordingPath {
-  grid,    ///< every free place of a grid, row by row
-  zigzag,  ///< the same, every second row backwards
-  tour,    ///< along the scene's round trip, or way points of the caller
+  grid,    ///< every free grid position, row by row
+  zigzag,  ///< as grid, every second row backwards
+  tour,    ///< along the scene's round trip or given way points
   walk,    ///< a random walk
   random,  ///< independent random poses
 };
 
-/// The robot's heading at each place.
+/// The robot's heading at each pose.
 enum class RecordingHeading {
   fixed,   ///< the same heading everywhere
-  path,    ///< the way it goes
-  random,  ///< any
+  path,    ///< along the path
+  random,  ///< uniform
 };
 
-/// Poses and times of the images of a robot.
+/// Path, headings and speed of the robot that records images.
 struct RecordingOptions {
-  RecordingPath path = RecordingPath::grid;            ///< from place to place
-  RecordingHeading heading = RecordingHeading::fixed;  ///< at each place
+  RecordingPath path = RecordingPath::grid;            ///< positions of the images
+  RecordingHeading heading = RecordingHeading::fixed;  ///< headings of the images
   double heading_rad = 0.0;                            ///< of fixed headings
   double spacing_m = 0.5;                              ///< of the grid, or along the path
-  int poses = 200;                                     ///< number of a walk or of random poses
-  double speed_m_s = 0.3;                              ///< gives the stamps
+  int poses = 200;                                     ///< number of poses of walk and random
+  double speed_m_s = 0.3;                              ///< determines the time stamps
 };
 void visit_options(RecordingOptions& options, OptionVisitor& visitor);
 
 /// True pose and odometry of one image of a recording.
 struct RecordedPose {
-  double stamp_s = 0.0;  ///< seconds, by way and speed; of a trajectory its own
-  Pose2 pose;            ///< where it truly is
-  Pose2 odometry;        ///< where its odometry says that it is, in the odometry frame
+  double stamp_s = 0.0;  ///< s; from distance and speed, or the trajectory's own
+  Pose2 pose;            ///< true pose
+  Pose2 odometry;        ///< pose by odometry, in the odometry frame
   friend bool operator==(const RecordedPose&, const RecordedPose&) = default;
 };
 
-/// Plans the poses of a recording, all of them free. `way_points` replace the scene's tour.
-/// Straight lines that are not free are replaced by the shortest free paths. The same seed gives
-/// the same poses. Throws OptionError; ContractError when no place is free at this spacing, a way
-/// point is not free, or a tour is requested where there is none.
+/// Plans the poses of a recording, all of them free. `way_points` replace the scene's tour. Where
+/// the straight line between way points is not free, the shortest free path replaces it. The same
+/// seed gives the same poses. Throws OptionError, and ContractError if no grid position is free at
+/// this spacing, a way point is not free, or a tour is requested in a scene without one.
 [[nodiscard]] std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
                                                        const RecordingOptions& options,
                                                        const OdometryNoise& odometry,
                                                        std::uint64_t seed,
                                                        std::span<const Point2> way_points = {});
 
-/// Turns each pose towards the next one, -pi .. pi; the last keeps the heading of the one before.
+/// Turns each pose towards the next one, -pi .. pi; the last pose gets the heading of the one
+/// before it.
 void face_path(std::vector<Pose2>& poses);
 
-/// Camera of the rendered image: an image through a camera, or the panoramic cylinder directly.
+/// Camera of a recording: a camera model, or a panorama that is rendered directly.
 using RecordingCamera = std::variant<PanoramaRendering, Camera>;
 
-/// Viewpoint and rays of each image of a recording.
+/// Viewpoint and ray density of each image of a recording.
 struct FrameOptions {
   double camera_height_m = 0.6;  ///< of the viewpoint above the floor, > 0
-  /// Tilt of the robot, in another random direction at each place.
+  /// Tilt of the robot in rad, in a new random direction for each image.
   double tilt_rad = 0.0;
-  int rays_per_axis = 2;  ///< for pictures through a camera
+  int rays_per_axis = 2;  ///< for images of a camera model
 };
 void visit_options(FrameOptions& options, OptionVisitor& visitor);
 
-/// Draws the tilt of the robot in the image of this seed.
+/// Draws the tilt of the robot in the image with this seed.
 [[nodiscard]] Tilt sample_tilt(const FrameOptions& options, std::uint64_t seed);
 
-/// Takes the image of the robot: a panorama for people (see `to_picture`), or the camera's
-/// image. The same options and seed give the same picture; give each frame its own seed.
-/// Throws OptionError, and ContractError as the renderer does.
+/// Takes the robot's image: by a camera model, or a panorama as an image (see `to_picture`). The
+/// same options and seed give the same image; use a different seed for each image. Throws
+/// OptionError, and ContractError as the renderer does.
 [[nodiscard]] Image take_picture(const Renderer& renderer, const Pose2& pose,
                                  const RecordingCamera& camera, const FrameOptions& options,
                                  const SensorOptions& sensor, std::uint64_t seed,
                                  Executor& executor);
 
-/// Takes the image as a panorama.
+/// Takes the robot's view as a panorama. Otherwise as `take_picture`.
 [[nodiscard]] Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
                                      const PanoramaRendering& rendering,
                                      const FrameOptions& options, const SensorOptions& sensor,
                                      std::uint64_t seed, Executor& executor);
 
-/// One image of a recording, valid during the call.
+/// One image of a recording, valid during the callback.
 struct RecordedFrame {
-  std::size_t number = 0;    ///< counted from 0
-  const RecordedPose& pose;  ///< belongs to the poses that `record` was given
-  Tilt tilt;                 ///< as it truly is
-  const Image& picture;      ///< as `take_picture` gives it; gone after the call
+  std::size_t number = 0;    ///< index from 0
+  const RecordedPose& pose;  ///< element of the poses passed to `record`
+  Tilt tilt;                 ///< true tilt of the robot
+  const Image& picture;      ///< as returned by `take_picture`
 };
 
-/// Takes all pictures in order and hands each to `frame`, so that only one is in memory. Frame i
-/// has the random stream (seed, i).
+/// Takes all images in order and passes each to `frame`, so that only one is in memory. Frame i
+/// uses the random stream (seed, i).
 void record(const Renderer& renderer, std::span<const RecordedPose> poses,
             const RecordingCamera& camera, const FrameOptions& options, const SensorOptions& sensor,
             std::uint64_t seed, Executor& executor,

@@ -23,22 +23,23 @@ constexpr float housing_brightness = 0.02F;
 constexpr float body_brightness = 0.05F;
 constexpr float lens_brightness = 0.01F;
 
-// Rotation and place of the robot in the scene, applied to many rays.
-class RayMaker {
+// Position and rotation of the robot in the scene, precomputed to create many rays.
+class RayFactory {
  public:
-  explicit RayMaker(const Viewpoint& viewpoint)
+  explicit RayFactory(const Viewpoint& viewpoint)
       : at_{viewpoint.pose.x_m, viewpoint.pose.y_m, viewpoint.height_m},
         x_(scene_from_robot(viewpoint, {1.0, 0.0, 0.0})),
         y_(scene_from_robot(viewpoint, {0.0, 1.0, 0.0})),
         z_(scene_from_robot(viewpoint, {0.0, 0.0, 1.0})) {}
 
   [[nodiscard]] Ray operator()(const Direction3& direction) const {
-    const Direction3 d = turned(direction.x, direction.y, direction.z);
+    const Direction3 d = rotate_to_scene(direction.x, direction.y, direction.z);
     return {to_floats(at_.x_m, at_.y_m, at_.z_m), to_floats(d.x, d.y, d.z)};
   }
   [[nodiscard]] Ray operator()(const Vector3& from_viewpoint, const Direction3& direction) const {
-    const Direction3 o = turned(from_viewpoint.x_m, from_viewpoint.y_m, from_viewpoint.z_m);
-    const Direction3 d = turned(direction.x, direction.y, direction.z);
+    const Direction3 o =
+        rotate_to_scene(from_viewpoint.x_m, from_viewpoint.y_m, from_viewpoint.z_m);
+    const Direction3 d = rotate_to_scene(direction.x, direction.y, direction.z);
     return {to_floats(at_.x_m + o.x, at_.y_m + o.y, at_.z_m + o.z), to_floats(d.x, d.y, d.z)};
   }
 
@@ -46,7 +47,7 @@ class RayMaker {
   static std::array<float, 3> to_floats(double x, double y, double z) {
     return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
   }
-  [[nodiscard]] Direction3 turned(double x, double y, double z) const {
+  [[nodiscard]] Direction3 rotate_to_scene(double x, double y, double z) const {
     return {x * x_.x + y * y_.x + z * z_.x, x * x_.y + y * y_.y + z * z_.y,
             x * x_.z + y * y_.z + z * z_.z};
   }
@@ -120,8 +121,8 @@ struct Renderer::Implementation {
                          triangle.normal[2] * ray.direction[2];
     if (material.textured()) {
       const auto& uv = triangle.uv;
-      // The pixel's mark on a slanted surface is an ellipse; the square root is a compromise
-      // between blur along its short axis and aliasing along the long one.
+      // The footprint of a pixel on a slanted surface is an ellipse; the square root is a
+      // compromise between blur along its short axis and aliasing along its long axis.
       const float slant = 1.0F / std::sqrt(std::max(std::fabs(facing), 0.02F));
       const float footprint = spread_rad * hit.distance_m * slant * triangle.texture_density;
       material.sample(w * uv[0][0] + hit.u * uv[1][0] + hit.v * uv[2][0],
@@ -136,7 +137,8 @@ struct Renderer::Implementation {
     for (int c = 0; c < channels; ++c) colour[c] *= factor;
   }
 
-  // Adds the colours of the rays, `rays_per_pixel` neighbouring rays to one pixel.
+  // Adds the colours of the rays to the pixels; each `rays_per_pixel` consecutive rays belong to
+  // one pixel.
   void shade(std::span<const Ray> rays, std::span<const RayHit> hits, float spread_rad,
              float weight, std::size_t rays_per_pixel, float* values) const {
     std::array<float, 3> colour{};
@@ -185,7 +187,7 @@ Direction3 scene_from_robot(const Viewpoint& viewpoint, const Direction3& in_rob
 
 namespace {
 
-// Returns the ray with a direction of unit length.
+// Returns a ray whose direction is normalised to unit length.
 Ray unit_ray(const Vector3& origin, const Direction3& direction) {
   if (!is_in_reach(origin)) {
     throw ContractError("origin", "not finite or too far", "coordinates of -1e9 .. 1e9 m");
@@ -230,7 +232,7 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
       (rendering.elevations.top_rad - rendering.elevations.bottom_rad) / rendering.rows;
   const auto spread_rad = static_cast<float>(std::sqrt(column_rad * row_rad) / n);
   const float weight = 1.0F / static_cast<float>(n * n);
-  // Directions in the plane for every ray of every line of a row: they are the same in all rows.
+  // Horizontal directions of all rays of a row of pixels, which are the same for every row.
   std::vector<std::array<double, 2>> azimuths(rays_per_row * static_cast<std::size_t>(n));
   for (int j = 0; j < n; ++j) {
     for (std::size_t ray = 0; ray < rays_per_row; ++ray) {
@@ -241,7 +243,7 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
                                                                     std::sin(azimuth)};
     }
   }
-  const RayMaker make_ray(viewpoint);
+  const RayFactory make_ray(viewpoint);
   const auto out = panorama.values();
   const auto draw_rows = [&](std::size_t begin, std::size_t end, std::size_t) {
     std::vector<Ray> rays(rays_per_row);
@@ -277,11 +279,12 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
 
 namespace {
 
-// Rays of the points of an image, through the lenses or the mirror.
+// Computes the rays through image points, by the lenses or the mirror.
 class CameraRays {
  public:
-  // Target of a pixel: a ray, or the camera's own body; neither outside the image circle.
-  struct Sight {
+  // Target of a pixel: a ray into the scene, or a part of the camera with this brightness. Both are
+  // nullopt outside the image circle.
+  struct PixelTarget {
     std::optional<Ray> ray;
     std::optional<float> body;
   };
@@ -297,7 +300,7 @@ class CameraRays {
     }
   }
 
-  [[nodiscard]] Sight look_at(const PixelPoint& point) const {
+  [[nodiscard]] PixelTarget find_pixel_target(const PixelPoint& point) const {
     if (mirror_) {
       const MirrorRay ray = mirror_->trace(point);
       if (ray.target == MirrorTarget::world) return {make_ray_(ray.origin, ray.direction), {}};
@@ -313,15 +316,15 @@ class CameraRays {
     return {make_ray_(viewpoints_[lens_at(camera_, point)], *direction), {}};
   }
 
-  // Returns the gain of a column.
+  // Returns the gain of the lens to which a column belongs.
   [[nodiscard]] float gain(std::size_t column) const {
     if (!dual_) return 1.0F;
     return static_cast<float>(
         dual_->lenses[lens_at(camera_, {static_cast<double>(column), 0.0})].gain);
   }
 
-  // Returns the angle between pixels, which varies little over an image: the one at two thirds of
-  // the rim, about the horizon, stands for all.
+  // Returns an approximate angle between neighbouring pixels for the whole image: it varies little;
+  // for a mirror that at two thirds of the rim, near the horizon.
   [[nodiscard]] double pixel_rad() const {
     const bool flat = std::holds_alternative<EquirectangularModel>(camera_.model);
     const double around_px = flat    ? camera_.image_size.width
@@ -333,7 +336,7 @@ class CameraRays {
  private:
   const Camera& camera_;
   const DualFisheyeModel* dual_;
-  RayMaker make_ray_;
+  RayFactory make_ray_;
   std::optional<HyperboloidalMirror> mirror_;
   std::array<Vector3, 2> viewpoints_{};  // of the lenses, in the robot's frame
 };
@@ -371,7 +374,7 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
       for (std::size_t i = 0; i < width * n; ++i) {
         const SubPixel at = sub_pixel(static_cast<int>(i % n), static_cast<int>(line % n), n);
         const std::size_t pixel = line / n * width + i / n;
-        const auto seen = camera_rays.look_at(
+        const auto seen = camera_rays.find_pixel_target(
             {static_cast<double>(i / n) + at.u, static_cast<double>(line / n) + at.v});
         if (seen.ray) {
           rays.push_back(*seen.ray);

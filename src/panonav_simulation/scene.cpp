@@ -76,8 +76,9 @@ void scale_light(Scene& scene, double factor) {
   for (DirectionalLight& light : scene.directional_lights) light.intensity *= f;
   for (float& channel : scene.background) channel *= f;
   for (Material& material : scene.materials) {
-    // A surface shows colour * (e + (1 - e) * light). Light is scaled already, so the two shares
-    // change: colour' e' = f colour e and colour' (1 - e') = colour (1 - e).
+    // A surface has the radiance colour * (e + (1 - e) * light). The light is scaled already, so
+    // colour and emission e change such that colour' e' = f colour e and colour' (1 - e') = colour
+    // (1 - e).
     const float scale = f * material.emission + 1.0F - material.emission;
     for (float& channel : material.colour) channel *= scale;
     material.emission *= f / scale;

@@ -10,7 +10,7 @@ namespace panonav::simulation {
 
 namespace {
 
-// Returns the distance of a point from an area; 0 inside.
+// Returns the distance of a point from an area; 0 if it is inside.
 bool is_inside(const FloorArea& area, Point2 centre, double margin_m) {
   return centre.x_m >= area.low.x_m + margin_m && centre.x_m <= area.high.x_m - margin_m &&
          centre.y_m >= area.low.y_m + margin_m && centre.y_m <= area.high.y_m - margin_m;
@@ -19,10 +19,10 @@ bool is_inside(const FloorArea& area, Point2 centre, double margin_m) {
 }  // namespace
 
 SceneBuilder::SceneBuilder(std::string name, const SceneVariation& variation)
-    : variation_(variation), random_(variation.seed, 11), moved_(variation.moved_seed, 12) {
+    : variation_(variation), random_(variation.seed, 11), moved_random_(variation.moved_seed, 12) {
   scene_.name = std::move(name);
-  palette_ = {tint(random_, 0.25, 0.7, 0.2), tint(random_, 0.3, 0.8, 0.12),
-              tint(random_, 0.08, 0.45, 0.35), tint(random_, 0.08, 0.35, 0.05)};
+  palette_ = {sample_colour(random_, 0.25, 0.7, 0.2), sample_colour(random_, 0.3, 0.8, 0.12),
+              sample_colour(random_, 0.08, 0.45, 0.35), sample_colour(random_, 0.08, 0.35, 0.05)};
 }
 
 int SceneBuilder::add_plain_material(Colour colour, float emission) {
@@ -127,7 +127,7 @@ void SceneBuilder::add_blob(const std::string& object, int material, Vector3 cen
     for (int i = 0; i <= blob_facets; ++i) {
       const double bump = std::max(0.3, random_.normal(1.0, roughness));
       if (i == 0) first = bump;
-      // The seam closes, and the poles are one point each.
+      // The last column equals the first, so that the seam closes; each pole is a single point.
       const double r = ring == 0 || ring == blob_rings ? 1.0 : i == blob_facets ? first : bump;
       const double angle = 2.0 * std::numbers::pi * i / blob_facets;
       mesh.vertices.push_back({centre.x_m + radii.x_m * r * std::cos(elevation) * std::cos(angle),
@@ -163,7 +163,7 @@ void SceneBuilder::add_on_wall(const std::string& object, int material, Point2 f
   const auto corner = [&](double along, double z) {
     return Vector3{from.x_m + ux * along - uy * before_m, from.y_m + uy * along + ux * before_m, z};
   };
-  // Seen from the left-hand side the wall runs from right to left.
+  // Viewed from its left-hand side, the wall runs from right to left.
   add_quadrilateral(object, material, corner(along_m + width_m, bottom_m),
                     corner(along_m, bottom_m), corner(along_m, top_m),
                     corner(along_m + width_m, top_m));
@@ -186,14 +186,15 @@ void SceneBuilder::add_ceiling(int material, Point2 low, Point2 high, double hei
 
 Footing SceneBuilder::place_movable(const Footing& planned, double radius_m,
                                     const FloorArea& room) {
-  // Numbers are drawn for every object, so that one object's luck does not change the next one's.
-  const bool moves = moved_.uniform() < variation_.moved_objects;
+  // Draw the same random numbers for every object, so that one object's motion does not change that
+  // of the next.
+  const bool moves = moved_random_.uniform() < variation_.moved_objects;
   Footing found = planned;
   bool placed = false;
   for (int attempt = 0; attempt < 40; ++attempt) {
-    const double angle = moved_.uniform(-std::numbers::pi, std::numbers::pi);
-    const double step = moved_.uniform(1.5, 4.0) * scene_.robot_radius_m;
-    const double turn = moved_.uniform(-0.6, 0.6);
+    const double angle = moved_random_.uniform(-std::numbers::pi, std::numbers::pi);
+    const double step = moved_random_.uniform(1.5, 4.0) * scene_.robot_radius_m;
+    const double turn = moved_random_.uniform(-0.6, 0.6);
     if (!moves || placed) continue;
     const Point2 centre{planned.centre.x_m + step * std::cos(angle),
                         planned.centre.y_m + step * std::sin(angle)};

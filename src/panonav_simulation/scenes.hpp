@@ -11,10 +11,10 @@ namespace panonav::simulation {
 
 /// Differences between two scenes of the same name. The same variation gives the same scene.
 struct SceneVariation {
-  std::uint64_t seed = 1;        ///< textures, furniture and its places
-  double moved_objects = 0.0;    ///< share of the movable objects that stand elsewhere, 0 .. 1
-  std::uint64_t moved_seed = 1;  ///< which objects moved, and where to
-  double light = 1.0;            ///< all lamps and the sky times this, > 0
+  std::uint64_t seed = 1;        ///< of textures and furniture
+  double moved_objects = 0.0;    ///< share of the movable objects that are moved, 0 .. 1
+  std::uint64_t moved_seed = 1;  ///< of the choice and motion of moved objects
+  double light = 1.0;            ///< factor of all lamps and the sky, > 0
   friend bool operator==(const SceneVariation&, const SceneVariation&) = default;
 };
 

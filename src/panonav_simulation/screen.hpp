@@ -5,8 +5,8 @@
 
 namespace panonav::simulation {
 
-/// Puts a screen onto the floor: thin, upright, its middle at `across`, at right angles to the
-/// heading there. Sizes > 0.
+/// Adds a thin upright screen on the floor, centred at `across` and perpendicular to its heading.
+/// Sizes > 0.
 void add_screen(Scene& scene, const Pose2& across, double width_m, double height_m);
 
 }  // namespace panonav::simulation

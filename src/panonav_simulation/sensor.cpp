@@ -17,10 +17,11 @@ namespace {
 
 constexpr double full_turn_rad = 2.0 * std::numbers::pi;
 
-// Streams of the seed, so that occluders stay where they are when the noise changes its length.
+// Random streams of the seed, separate so that occluders do not depend on the number of noise
+// values drawn.
 enum Stream : std::uint64_t { noise_stream = 31, occluder_stream = 32 };
 
-// Occluders around the robot, each of which hides a sector of azimuths from top to bottom.
+// Occluders around the robot, each hiding a sector of azimuths over the full height of the view.
 class Occluders {
  public:
   Occluders(const SensorOptions& options, std::uint64_t seed) {
@@ -30,7 +31,7 @@ class Occluders {
     const double sector = full_turn_rad / options.occluders;
     width_rad_ = options.occluded_fraction * sector;
     for (int i = 0; i < options.occluders; ++i) {
-      // One in each sector: they never overlap, so the hidden share is exact.
+      // One occluder per sector: they never overlap, so the hidden share is exact.
       Occluder occluder;
       occluder.start_rad =
           std::fmod(first + sector * i + random.uniform(0.0, sector - width_rad_), full_turn_rad);
@@ -39,8 +40,8 @@ class Occluders {
     }
   }
 
-  // Returns the brightness of an occluder; nullopt where the view is free. `height` runs from 0
-  // (bottom) to 1 (top of the view).
+  // Returns the brightness of the occluder at this azimuth; nullopt if there is none. `height` runs
+  // from 0 (bottom) to 1 (top of the view).
   [[nodiscard]] std::optional<float> at(double azimuth_rad, double height) const {
     for (const Occluder& occluder : occluders_) {
       const double within =
@@ -52,7 +53,7 @@ class Occluders {
     }
     return std::nullopt;
   }
-  [[nodiscard]] bool none() const noexcept { return occluders_.empty(); }
+  [[nodiscard]] bool empty() const noexcept { return occluders_.empty(); }
 
  private:
   struct Occluder {
@@ -63,10 +64,10 @@ class Occluders {
   std::vector<Occluder> occluders_;
 };
 
-// Converts light to a digital value in 0 .. 1.
-class Pixel {
+// Converts light to a noisy digital value in 0 .. 1.
+class PixelSensor {
  public:
-  Pixel(const SensorOptions& options, std::uint64_t seed)
+  PixelSensor(const SensorOptions& options, std::uint64_t seed)
       : options_(options), random_(seed, noise_stream) {}
 
   float value(double light) {
@@ -112,7 +113,7 @@ void visit_options(SensorOptions& options, OptionVisitor& visitor) {
 Panorama apply_sensor(Panorama view, const SensorOptions& options, std::uint64_t seed) {
   validate(options);
   const Occluders occluders(options, seed);
-  Pixel pixel(options, seed);
+  PixelSensor pixel(options, seed);
   for (int y = 0; y < view.rows(); ++y) {
     const double height = 1.0 - (y + 0.5) / view.rows();
     for (int c = 0; c < view.columns(); ++c) {
@@ -138,9 +139,9 @@ Image apply_sensor(const Radiance& view, const Camera& camera, const SensorOptio
   const ElevationBand band = visible_elevations(camera);
   const std::array<ImageCircle, 2> circles{image_circle(camera, 0),
                                            image_circle(camera, lens_count(camera) - 1)};
-  // Directions cost time: they are looked up only if something depends on them.
-  const bool directions = options.directional_light > 0.0 || !occluders.none();
-  Pixel pixel(options, seed);
+  // Compute the directions of pixels, which is slow, only if light or occluders depend on them.
+  const bool needs_directions = options.directional_light > 0.0 || !occluders.empty();
+  PixelSensor pixel(options, seed);
   Image image(view.width, view.height, view.channels);
   std::size_t i = 0;
   for (int v = 0; v < view.height; ++v) {
@@ -148,7 +149,7 @@ Image apply_sensor(const Radiance& view, const Camera& camera, const SensorOptio
       const PixelPoint point{u + 0.5, v + 0.5};
       double factor = 1.0;
       std::optional<float> hidden;
-      const auto direction = directions ? unproject(camera, point) : std::nullopt;
+      const auto direction = needs_directions ? unproject(camera, point) : std::nullopt;
       if (direction) {
         const double azimuth = direction->azimuth_rad();
         factor = light_factor(options, azimuth);

@@ -10,34 +10,32 @@
 
 namespace panonav::simulation {
 
-/// Faults of a camera and occluders in front of it. The defaults are those of a
-/// small 8-bit camera in a lit room. Light 1 at exposure 1 fills a pixel.
+/// Noise and lighting of a camera, and occluders in front of it. The defaults are those of a small
+/// 8-bit camera in a lit room. Light 1 at exposure 1 saturates a pixel.
 struct SensorOptions {
-  double exposure = 1.0;      ///< light collected, times that of a full exposure
-  double gain = 1.0;          ///< electronic amplification of signal and noise
-  double read_noise = 0.004;  ///< standard deviation of a dark pixel, share of full scale
-  double full_well =
-      10000.0;              ///< electrons of a full pixel; shot noise is the root of the electrons
-  double vignetting = 0.0;  ///< share of light lost at the mirror's rim; grows with radius squared
-  /// Light from one side: things in direction `light_azimuth_rad` are brighter by this share, those
-  /// opposite darker.
+  double exposure = 1.0;       ///< factor of the light collected
+  double gain = 1.0;           ///< electronic amplification of signal and noise
+  double read_noise = 0.004;   ///< standard deviation of a dark pixel / full scale
+  double full_well = 10000.0;  ///< electrons of a full pixel; fewer mean more shot noise
+  double vignetting = 0.0;     ///< share of light lost at the rim; as radius squared
+  /// One-sided light: things in direction `light_azimuth_rad` are brighter by this share, things on
+  /// the opposite side darker.
   double directional_light = 0.0;
   double light_azimuth_rad = 0.0;  ///< in the robot frame
-  double occluded_fraction = 0.0;  ///< share of all azimuths that people or things stand before
-  int occluders = 3;               ///< how many share it, equally wide, spread at random
-  bool eight_bit = true;           ///< values are multiples of 1/255; images always are
+  double occluded_fraction = 0.0;  ///< share of all azimuths hidden by people or things
+  int occluders = 3;               ///< number of these, equally wide, at random azimuths
+  bool eight_bit = true;           ///< round panoramas to multiples of 1/255; images always are
   friend bool operator==(const SensorOptions&, const SensorOptions&) = default;
 };
 void visit_options(SensorOptions& options, OptionVisitor& visitor);
 
-/// Returns the panorama of a camera with this sensor, for a rendered one. The same options and seed
-/// give the same noise and occluders. `vignetting` has no meaning without a mirror and is left out.
-/// Throws OptionError.
+/// Applies the sensor to a rendered panorama. The same options and seed give the same noise and
+/// occluders. `vignetting` is ignored, because it needs a mirror. Throws OptionError.
 [[nodiscard]] Panorama apply_sensor(Panorama view, const SensorOptions& options,
                                     std::uint64_t seed);
 
-/// Returns the image of a camera with this sensor, for one rendered through `camera`. Throws
-/// OptionError, and ContractError when the sizes differ.
+/// Applies the sensor to an image rendered through `camera`. Throws OptionError, and ContractError
+/// if the sizes differ.
 [[nodiscard]] Image apply_sensor(const Radiance& view, const Camera& camera,
                                  const SensorOptions& options, std::uint64_t seed);
 

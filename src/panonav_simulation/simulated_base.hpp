@@ -11,13 +11,13 @@
 
 namespace panonav::simulation {
 
-/// A robot base that drives as commanded until an obstacle blocks it, and the odometry of its
+/// A robot base that drives as commanded until an obstacle blocks it, with the odometry of its
 /// wheels.
 class SimulatedBase {
  public:
-  /// True if nothing stands on the straight line.
+  /// Returns true if the straight line is free of obstacles.
   using IsClear = std::function<bool(Point2 from, Point2 to)>;
-  /// The true motion.
+  /// The true motion of one command.
   struct Step {
     Pose2 moved;           ///< robot_old_from_robot_new
     bool stopped = false;  ///< by an obstacle
@@ -28,8 +28,8 @@ class SimulatedBase {
                 std::uint64_t seed)
       : is_clear_(std::move(is_clear)), odometry_(noise, seed), pose_(start) {}
 
-  /// Drives at constant velocity. Before an obstacle it turns, but does not move. Throws
-  /// ContractError unless the numbers are finite and the time is >= 0.
+  /// Drives at constant velocity for a time. If an obstacle blocks the path, the robot turns but
+  /// does not move. Throws ContractError unless the numbers are finite and the time is >= 0.
   Step drive(const Velocity& velocity, double duration_s) {
     for (const double speed : {velocity.forward_m_s, velocity.left_m_s, velocity.turn_rad_s}) {
       require(std::isfinite(speed), "velocity", speed, "finite numbers");
@@ -43,11 +43,11 @@ class SimulatedBase {
     pose_ = pose_ * step.moved;
     return step;
   }
-  /// Moves the robot there unknown to its odometry, as a person who carries it does.
+  /// Moves the robot to `pose` without its odometry noticing, as if a person carried it.
   void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
   /// Returns the true pose, in the frame of the start pose.
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
-  /// Returns odometry_from_robot as its wheels measure it, zero at the start.
+  /// Returns odometry_from_robot as measured by the wheels, identity at the start.
   [[nodiscard]] const Pose2& odometry() const noexcept { return odometry_.pose(); }
 
  private:

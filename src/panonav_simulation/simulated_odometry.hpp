@@ -10,8 +10,8 @@
 
 namespace panonav::simulation {
 
-/// The odometry of one run: an absolute pose in the odometry frame, which is the robot's frame at
-/// the start of the run. The scale errors are drawn once, at construction.
+/// The odometry of one run: a pose in the odometry frame, which is the robot's frame at the start.
+/// The scale errors are drawn once, at construction.
 class SimulatedOdometry {
  public:
   /// Throws OptionError.
@@ -21,10 +21,11 @@ class SimulatedOdometry {
     rotation_scale_ = random_.normal(1.0, noise_.rotation_scale_error);
   }
 
-  /// Measures a step that the robot truly made. Returns odometry_from_robot afterwards.
+  /// Adds the measurement of a true step `step`. Returns odometry_from_robot after it.
   Pose2 advance(const Pose2& step) {
     Pose2 measured = sample_step(step, noise_, random_);
-    // The chord turns with half the heading, as in sample_step, so that wheels still do not slip.
+    // The chord of the step turns by half the additional turn, as in sample_step, so that the
+    // wheels still do not slip.
     const double extra_turn = (rotation_scale_ - 1.0) * measured.heading_rad;
     const double half = noise_.drive == DriveKind::differential ? 0.5 * extra_turn : 0.0;
     const double c = translation_scale_ * std::cos(half);
@@ -34,7 +35,7 @@ class SimulatedOdometry {
     odometry_from_robot_ = odometry_from_robot_ * measured;
     return odometry_from_robot_;
   }
-  /// Returns odometry_from_robot: where the odometry believes the robot to be.
+  /// Returns odometry_from_robot, the pose by odometry.
   [[nodiscard]] const Pose2& pose() const noexcept { return odometry_from_robot_; }
 
  private:
@@ -45,7 +46,7 @@ class SimulatedOdometry {
   Pose2 odometry_from_robot_;
 };
 
-/// Simulates odometry along true poses: one reading for each pose, the first one zero. Throws
+/// Simulates odometry along true poses: one reading per pose, the first one the identity. Throws
 /// OptionError.
 [[nodiscard]] inline std::vector<Pose2> simulate_odometry(std::span<const Pose2> world_from_robot,
                                                           const OdometryNoise& noise,

@@ -11,13 +11,13 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr int feelers_each_side = 11;
+constexpr int directions_per_side = 11;
 
 Point2 point_ahead(const Pose2& pose, double direction_rad, double distance_m) {
   return pose * Point2{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
 }
 
-// Returns the length of the free part of the straight way, at most `distance_m`.
+// Returns the length of the free part of the straight line, measured from `from`.
 double free_length_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (space.is_free_between(from, to)) return distance(from, to);
   double low = 0.0;
@@ -63,14 +63,15 @@ bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from
   return true;
 }
 
-std::optional<OpenDirection> find_open_direction(double direct_rad, int feelers_each_side, int side,
+std::optional<OpenDirection> find_open_direction(double direct_rad, int directions_per_side,
+                                                 int side,
                                                  const std::function<bool(double)>& is_open) {
-  constexpr double apart_rad = std::numbers::pi / 12.0;
-  for (int i = 1; i <= feelers_each_side; ++i) {
-    for (const int tried : {1, -1}) {
-      if (side != 0 && tried != side) continue;
-      const double direction_rad = direct_rad + tried * i * apart_rad;
-      if (is_open(direction_rad)) return OpenDirection{direction_rad, tried};
+  constexpr double direction_step_rad = std::numbers::pi / 12.0;
+  for (int i = 1; i <= directions_per_side; ++i) {
+    for (const int tried_side : {1, -1}) {
+      if (side != 0 && tried_side != side) continue;
+      const double direction_rad = direct_rad + tried_side * i * direction_step_rad;
+      if (is_open(direction_rad)) return OpenDirection{direction_rad, tried_side};
     }
   }
   return std::nullopt;
@@ -91,23 +92,23 @@ bool SimulatedRobot::is_open(double direction_rad, double distance_m) const {
 
 std::optional<double> SimulatedRobot::find_free_direction(double direct_rad, double advance_m) {
   if (is_open(direct_rad, advance_m)) {
-    side_ = 0;
+    detour_side_ = 0;
     return direct_rad;
   }
   if (obstacles_ == ObstacleRule::stop) return std::nullopt;
-  const auto feel = [&] {
-    return find_open_direction(direct_rad, feelers_each_side, side_, [&](double direction_rad) {
-      return is_open(direction_rad, 0.5 * advance_m);
-    });
+  const auto find_on_preferred_side = [&] {
+    return find_open_direction(
+        direct_rad, directions_per_side, detour_side_,
+        [&](double direction_rad) { return is_open(direction_rad, 0.5 * advance_m); });
   };
-  auto aside = feel();
-  if (!aside && side_ != 0) {
-    side_ = -side_;
-    aside = feel();
+  auto free_direction = find_on_preferred_side();
+  if (!free_direction && detour_side_ != 0) {
+    detour_side_ = -detour_side_;
+    free_direction = find_on_preferred_side();
   }
-  if (!aside) return std::nullopt;
-  side_ = aside->side;
-  return aside->direction_rad;
+  if (!free_direction) return std::nullopt;
+  detour_side_ = free_direction->side;
+  return free_direction->direction_rad;
 }
 
 bool SimulatedRobot::go(double direction_rad, double advance_m) {
@@ -122,13 +123,13 @@ bool SimulatedRobot::go(double direction_rad, double advance_m) {
                                   advance_m * std::sin(direction_rad), 0.0},
                                  motion_, random_);
   }
-  const double way_m = distance(before.position(), after.position());
+  const double step_length_m = distance(before.position(), after.position());
   const double free_m = free_length_m(*space_, before.position(), after.position());
-  if (free_m >= way_m) {
+  if (free_m >= step_length_m) {
     pose_ = after;
     return true;
   }
-  const double share = free_m / way_m;
+  const double share = free_m / step_length_m;
   pose_ = {before.x_m + share * (after.x_m - before.x_m),
            before.y_m + share * (after.y_m - before.y_m), after.heading_rad};
   return false;

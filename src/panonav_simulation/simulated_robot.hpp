@@ -12,52 +12,51 @@
 
 namespace panonav::simulation {
 
-/// True if a robot touches nothing on the straight line, checked every `spacing_m` beyond `from`.
-/// Borders of drivable areas are no obstacles.
+/// True if a robot can drive the straight line without contact, checked at steps of at most
+/// `spacing_m` after `from`. Borders of drivable areas are not obstacles.
 [[nodiscard]] bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from,
                                     Point2 to, double spacing_m);
 
-/// Returns the distance from a place to the polyline through the poses; infinity for none.
+/// Returns the distance from a position to the polyline through the poses; infinity if there are no
+/// poses.
 [[nodiscard]] double distance_from_route_m(Point2 place, std::span<const Pose2> route);
 
-/// A direction on the left (1) or the right (-1) of the intended one.
+/// A direction that is open, and its side: left (1) or right (-1) of the intended direction.
 struct OpenDirection {
   double direction_rad = 0.0;
   int side = 0;
 };
-/// Finds the nearest open direction left and right of `direct_rad`, 15 degrees apart; on one side
-/// only, unless `side` is 0. Nullopt if none is open.
+/// Finds the open direction nearest to `direct_rad`, in steps of 15 degrees to the left and right;
+/// on one side only if `side` is not 0. nullopt if none is open.
 [[nodiscard]] std::optional<OpenDirection> find_open_direction(
-    double direct_rad, int feelers_each_side, int side,
+    double direct_rad, int directions_per_side, int side,
     const std::function<bool(double direction_rad)>& is_open);
 
-/// Behaviour of a robot in front of an obstacle.
+/// Behaviour of a robot at an obstacle.
 enum class ObstacleRule {
-  stop,  ///< it stops there, and the run ends
-  /// Drives past obstacles: with feelers as long as the step, it tries directions left and right of
-  /// the requested one, 15 degrees apart, up to 165 degrees off, nearest first, and takes the first
-  /// in which half a step is free. While the requested direction stays blocked it keeps to the side
-  /// that it has chosen, and changes the side where that one is blocked. If no direction is free,
-  /// it stops.
+  stop,  ///< it stops there, which ends the run
+  /// Drives around obstacles: tries directions left and right of the requested one, in steps of 15
+  /// degrees up to 165 degrees, and takes the nearest in which half a step is free. While the
+  /// requested direction stays blocked it keeps the chosen side; if that side is blocked too, it
+  /// tries the other one. If no direction is free, it stops.
   pass,
 };
 
-/// A robot base in a simulated place: executes commands with errors. Holds the true pose
-/// and the random stream of its errors.
+/// A robot in a simulated place that executes motion commands with errors. Holds the true pose and
+/// the random stream of its errors.
 class SimulatedRobot {
  public:
-  /// `space` must outlive the robot. Throws OptionError, and ContractError when `start` is not
-  /// free.
+  /// `space` must outlive the robot. Throws OptionError, and ContractError if `start` is not free.
   SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion, ObstacleRule obstacles,
                  const Pose2& start, std::uint64_t seed);
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
 
-  /// Finds the direction of a step of `advance_m` towards `direct_rad` past obstacles, in the robot
-  /// frame; nullopt if it is stopped. Remembers the side on which it passes.
+  /// Finds the direction, in the robot frame, in which a step of `advance_m` towards `direct_rad`
+  /// avoids obstacles; nullopt if the robot is stopped. Remembers the side of the detour.
   [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double advance_m);
 
-  /// Moves as far as nothing stands in the way. Returns true if that was the whole step.
+  /// Drives until an obstacle is reached. Returns true if the whole step was free.
   bool go(double direction_rad, double advance_m);
 
  private:
@@ -68,7 +67,7 @@ class SimulatedRobot {
   ObstacleRule obstacles_;
   Pose2 pose_;
   Random random_;
-  int side_ = 0;  // on which it goes past something: 1 left, -1 right
+  int detour_side_ = 0;  // side of the last detour: 1 left, -1 right, 0 none
 };
 
 }  // namespace panonav::simulation

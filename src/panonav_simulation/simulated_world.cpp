@@ -28,39 +28,40 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Refuses options that vary built-in scenes for a scene of a file, where they would be ignored.
+/// Rejects options that vary only built-in scenes if the scene is read from a file.
 void reject_variations_of_file(const std::string& file, const FindSetOption& find_set_option) {
   for (const char* name : {"scene_seed", "moved_objects", "moved_seed"}) {
-    if (const auto name_of_user = find_set_option("simulation", name)) {
-      throw OptionError(*name_of_user + " varies built-in scenes only; '" + file +
+    if (const auto option_name = find_set_option("simulation", name)) {
+      throw OptionError(*option_name + " varies built-in scenes only; '" + file +
                         "' is a file, leave it out");
     }
   }
 }
 
-/// Limits of the process that reads a world or a mesh.
-constexpr unsigned scene_seconds = 60;
-constexpr rlim_t scene_bytes = rlim_t{4} << 30U;
+/// Limits of the process that reads a world or a mesh: seconds of processor time, bytes of memory.
+constexpr unsigned max_read_seconds = 60;
+constexpr rlim_t max_read_bytes = rlim_t{4} << 30U;
 
-void limit_this_process() {
+void limit_process_resources() {
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
-  const rlimit seconds{scene_seconds, scene_seconds};
+  const rlimit seconds{max_read_seconds, max_read_seconds};
   setrlimit(RLIMIT_CPU, &seconds);
-  alarm(2 * scene_seconds);  // what only waits, too
+  alarm(2 * max_read_seconds);  // also ends a process that only waits
   rlim_t pages_now = 0;
   std::ifstream("/proc/self/statm") >> pages_now;
-  const rlim_t bytes = pages_now * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + scene_bytes;
+  const rlim_t bytes = pages_now * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + max_read_bytes;
   const rlimit memory{bytes, bytes};
   setrlimit(RLIMIT_AS, &memory);
 }
 
-/// Reads a file whose textures the argument reads; empty: surfaces get plain colours.
+/// Reads a scene file; the argument reads its textures. If it is empty, surfaces get plain colours.
 using ReadScene = std::function<Scene(const TextureReader&)>;
 
-/// Reads a scene and ends the process with exit code 0, or writes the message of an error.
-[[noreturn]] void read_and_exit(const ReadScene& read, int answer) {
-  limit_this_process();
+/// Reads a scene and exits with code 0; on an error writes its message to `message_pipe` and exits
+/// with 1.
+[[noreturn]] void read_and_exit(const ReadScene& read, int message_pipe) {
+  limit_process_resources();
   std::string message;
   try {
     (void)read({});
@@ -69,28 +70,29 @@ using ReadScene = std::function<Scene(const TextureReader&)>;
   } catch (const std::exception& error) {
     message = std::string("the reader of the format failed: ") + error.what();
   }
-  const ssize_t written = write(answer, message.data(), message.size());
+  const ssize_t written = write(message_pipe, message.data(), message.size());
   _exit(message.empty() || written < 0 ? 0 : 1);
 }
 
-/// The packaged readers of worlds and meshes crash on some damaged files and never end on others.
-/// Such a file ends a process of its own, and this one with a clear line. What can be read is read
-/// again here, with its textures. Between fork and _exit only this thread runs in the child; those
-/// of the executor wait for work and hold no lock.
-Scene read_safely(const std::string& file, const ReadScene& read) {
-  std::array<int, 2> answer{-1, -1};
-  if (pipe2(answer.data(), O_CLOEXEC) != 0) throw FileError(file, "cannot be read: no pipe left");
+/// Reads a scene file in a child process first, because the third-party readers of worlds and
+/// meshes crash on some damaged files and never return on others; this process then reports a clear
+/// error. A file that can be read is read again here, with its textures. Between fork and _exit
+/// only this thread runs in the child; the executor's threads wait for work and hold no lock.
+Scene read_in_child_first(const std::string& file, const ReadScene& read) {
+  std::array<int, 2> message_pipe{-1, -1};
+  if (pipe2(message_pipe.data(), O_CLOEXEC) != 0)
+    throw FileError(file, "cannot be read: no pipe left");
   const pid_t child = fork();
-  if (child == 0) read_and_exit(read, answer[1]);
-  close(answer[1]);
+  if (child == 0) read_and_exit(read, message_pipe[1]);
+  close(message_pipe[1]);
   std::string message;
   std::array<char, 4096> buffer{};
   ssize_t count = 0;
-  while ((count = ::read(answer[0], buffer.data(), buffer.size())) > 0 ||
+  while ((count = ::read(message_pipe[0], buffer.data(), buffer.size())) > 0 ||
          (count < 0 && errno == EINTR)) {
     if (count > 0) message.append(buffer.data(), static_cast<std::size_t>(count));
   }
-  close(answer[0]);
+  close(message_pipe[0]);
   if (child < 0) throw FileError(file, "cannot be read: the system starts no process");
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
@@ -101,7 +103,7 @@ Scene read_safely(const std::string& file, const ReadScene& read) {
   }
   const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
   if (signal == SIGXCPU || signal == SIGALRM || signal == SIGKILL) {
-    throw FileError(file, "takes more than " + std::to_string(scene_seconds) + " s to read");
+    throw FileError(file, "takes more than " + std::to_string(max_read_seconds) + " s to read");
   }
   throw FileError(file, "is damaged: the reader of its format crashes on it");
 }
@@ -127,13 +129,13 @@ Scene load_scene(const std::string& name, const SceneOptions& options,
   if (ending == ".world" || ending == ".sdf") {
     GazeboOptions gazebo;
     gazebo.model_folders = gazebo_model_folders_of_environment();
-    scene = read_safely(name, [&](const TextureReader& textures) {
+    scene = read_in_child_first(name, [&](const TextureReader& textures) {
       gazebo.textures.read = textures;
       return load_gazebo(name, gazebo);
     });
   } else {
     MeshOptions mesh;
-    scene = read_safely(name, [&](const TextureReader& textures) {
+    scene = read_in_child_first(name, [&](const TextureReader& textures) {
       mesh.textures.read = textures;
       return load_mesh(name, mesh);
     });
@@ -208,7 +210,7 @@ SimulatedWorld::SimulatedWorld(const std::string& scene, SimulatedWorldOptions o
   }
   if (!find_set_option("frame", "camera_height_m"))
     options_.frame.camera_height_m = scene_.camera_height_m;
-  // Options that the user did not set describe the robot that the scene is made for.
+  // Use the values of the robot for which the scene is made, unless the user set an option.
   const FreeSpaceOptions defaults =
       free_space_options(scene_.robot_radius_m, options_.frame.camera_height_m);
   FreeSpaceOptions& robot = options_.free_space;
@@ -245,12 +247,12 @@ RecordingCamera SimulatedWorld::camera() const {
 
 PictureSource SimulatedWorld::source() const {
   PictureSource source;
-  const auto seen_by = camera();
-  if (const auto* mirror = std::get_if<Camera>(&seen_by)) {
+  const auto chosen_camera = camera();
+  if (const auto* mirror = std::get_if<Camera>(&chosen_camera)) {
     source.kind = PictureKind::mirror;
     source.camera = *mirror;
   } else {
-    source.layout.elevations = std::get<PanoramaRendering>(seen_by).elevations;
+    source.layout.elevations = std::get<PanoramaRendering>(chosen_camera).elevations;
   }
   return source;
 }

@@ -44,7 +44,7 @@ std::vector<float> noise_field(Random& random, int width, int height, double exp
   double energy = 0.0;
   for (int cells = 2; cells <= std::max(width, height) / 2; cells *= 2) {
     const double amplitude = std::pow(static_cast<double>(cells), 0.5 * (2.0 - exponent) - 0.5);
-    energy += amplitude * amplitude * 0.4;  // interpolation takes part of a lattice's variance
+    energy += amplitude * amplitude * 0.4;  // interpolation reduces the variance of a lattice
     const LatticeNoise octave(random, std::min(cells, width), std::min(cells, height));
     for (int v = 0; v < height; ++v) {
       for (int u = 0; u < width; ++u) {
@@ -63,19 +63,21 @@ std::uint8_t to_byte(float value) {
   return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
 }
 
-void set(Image& image, int u, int v, Colour colour, float factor = 1.0F) {
+void set_pixel(Image& image, int u, int v, Colour colour, float factor = 1.0F) {
   for (int c = 0; c < 3; ++c) {
     image.at(u, v, c) = to_byte(colour[static_cast<std::size_t>(c)] * factor);
   }
 }
 
-void fill(Image& image, int u0, int v0, int u1, int v1, Colour colour) {
+void fill_rectangle(Image& image, int u0, int v0, int u1, int v1, Colour colour) {
   for (int v = std::max(0, v0); v < std::min(image.height(), v1); ++v) {
-    for (int u = std::max(0, u0); u < std::min(image.width(), u1); ++u) set(image, u, v, colour);
+    for (int u = std::max(0, u0); u < std::min(image.width(), u1); ++u)
+      set_pixel(image, u, v, colour);
   }
 }
 
-// Adds light and dirt over a finished picture, so that no surface is of one even colour.
+// Varies the brightness of a finished picture as light and dirt do, so that no surface has a
+// uniform colour.
 void add_weathering(Random& random, Image& image, double contrast) {
   const auto field = noise_field(random, image.width(), image.height(), 2.0);
   for (int v = 0; v < image.height(); ++v) {
@@ -91,7 +93,7 @@ void add_weathering(Random& random, Image& image, double contrast) {
 
 }  // namespace
 
-Colour tint(Random& random, double low, double high, double spread) {
+Colour sample_colour(Random& random, double low, double high, double spread) {
   const double level = random.uniform(low, high);
   Colour colour{};
   for (float& channel : colour) {
@@ -111,7 +113,8 @@ Image noise_texture(Random& random, int size, Colour base, double contrast, doub
   const auto field = noise_field(random, size, size, exponent);
   for (int v = 0; v < size; ++v) {
     for (int u = 0; u < size; ++u) {
-      set(image, u, v, base,
+      set_pixel(
+          image, u, v, base,
           1.0F + static_cast<float>(contrast) * field[static_cast<std::size_t>(v) * size + u]);
     }
   }
@@ -134,7 +137,7 @@ Image wood_texture(Random& random, int size, Colour base) {
       float factor = tone[static_cast<std::size_t>(board)] *
                      (1.0F + 0.10F * grain.at(s, t) + 0.06F * fine.at(s, t));
       if (within < 0.02) factor *= 0.5F;
-      set(image, u, v, base, factor);
+      set_pixel(image, u, v, base, factor);
     }
   }
   return image;
@@ -155,9 +158,9 @@ Image brick_texture(Random& random, int size, int columns, int rows, Colour bric
       const double fy = y - row;
       const bool is_joint = fx < 0.05 || fy < 0.08;
       if (is_joint) {
-        set(image, u, v, joint);
+        set_pixel(image, u, v, joint);
       } else {
-        set(image, u, v, brick, tone[static_cast<std::size_t>(row) * columns + column]);
+        set_pixel(image, u, v, brick, tone[static_cast<std::size_t>(row) * columns + column]);
       }
     }
   }
@@ -167,10 +170,10 @@ Image brick_texture(Random& random, int size, int columns, int rows, Colour bric
 
 Image bookshelf_texture(Random& random, int size, int boards) {
   Image image(size, size, 3);
-  // Most books of a shelf are of a series or an age: around one brightness.
+  // The books of a shelf have similar brightness, as if from one series.
   const double level = random.uniform(0.15, 0.65);
   const Colour board{0.45F, 0.35F, 0.25F};
-  fill(image, 0, 0, size, size, {0.12F, 0.10F, 0.09F});
+  fill_rectangle(image, 0, 0, size, size, {0.12F, 0.10F, 0.09F});
   const int height = size / boards;
   for (int b = 0; b < boards; ++b) {
     const int bottom = (b + 1) * height;
@@ -179,16 +182,17 @@ Image bookshelf_texture(Random& random, int size, int boards) {
       const int width = std::max(2, static_cast<int>(random.uniform(0.012, 0.07) * size));
       if (random.uniform() > 0.15) {
         const int top = bottom - static_cast<int>(height * random.uniform(0.55, 0.88));
-        fill(image, u, top, u + width - 1, bottom, tint(random, 0.6 * level, 1.4 * level, 0.3));
+        fill_rectangle(image, u, top, u + width - 1, bottom,
+                       sample_colour(random, 0.6 * level, 1.4 * level, 0.3));
         if (random.uniform() < 0.4) {
           const int label = top + height / 6;
-          fill(image, u + width / 4, label, u + 3 * width / 4, label + height / 8,
-               {0.9F, 0.9F, 0.85F});
+          fill_rectangle(image, u + width / 4, label, u + 3 * width / 4, label + height / 8,
+                         {0.9F, 0.9F, 0.85F});
         }
       }
       u += width;
     }
-    fill(image, 0, bottom - std::max(2, height / 16), size, bottom, board);
+    fill_rectangle(image, 0, bottom - std::max(2, height / 16), size, bottom, board);
   }
   add_weathering(random, image, 0.05);
   return image;
@@ -197,10 +201,10 @@ Image bookshelf_texture(Random& random, int size, int boards) {
 Image poster_texture(Random& random, int size) {
   Image image(size, size, 3);
   const double level = random.uniform(0.2, 0.75);
-  fill(image, 0, 0, size, size, tint(random, level, level, 0.3));
+  fill_rectangle(image, 0, 0, size, size, sample_colour(random, level, level, 0.3));
   const int shapes = 3 + static_cast<int>(random.index(5));
   for (int i = 0; i < shapes; ++i) {
-    const Colour colour = tint(random, 0.4 * level, 1.6 * level, 0.5);
+    const Colour colour = sample_colour(random, 0.4 * level, 1.6 * level, 0.5);
     const double cu = random.uniform(0.0, 1.0) * size;
     const double cv = random.uniform(0.0, 1.0) * size;
     const double ru = random.uniform(0.08, 0.35) * size;
@@ -211,17 +215,17 @@ Image poster_texture(Random& random, int size) {
            ++u) {
         const double x = (u - cu) / ru;
         const double y = (v - cv) / rv;
-        if (!ellipse || x * x + y * y <= 1.0) set(image, u, v, colour);
+        if (!ellipse || x * x + y * y <= 1.0) set_pixel(image, u, v, colour);
       }
     }
   }
   add_weathering(random, image, 0.06);
   const int frame = size / 24;
-  const Colour edge = tint(random, 0.05, 0.3, 0.2);
-  fill(image, 0, 0, size, frame, edge);
-  fill(image, 0, size - frame, size, size, edge);
-  fill(image, 0, 0, frame, size, edge);
-  fill(image, size - frame, 0, size, size, edge);
+  const Colour edge = sample_colour(random, 0.05, 0.3, 0.2);
+  fill_rectangle(image, 0, 0, size, frame, edge);
+  fill_rectangle(image, 0, size - frame, size, size, edge);
+  fill_rectangle(image, 0, 0, frame, size, edge);
+  fill_rectangle(image, size - frame, 0, size, size, edge);
   return image;
 }
 
@@ -233,35 +237,35 @@ Image window_texture(Random& random, int size) {
         size * std::clamp(0.7 + 0.08 * skyline[static_cast<std::size_t>(u)], 0.4, 0.95));
     for (int v = 0; v < size; ++v) {
       const float glow = 0.80F + 0.18F * static_cast<float>(v) / static_cast<float>(size);
-      set(image, u, v, v < horizon ? Colour{glow, glow, 1.0F} : Colour{0.25F, 0.32F, 0.22F});
+      set_pixel(image, u, v, v < horizon ? Colour{glow, glow, 1.0F} : Colour{0.25F, 0.32F, 0.22F});
     }
   }
   const int bar = std::max(2, size / 20);
   const Colour frame{0.85F, 0.85F, 0.82F};
   for (const int at : {0, size / 2 - bar / 2, size - bar}) {
-    fill(image, at, 0, at + bar, size, frame);
-    fill(image, 0, at, size, at + bar, frame);
+    fill_rectangle(image, at, 0, at + bar, size, frame);
+    fill_rectangle(image, 0, at, size, at + bar, frame);
   }
   return image;
 }
 
 Image door_texture(Random& random, int size, Colour base) {
   Image image(size, size, 3);
-  fill(image, 0, 0, size, size, base);
+  fill_rectangle(image, 0, 0, size, size, base);
   const Colour dark{base[0] * 0.6F, base[1] * 0.6F, base[2] * 0.6F};
   for (const double top : {0.08, 0.55}) {
     const int v0 = static_cast<int>(top * size);
     const int v1 = static_cast<int>((top + 0.38) * size);
-    fill(image, size / 6, v0, size - size / 6, v1, dark);
+    fill_rectangle(image, size / 6, v0, size - size / 6, v1, dark);
     const int inset = size / 24;
-    fill(image, size / 6 + inset, v0 + inset, size - size / 6 - inset, v1 - inset, base);
+    fill_rectangle(image, size / 6 + inset, v0 + inset, size - size / 6 - inset, v1 - inset, base);
   }
-  fill(image, size - size / 8, size / 2 - size / 50, size - size / 24, size / 2 + size / 50,
-       {0.85F, 0.82F, 0.7F});
+  fill_rectangle(image, size - size / 8, size / 2 - size / 50, size - size / 24,
+                 size / 2 + size / 50, {0.85F, 0.82F, 0.7F});
   const Colour gap{0.08F, 0.08F, 0.08F};
-  fill(image, 0, 0, size / 40, size, gap);
-  fill(image, size - size / 40, 0, size, size, gap);
-  fill(image, 0, 0, size, size / 80, gap);
+  fill_rectangle(image, 0, 0, size / 40, size, gap);
+  fill_rectangle(image, size - size / 40, 0, size, size, gap);
+  fill_rectangle(image, 0, 0, size, size / 80, gap);
   add_weathering(random, image, 0.04);
   return image;
 }
@@ -274,7 +278,7 @@ Image sky_texture(Random& random, int width, int height) {
   Image image(width, height, 3);
   const auto field = noise_field(random, width, height, 2.4);
   for (int v = 0; v < height; ++v) {
-    // v counts down from the zenith; the horizon is brightest.
+    // v counts down from the zenith to the horizon, which is brightest.
     const float down = static_cast<float>(v) / static_cast<float>(height);
     const Colour blue{0.40F + 0.35F * down, 0.55F + 0.27F * down, 0.85F + 0.08F * down};
     for (int u = 0; u < width; ++u) {
@@ -282,7 +286,7 @@ Image sky_texture(Random& random, int width, int height) {
           std::clamp(0.5F * field[static_cast<std::size_t>(v) * width + u] - 0.1F, 0.0F, 0.8F);
       Colour mixed{};
       for (std::size_t c = 0; c < 3; ++c) mixed[c] = (1.0F - cloud) * blue[c] + cloud * 0.97F;
-      set(image, u, v, mixed);
+      set_pixel(image, u, v, mixed);
     }
   }
   return image;

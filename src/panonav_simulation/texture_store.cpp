@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Slashes of our kind, no scheme.
+// Returns a path with forward slashes and without the scheme file://.
 std::string normalise_path(std::string_view written) {
   std::string path(written);
   if (path.rfind("file://", 0) == 0) path.erase(0, 7);
@@ -26,8 +26,8 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error);
 }
 
-// Finds a file of `folder` with this base name: the same ending first, then those that can be
-// decoded.
+// Finds a file in `folder` with this base name: preferably with the same extension, else with one
+// that can be decoded.
 std::optional<fs::path> find_in_folder(const fs::path& folder, const fs::path& name) {
   std::error_code error;
   std::vector<fs::path> entries;
@@ -37,7 +37,7 @@ std::optional<fs::path> find_in_folder(const fs::path& folder, const fs::path& n
       entries.push_back(it->path());
     }
   }
-  // The order of a directory differs between machines.
+  // Sort, because the order of a directory differs between machines.
   std::sort(entries.begin(), entries.end());
   const std::array<std::string, 4> endings{to_lower_case(name.extension().string()), ".png", ".jpg",
                                            ".jpeg"};
@@ -49,7 +49,7 @@ std::optional<fs::path> find_in_folder(const fs::path& folder, const fs::path& n
   return std::nullopt;
 }
 
-std::optional<fs::path> find_file(const std::string& path, const fs::path& directory) {
+std::optional<fs::path> find_texture_file(const std::string& path, const fs::path& directory) {
   const fs::path written(path);
   if (is_file(directory / written)) return directory / written;
   const fs::path name = written.filename();
@@ -73,7 +73,7 @@ Image halve(const Image& image) {
   Image half(width, height, image.channels());
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
-      // A side of 1 pixel has no second one.
+      // An image 1 pixel wide or high has no second column or row.
       const int right = std::min(2 * u + 1, image.width() - 1);
       const int below = std::min(2 * v + 1, image.height() - 1);
       for (int c = 0; c < image.channels(); ++c) {
@@ -96,9 +96,9 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
                                                 const fs::path& directory) {
   if (!options_.read || written.empty()) return nullptr;
   const std::string path = normalise_path(written);
-  const auto found = find_file(path, directory);
+  const auto found = find_texture_file(path, directory);
   if (!found) {
-    if (reported_missing_.emplace(path, true).second) {
+    if (reported_.emplace(path, true).second) {
       warnings_.push_back(directory.string() + ": texture \"" + path +
                           "\" was not found; a plain colour is shown instead");
     }
@@ -107,7 +107,7 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
   const std::string file_name = found->filename().string();
   const std::string name = fs::path(path).filename().string();
   if (file_name != name && to_lower_case(file_name) == to_lower_case(name) &&
-      reported_missing_.emplace(path, true).second) {
+      reported_.emplace(path, true).second) {
     warnings_.push_back(directory.string() + ": texture \"" + path +
                         "\" was not found; taken instead, with letters of other case: " +
                         found->lexically_normal().string());

@@ -32,19 +32,19 @@ std::vector<std::string> find_all_worlds(const std::filesystem::path& data) {
   return filter_available_worlds(data, {"small_warehouse", "small_house", "industrial_warehouse"});
 }
 
-Scene read_world(const std::filesystem::path& data, const std::string& name) {
+Scene read_gazebo_world(const std::filesystem::path& data, const std::string& name) {
   const std::filesystem::path folder = data / "scenes" / name / "worlds";
   std::filesystem::path world = folder / (name + ".world");
   std::error_code ignored;
   if (!std::filesystem::exists(world, ignored)) {
-    // A folder may hold one world of another name.
+    // The folder may contain one world of another name.
     for (const auto& file : std::filesystem::directory_iterator(folder, ignored)) {
       if (file.path().extension() == ".world") world = file.path();
     }
   }
-  GazeboOptions reading;
-  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
-  return load_gazebo(world, reading);
+  GazeboOptions gazebo_options;
+  gazebo_options.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
+  return load_gazebo(world, gazebo_options);
 }
 
 namespace {
@@ -62,7 +62,7 @@ bool has_scene(const std::filesystem::path& data, const std::string& name) {
 Scene make_or_read_scene(const std::filesystem::path& data, const std::string& name,
                          const SceneVariation& variation) {
   if (is_built_in(name)) return make_scene(name, variation);
-  Scene scene = read_world(data, name);
+  Scene scene = read_gazebo_world(data, name);
   if (variation.light != 1.0) scale_light(scene, variation.light);
   return scene;
 }

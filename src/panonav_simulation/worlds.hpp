@@ -10,19 +10,19 @@
 
 namespace panonav::simulation {
 
-/// True if the folder of recordings and Gazebo worlds (docs/formats.md) has this part.
+/// True if the folder of recordings and Gazebo worlds (docs/formats.md) contains the folder `part`.
 [[nodiscard]] bool has_data(const std::filesystem::path& data, const std::filesystem::path& part);
-/// Returns the Gazebo worlds of the experiments that exist.
+/// Returns the names of the available Gazebo worlds used for development.
 [[nodiscard]] std::vector<std::string> find_worlds(const std::filesystem::path& data);
-/// Returns those, and the worlds that were never used for development.
+/// Returns the names of all available Gazebo worlds, including those never used for development.
 [[nodiscard]] std::vector<std::string> find_all_worlds(const std::filesystem::path& data);
-/// Reads one of these. Throws FileError.
-[[nodiscard]] Scene read_world(const std::filesystem::path& data, const std::string& name);
+/// Reads the Gazebo world `name`. Throws FileError.
+[[nodiscard]] Scene read_gazebo_world(const std::filesystem::path& data, const std::string& name);
 
-/// True if the name is a built-in scene or an existing world.
+/// True if `name` is a built-in scene or an available world.
 [[nodiscard]] bool has_scene(const std::filesystem::path& data, const std::string& name);
-/// Returns the variation of a built-in scene; of a world, only its light is varied. Throws
-/// FileError.
+/// Makes a variation of a built-in scene, or reads a world, of which only the light is varied.
+/// Throws FileError.
 [[nodiscard]] Scene make_or_read_scene(const std::filesystem::path& data, const std::string& name,
                                        const SceneVariation& variation);
 

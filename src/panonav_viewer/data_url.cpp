@@ -4,7 +4,7 @@
 
 namespace panonav::viewer {
 
-std::string data_url(std::string_view type, std::span<const std::uint8_t> bytes) {
+std::string make_data_url(std::string_view type, std::span<const std::uint8_t> bytes) {
   constexpr std::string_view letters =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text = "data:" + std::string(type) + ";base64,";

@@ -23,7 +23,7 @@ Point2 offset_point(Point2 from, double direction_rad, double distance_m) {
           from.y_m + distance_m * std::sin(direction_rad)};
 }
 
-/// An arrow with its tail at `from`.
+/// Makes an arrow as a polyline with its tail at `from`.
 std::vector<Point2> make_arrow(Point2 from, double direction_rad, double length_m) {
   constexpr double barb_rad = std::numbers::pi - 0.5;
   const Point2 tip = offset_point(from, direction_rad, length_m);
@@ -31,7 +31,7 @@ std::vector<Point2> make_arrow(Point2 from, double direction_rad, double length_
           offset_point(tip, direction_rad - barb_rad, 0.4 * length_m)};
 }
 
-/// Each reference, and where it sends the robot.
+/// Makes layers of the references and of their directions to the goal.
 std::vector<MapLayer> make_field_layers(const simulation::RememberedPlace& remembered,
                                         const FieldOptions& options, ViewId goal) {
   constexpr double share_of_spacing = 0.55;
@@ -49,7 +49,8 @@ std::vector<MapLayer> make_field_layers(const simulation::RememberedPlace& remem
   return {arrows, references};
 }
 
-/// Over the references, from that which the robot was nearest to at first.
+/// Makes the layer of the path planned over the references, from the first known nearest reference
+/// to the goal.
 MapLayer make_planned_layer(const simulation::RememberedPlace& remembered,
                             const PlannerOptions& options, ViewId goal,
                             const simulation::MissionRun& run) {
@@ -78,15 +79,16 @@ MapLayer make_driven_layer(const simulation::MissionRun& run) {
 
 }  // namespace
 
-MapPlot mission_plot(const std::string& title, const simulation::MissionPlace& place,
-                     const simulation::RememberedPlace& remembered, const PlannerOptions& options,
-                     ViewId goal, const simulation::MissionRun& run) {
+MapPlot make_mission_plot(const std::string& title, const simulation::MissionPlace& place,
+                          const simulation::RememberedPlace& remembered,
+                          const PlannerOptions& options, ViewId goal,
+                          const simulation::MissionRun& run) {
   const std::vector<MapLayer> scene = scene_layers(place.scene);
   MapPlot plot{.title = title, .layers = {scene.front()}};
   for (MapLayer& layer : make_field_layers(remembered, options.field, goal)) {
     plot.layers.push_back(std::move(layer));
   }
-  plot.layers.push_back(scene.back());  // a screen stands among the references
+  plot.layers.push_back(scene.back());  // a screen may hide references, so it is drawn above
   plot.layers.push_back(make_planned_layer(remembered, options, goal, run));
   plot.layers.push_back(make_driven_layer(run));
   plot.layers.push_back(
@@ -109,7 +111,7 @@ void write_mission_picture(const std::filesystem::path& path, const std::string&
                            const simulation::RememberedPlace& remembered,
                            const PlannerOptions& options, ViewId goal,
                            const simulation::MissionRun& run) {
-  write_plot(path, mission_plot(title, place, remembered, options, goal, run));
+  write_plot(path, make_mission_plot(title, place, remembered, options, goal, run));
 }
 
 }  // namespace panonav::viewer

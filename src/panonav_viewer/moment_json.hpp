@@ -7,19 +7,22 @@
 
 #include "panonav_recordings/run_recorder.hpp"
 
-/// Writes the moments of a run as JSON for the page, live and in reports. Metres to 0.1 mm, radians
-/// to 1e-4.
+/// JSON of the moments of a run for the page, live and in reports. Metres are rounded to 0.1 mm,
+/// radians to 1e-4.
 namespace panonav::viewer {
 
-/// Returns a moment as JSON, without the members that stay. `number` counts moments from 0.
-[[nodiscard]] std::string moment_json(const recordings::RunMoment& moment, std::size_t number);
+/// Returns a moment as JSON, without its retained parts (see `retained_to_json`). `number` is the
+/// index of the moment.
+[[nodiscard]] std::string moment_to_json(const recordings::RunMoment& moment, std::size_t number);
 
 /// "references": [x, y, ...]; "names" and "headings" of these; "regions": [[area, x, y, ...], ...];
 /// "walls": [[x, y, ...], ...]; "edges": [x, y, x, y, kind, ...]; "plan" and "directions": [x, y,
-/// heading, ...]; "goal": [x, y, heading]: those of these that the moment replaces. Empty: none.
-[[nodiscard]] std::string retained_json(const recordings::RunMoment& moment);
+/// heading, ...]; "goal": [x, y, heading]: only the members that the moment replaces. Returns an
+/// empty text if there are none.
+[[nodiscard]] std::string retained_to_json(const recordings::RunMoment& moment);
 
-/// The newest of each part of a run that stays until it is replaced, and how often it was replaced.
+/// The newest version of each retained part of a run (shown until it is replaced), and the number
+/// of replacements.
 struct RetainedParts {
   recordings::RunMoment moment;
   std::size_t times = 0;
@@ -27,7 +30,7 @@ struct RetainedParts {
   void take(const recordings::RunMoment& from);
 };
 
-/// Part of a moment that the page keeps, for path and timeline.
+/// Values of a past moment that the page keeps for the path and the timeline.
 struct PastMoment {
   double stamp_s = 0.0;
   std::optional<Pose2> pose;
@@ -36,8 +39,8 @@ struct PastMoment {
   bool sure = false;
   std::string state;
 };
-/// Returns [[stamp, x, y, heading, probability, sure, state, true x, true y], ...], null for
-/// unknown values.
-[[nodiscard]] std::string past_json(const std::vector<PastMoment>& past);
+/// Returns [[stamp, x, y, heading, probability, sure, state, true x, true y], ...]; unknown values
+/// are null.
+[[nodiscard]] std::string past_to_json(const std::vector<PastMoment>& past);
 
 }  // namespace panonav::viewer

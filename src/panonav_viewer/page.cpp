@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Escapes the characters that an address with text must not contain.
+/// Escapes the characters that must not occur in a data URL.
 std::string encode_percent(std::string_view text) {
   std::string encoded;
   for (const char c : text) {
@@ -34,8 +34,8 @@ std::string encode_percent(std::string_view text) {
   return encoded;
 }
 
-/// Browsers load no module from a file next to a page that is itself a file. An import map gives
-/// each module an address that holds its text.
+/// Returns an import map that gives each module a data URL with its text, because browsers do not
+/// load modules from files next to a page that is itself a file.
 std::string import_map() {
   const std::array modules{
       std::pair{"store", web::store_js},       std::pair{"draw", web::draw_js},
@@ -56,19 +56,20 @@ std::string import_map() {
 }  // namespace
 
 std::string make_page(std::string_view title, std::string_view generator, std::string body) {
-  const std::string maker =
+  const std::string generator_element =
       generator.empty() ? std::string()
                         : "<meta name=\"generator\" content=\"" + escape_html(generator) + "\">\n";
-  const bool moving = body.find("<pn-") != std::string::npos;
-  const std::string imports =
-      moving ? "<script type=\"importmap\">" + import_map() + "</script>\n" : std::string();
+  const bool has_run_elements = body.find("<pn-") != std::string::npos;
+  const std::string imports = has_run_elements
+                                  ? "<script type=\"importmap\">" + import_map() + "</script>\n"
+                                  : std::string();
   constexpr std::string_view starting =
       "<script type=\"module\">import 'panonav/main';</script>\n<noscript><p>This page "
       "needs scripts to show runs and plots. Scripts are switched off in this "
       "browser.</p></noscript>\n";
-  const std::string_view scripts = moving ? starting : std::string_view();
+  const std::string_view scripts = has_run_elements ? starting : std::string_view();
   const std::array filled{std::pair{std::string_view("{{title}}"), escape_html(title)},
-                          std::pair{std::string_view("{{generator}}"), maker},
+                          std::pair{std::string_view("{{generator}}"), generator_element},
                           std::pair{std::string_view("{{style}}"), std::string(web::viewer_css)},
                           std::pair{std::string_view("{{imports}}"), imports},
                           std::pair{std::string_view("{{scripts}}"), std::string(scripts)},
@@ -126,11 +127,12 @@ std::string data_element(std::string_view json) {
   return safe + "</script>";
 }
 
-std::string live_page(std::string_view title, bool replay, std::string_view takes) {
+std::string live_page(std::string_view title, bool replay, std::string_view accepted_input) {
   return make_page(
       title, {},
       "<pn-run class=\"whole\" data-title=\"" + escape_html(title) + "\">" +
-          data_element(Json{{"live", "events"}, {"replay", replay}, {"takes", takes}}.dump()) +
+          data_element(
+              Json{{"live", "events"}, {"replay", replay}, {"takes", accepted_input}}.dump()) +
           "</pn-run>");
 }
 
@@ -139,20 +141,20 @@ RunPage::RunPage(std::string title, std::size_t moments)
 
 void RunPage::add(const recordings::RunMoment& moment) {
   const std::size_t number = moments_.size();
-  moments_.push_back(moment_json(moment, number));
+  moments_.push_back(moment_to_json(moment, number));
   pictures_.emplace_back();
   retained_.take(moment);
-  // Changes during the run are stored with their moment.
+  // Store changes of retained parts with the moment at which they occur.
   recordings::RunMoment changed;
   changed.plan = moment.plan;
   changed.directions = moment.directions;
   changed.goal = moment.goal;
-  if (const std::string changes = retained_json(changed); !changes.empty()) {
+  if (const std::string changes = retained_to_json(changed); !changes.empty()) {
     moments_.back().back() = ',';
     moments_.back() += "\"changes\":" + changes + "}";
   }
   if (number % every_ != 0) return;
-  if (number / every_ >= 600) {  // more came than were expected
+  if (number / every_ >= 600) {  // more moments came than were expected
     every_ *= 2;
     for (std::size_t i = 0; i < number; ++i) {
       if (i % every_ != 0) pictures_[i].clear();
@@ -162,11 +164,11 @@ void RunPage::add(const recordings::RunMoment& moment) {
   Json pictures = Json::object();
   if (moment.panorama) {
     const Image image = to_picture(*moment.panorama);
-    pictures["panorama"] = data_url("image/jpeg", encode_jpeg(image.view()));
+    pictures["panorama"] = make_data_url("image/jpeg", encode_jpeg(image.view()));
   }
   if (!moment.best_match.empty()) {
     const Image best = decode_image(moment.best_match, "best match", {.side_px = 4096});
-    pictures["best"] = data_url("image/jpeg", encode_jpeg(best.view()));
+    pictures["best"] = make_data_url("image/jpeg", encode_jpeg(best.view()));
   }
   pictures_.back() = pictures.dump();
 }
@@ -182,13 +184,13 @@ void RunPage::route(const PicturePlot& panorama, const std::vector<RouteMark>& m
     all.push_back({mark.along_m ? Json(*mark.along_m) : Json(),
                    mark.true_along_m ? Json(*mark.true_along_m) : Json(), std::move(changed)});
   }
-  route_ = plot_json(panorama);
+  route_ = plot_to_json(panorama);
   route_.back() = ',';
   route_ += "\"marks\":" + all.dump() + "}";
 }
 
 std::string RunPage::json() const {
-  const std::string retained = retained_json(retained_.moment);
+  const std::string retained = retained_to_json(retained_.moment);
   std::string all = "{\"moments\":[";
   for (std::size_t i = 0; i < moments_.size(); ++i) {
     if (i > 0) all += ",\n";

@@ -19,11 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double bar_width = 0.6;  ///< of all bars at one x, in units of x
+constexpr double bar_width = 0.6;  ///< total width of all bars at one x, in units of x
 constexpr double bar_opacity = 0.7;
 constexpr double polygon_opacity = 0.45;
 
-/// A rectangle around everything that is drawn.
+/// A rectangle that contains everything drawn.
 struct Bounds {
   Point2 low{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   Point2 high{-low.x_m, -low.y_m};
@@ -48,23 +48,24 @@ struct Bounds {
   }
   [[nodiscard]] double width() const { return high.x_m - low.x_m; }
   [[nodiscard]] double height() const { return high.y_m - low.y_m; }
-  /// Adds a margin; then it is no wider than 5 times and no higher than 1.2 times the other side.
+  /// Adds a margin and extends the shorter side, so that the rectangle is at most 5 times as wide
+  /// as high, and at most 1.2 times as high as wide.
   void add_margin() {
     if (!(low.x_m <= high.x_m)) low = high = {};
     const double side = std::max({width(), height(), 1e-6 * std::abs(low.x_m), 1e-9});
-    grow(0.03 * side, 0.03 * side);
-    grow(std::max(0.0, 0.5 * (height() / 1.2 - width())), 0.0);
-    grow(0.0, std::max(0.0, 0.5 * (0.2 * width() - height())));
+    extend(0.03 * side, 0.03 * side);
+    extend(std::max(0.0, 0.5 * (height() / 1.2 - width())), 0.0);
+    extend(0.0, std::max(0.0, 0.5 * (0.2 * width() - height())));
   }
 
  private:
-  void grow(double x, double y) {
+  void extend(double x, double y) {
     low = {low.x_m - x, low.y_m - y};
     high = {high.x_m + x, high.y_m + y};
   }
 };
 
-/// Sets axes of one scale, as wide as the box, and the height of the box.
+/// Sets both axes to the same scale, by the width of the box, and computes the height of the box.
 void set_equal_scale(PlotArea& area, const Bounds& bounds) {
   const double px = area.box.width / bounds.width();
   area.box.height = std::round(px * bounds.height());
@@ -92,12 +93,13 @@ bool has_bars(const LinePlot& plot) {
   return std::ranges::find(plot.series, SeriesStyle::bars, &Series::style) != plot.series.end();
 }
 
-/// `values`: what the axis is to show unless there is a range.
+/// Makes an axis that shows `range`; without a range it shows all `values`, and zero if
+/// `with_zero`.
 PlotAxis make_axis(const std::string& label, bool is_log,
                    const std::optional<std::pair<double, double>>& range,
                    std::span<const double> values, bool with_zero) {
   PlotAxis axis{.label = label, .is_log = is_log};
-  axis.fit(values, with_zero);
+  axis.set_range_to_fit(values, with_zero);
   if (!range) return axis;
   require(!is_log || (range->first > 0.0 && range->second > 0.0), "range of a logarithmic axis",
           range->first, "> 0");
@@ -125,7 +127,7 @@ PlotAxis make_x_axis(const LinePlot& plot) {
   if (plot.series.empty()) return axis;
   const auto& places = plot.series.front().x;
   for (std::size_t i = 0; i < std::min(plot.x_tick_labels.size(), places.size()); ++i) {
-    axis.names.emplace_back(places[i], plot.x_tick_labels[i]);
+    axis.tick_texts.emplace_back(places[i], plot.x_tick_labels[i]);
   }
   return axis;
 }
@@ -140,7 +142,7 @@ PlotAxis make_y_axis(const LinePlot& plot) {
   return make_axis(plot.y_label, plot.log_y, plot.y_range, values, has_bars(plot));
 }
 
-/// Draws the bars of series `number`; those of several series are side by side.
+/// Draws the bars of series `number`; bars of several series are next to each other.
 void draw_bars(SvgDrawing& drawing, const PlotArea& area, const LinePlot& plot, std::size_t number,
                PlotColour colour) {
   const Series& series = plot.series[number];
@@ -176,10 +178,10 @@ void draw_error_bars(SvgDrawing& drawing, const PlotArea& area, const Series& se
 /// Draws one series and adds it to the legend.
 void draw_series(SvgDrawing& drawing, Legend& legend, const PlotArea& area, const LinePlot& plot,
                  std::size_t number) {
-  constexpr std::size_t series_colours = 7;  // the first ones, up to black
+  constexpr std::size_t series_colour_count = 7;  // the first PlotColours, blue to black
   const Series& series = plot.series[number];
   if (series.x.empty()) return;
-  LegendSymbol symbol{.colour = static_cast<PlotColour>(number % series_colours)};
+  LegendSymbol symbol{.colour = static_cast<PlotColour>(number % series_colour_count)};
   if (series.style == SeriesStyle::bars) {
     draw_bars(drawing, area, plot, number, symbol.colour);
     const double width = bar_width / static_cast<double>(plot.series.size());
@@ -191,7 +193,7 @@ void draw_series(SvgDrawing& drawing, Legend& legend, const PlotArea& area, cons
     return;
   }
   if (series.style != SeriesStyle::points) {
-    symbol.line = LineStyle{.dashes = static_cast<int>(number / series_colours)};
+    symbol.line = LineStyle{.dashes = static_cast<int>(number / series_colour_count)};
   }
   if (series.style != SeriesStyle::lines) symbol.mark = MarkStyle{};
   std::vector<Point2> points;
@@ -204,9 +206,9 @@ void draw_series(SvgDrawing& drawing, Legend& legend, const PlotArea& area, cons
   legend.add(series.label, symbol);
 }
 
-/// Returns the colour of the viewer (plan.js): from black over blue and green to yellow, rising in
-/// lightness. `share`: 0 .. 1.
-std::array<std::uint8_t, 3> choose_colour(double share) {
+/// Returns the viewer's colour (plan.js) for a value, from black over blue and green to yellow with
+/// rising lightness. `share` is 0 .. 1.
+std::array<std::uint8_t, 3> interpolate_colour(double share) {
   constexpr std::array<std::array<double, 3>, 6> stops{{{0, 34, 78},
                                                         {53, 69, 108},
                                                         {102, 105, 112},
@@ -223,13 +225,13 @@ std::array<std::uint8_t, 3> choose_colour(double share) {
   return colour;
 }
 
-/// Cells as pixels, the highest row first; white where there is no value.
+/// Returns the cells as pixels, highest row first; NaN cells are white.
 Image paint_cells(const HeatMap& plot, double low, double high) {
   Image image(plot.columns, plot.rows, 3);
   for (int row = 0; row < plot.rows; ++row) {
     for (int column = 0; column < plot.columns; ++column) {
       const double value = plot.values[static_cast<std::size_t>(row) * plot.columns + column];
-      const auto colour = std::isfinite(value) ? choose_colour((value - low) / (high - low))
+      const auto colour = std::isfinite(value) ? interpolate_colour((value - low) / (high - low))
                                                : std::array<std::uint8_t, 3>{255, 255, 255};
       for (int i = 0; i < 3; ++i) {
         image.at(column, plot.rows - 1 - row, i) = colour[static_cast<std::size_t>(i)];
@@ -244,36 +246,36 @@ void draw_colour_bar(SvgDrawing& drawing, const SvgBox& box, const PlotAxis& axi
   constexpr double tick_px = 34.0;
   Image gradient(1, steps, 3);
   for (int v = 0; v < steps; ++v) {
-    const auto colour = choose_colour(1.0 - (v + 0.5) / steps);
+    const auto colour = interpolate_colour(1.0 - (v + 0.5) / steps);
     for (int i = 0; i < 3; ++i) gradient.at(0, v, i) = colour[static_cast<std::size_t>(i)];
   }
   drawing.add_image(box, gradient.view());
   drawing.add_frame(box, PlotColour::dark_grey);
   for (const double tick : axis.ticks(box.height / tick_px)) {
-    drawing.add_text({box.right() + 5.0, box.bottom() - axis.share_of(tick) * box.height + 4.0},
+    drawing.add_text({box.right() + 5.0, box.bottom() - axis.fraction_of(tick) * box.height + 4.0},
                      format_number(tick));
   }
   drawing.add_text({box.right() + 62.0, box.top + 0.5 * box.height}, axis.label,
                    {.anchor = "middle", .rotation_deg = -90.0});
 }
 
-/// Draws a layer; only its first kind of mark has the label.
+/// Draws a layer; in the legend, only its first kind of mark has the label.
 void draw_layer(SvgDrawing& drawing, Legend& legend, const PlotArea& area, const MapLayer& layer) {
   std::string label = layer.label;
-  const auto explain = [&](LegendSymbol symbol) {
+  const auto add_to_legend = [&](LegendSymbol symbol) {
     symbol.colour = layer.colour;
     legend.add(std::exchange(label, std::string()), symbol);
   };
   for (const auto& polygon : layer.filled_polygons) {
     drawing.add_polygon(area.to_px(polygon), layer.colour, polygon_opacity);
   }
-  if (!layer.filled_polygons.empty()) explain({.area_opacity = polygon_opacity});
+  if (!layer.filled_polygons.empty()) add_to_legend({.area_opacity = polygon_opacity});
   for (const auto& line : layer.lines) drawing.add_path(area.to_px(line), layer.colour);
-  if (!layer.lines.empty()) explain({.line = LineStyle{}});
+  if (!layer.lines.empty()) add_to_legend({.line = LineStyle{}});
   const auto draw_marks = [&](const std::vector<Point2>& points, const MarkStyle& style) {
     if (points.empty()) return;
     drawing.add_marks(area.to_px(points), layer.colour, style);
-    explain({.mark = style});
+    add_to_legend({.mark = style});
   };
   draw_marks(layer.dots, {.radius = 1.6});
   draw_marks(layer.circles, {.shape = MarkShape::ring, .line_width = 1.0});
@@ -283,7 +285,7 @@ void draw_layer(SvgDrawing& drawing, Legend& legend, const PlotArea& area, const
 
 }  // namespace
 
-std::string_view hex(PlotColour colour) {
+std::string_view to_css_colour(PlotColour colour) {
   constexpr std::array<std::string_view, 12> colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                      "#e69f00", "#56b4e9", "#000000", "#f0e442",
                                                      "#555555", "#8c8c8c", "#c4c4c4", "#e4e4e4"};

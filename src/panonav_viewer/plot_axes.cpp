@@ -10,10 +10,10 @@ namespace panonav::viewer {
 
 namespace {
 
-constexpr double x_tick_px = 60.0;  ///< least distance between marks
+constexpr double x_tick_px = 60.0;  ///< smallest distance between tick marks
 constexpr double y_tick_px = 34.0;
-constexpr double turned_deg = -40.0;  ///< of names that would overlap
-constexpr double min_turned_px = 16.0;
+constexpr double rotated_name_deg = -40.0;  ///< rotation of names that would overlap
+constexpr double min_rotated_name_distance_px = 16.0;
 constexpr double legend_row_px = 18.0;
 constexpr double symbol_px = 24.0;
 
@@ -43,7 +43,7 @@ std::vector<double> find_log_ticks(double low, double high) {
 
 }  // namespace
 
-double PlotAxis::share_of(double value) const {
+double PlotAxis::fraction_of(double value) const {
   if (!is_log) return (value - from) / (to - from);
   if (!(value > 0.0)) return std::numeric_limits<double>::quiet_NaN();
   return std::log(value / from) / std::log(to / from);
@@ -62,7 +62,7 @@ std::vector<double> PlotAxis::ticks(double max_count) const {
   return found;
 }
 
-void PlotAxis::fit(std::span<const double> values, bool with_zero) {
+void PlotAxis::set_range_to_fit(std::span<const double> values, bool with_zero) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const double value : values) {
@@ -96,8 +96,8 @@ void PlotAxis::fit(std::span<const double> values, bool with_zero) {
 }
 
 Point2 PlotArea::to_px(double x_value, double y_value) const {
-  return {box.left + x.share_of(x_value) * box.width,
-          box.bottom() - y.share_of(y_value) * box.height};
+  return {box.left + x.fraction_of(x_value) * box.width,
+          box.bottom() - y.fraction_of(y_value) * box.height};
 }
 
 std::vector<Point2> PlotArea::to_px(std::span<const Point2> points) const {
@@ -107,30 +107,32 @@ std::vector<Point2> PlotArea::to_px(std::span<const Point2> points) const {
   return all;
 }
 
-bool PlotArea::has_turned_names() const {
-  const double room = box.width / static_cast<double>(x.names.size());
-  return std::ranges::any_of(
-      x.names, [room](const auto& name) { return estimate_text_width(name.second) + 6.0 > room; });
+bool PlotArea::has_rotated_names() const {
+  const double room = box.width / static_cast<double>(x.tick_texts.size());
+  return std::ranges::any_of(x.tick_texts, [room](const auto& name) {
+    return estimate_text_width(name.second) + 6.0 > room;
+  });
 }
 
 double PlotArea::extra_margin_px() const {
-  if (!has_turned_names()) return 0.0;
+  if (!has_rotated_names()) return 0.0;
   double longest = 0.0;
-  for (const auto& [at, name] : x.names) longest = std::max(longest, estimate_text_width(name));
+  for (const auto& [at, name] : x.tick_texts)
+    longest = std::max(longest, estimate_text_width(name));
   return 0.65 * longest;  // sin(40 deg)
 }
 
 void PlotArea::draw_grid(SvgDrawing& drawing) const {
   const LineStyle thin{.width = 1.0};
-  if (x.names.empty()) {
+  if (x.tick_texts.empty()) {
     for (const double tick : x.ticks(box.width / x_tick_px)) {
-      const double at = box.left + x.share_of(tick) * box.width;
+      const double at = box.left + x.fraction_of(tick) * box.width;
       drawing.add_path(std::vector<Point2>{{at, box.top}, {at, box.bottom()}},
                        PlotColour::pale_grey, thin);
     }
   }
   for (const double tick : y.ticks(box.height / y_tick_px)) {
-    const double at = box.bottom() - y.share_of(tick) * box.height;
+    const double at = box.bottom() - y.fraction_of(tick) * box.height;
     drawing.add_path(std::vector<Point2>{{box.left, at}, {box.right(), at}}, PlotColour::pale_grey,
                      thin);
   }
@@ -138,16 +140,16 @@ void PlotArea::draw_grid(SvgDrawing& drawing) const {
 
 void PlotArea::draw_axes(SvgDrawing& drawing, const std::string& title) const {
   drawing.add_frame(box, PlotColour::dark_grey);
-  if (x.names.empty()) {
+  if (x.tick_texts.empty()) {
     for (const double tick : x.ticks(box.width / x_tick_px)) {
-      drawing.add_text({box.left + x.share_of(tick) * box.width, box.bottom() + 16.0},
+      drawing.add_text({box.left + x.fraction_of(tick) * box.width, box.bottom() + 16.0},
                        format_number(tick), {.anchor = "middle"});
     }
   } else {
     draw_names(drawing);
   }
   for (const double tick : y.ticks(box.height / y_tick_px)) {
-    drawing.add_text({box.left - 6.0, box.bottom() - y.share_of(tick) * box.height + 4.0},
+    drawing.add_text({box.left - 6.0, box.bottom() - y.fraction_of(tick) * box.height + 4.0},
                      format_number(tick), {.anchor = "end"});
   }
   const double middle = box.left + 0.5 * box.width;
@@ -155,21 +157,21 @@ void PlotArea::draw_axes(SvgDrawing& drawing, const std::string& title) const {
                    {.anchor = "middle"});
   drawing.add_text({box.left - left_margin_px + 16.0, box.top + 0.5 * box.height}, y.label,
                    {.anchor = "middle", .rotation_deg = -90.0});
-  // Smaller where it would be wider than its plot.
+  // Use a smaller font if the title would be wider than the plot.
   const double size = std::clamp(12.0 * box.width / (1.0 + estimate_text_width(title)), 8.0, 12.0);
   drawing.add_text({middle, box.top - 10.0}, title, {.anchor = "middle", .size = size});
 }
 
 void PlotArea::draw_names(SvgDrawing& drawing) const {
   constexpr std::size_t max_characters = 47;
-  const bool is_turned = has_turned_names();
-  // Only every n-th name if even rotated ones are too wide.
-  const auto every = static_cast<std::size_t>(1.0 + static_cast<double>(x.names.size()) *
-                                                        min_turned_px / box.width);
-  for (std::size_t i = 0; i < x.names.size(); i += every) {
-    const auto& [value, name] = x.names[i];
-    const double at = box.left + x.share_of(value) * box.width;
-    const TextStyle style = is_turned ? TextStyle{.anchor = "end", .rotation_deg = turned_deg}
+  const bool is_turned = has_rotated_names();
+  // Draw only every n-th name if even rotated names would overlap.
+  const auto every = static_cast<std::size_t>(1.0 + static_cast<double>(x.tick_texts.size()) *
+                                                        min_rotated_name_distance_px / box.width);
+  for (std::size_t i = 0; i < x.tick_texts.size(); i += every) {
+    const auto& [value, name] = x.tick_texts[i];
+    const double at = box.left + x.fraction_of(value) * box.width;
+    const TextStyle style = is_turned ? TextStyle{.anchor = "end", .rotation_deg = rotated_name_deg}
                                       : TextStyle{.anchor = "middle"};
     drawing.add_text({is_turned ? at + 4.0 : at, box.bottom() + 16.0},
                      shorten_middle(to_readable_line(name), max_characters), style);

@@ -8,7 +8,7 @@
 
 #include "panonav_viewer/svg_drawing.hpp"
 
-/// Parts that all plots share: axes, titles, legends.
+/// An axis of a plot: range, scale and tick marks.
 namespace panonav::viewer {
 
 struct PlotAxis {
@@ -16,20 +16,22 @@ struct PlotAxis {
   double from = 0.0;
   double to = 1.0;
   bool is_log = false;
-  double tick = 0.0;  ///< between marks; 0: chosen by the range
-  /// Marks with text instead of numbers, if any.
-  std::vector<std::pair<double, std::string>> names = {};
+  double tick = 0.0;  ///< distance of tick marks; 0: chosen from the range
+  /// Positions with texts that replace the numbers, if any.
+  std::vector<std::pair<double, std::string>> tick_texts = {};
 
-  /// Returns 0 at `from` and 1 at `to`; NaN for values that the axis cannot show.
-  [[nodiscard]] double share_of(double value) const;
-  /// Returns the positions of marks: 0.2, 0.5, 1, 2, ... apart, about `max_count` at most.
+  /// Returns the position of a value on the axis, 0 at `from` and 1 at `to`; NaN if the axis cannot
+  /// show it.
+  [[nodiscard]] double fraction_of(double value) const;
+  /// Returns the positions of about `max_count` tick marks at most, at a distance of `tick` or 1, 2
+  /// or 5 times a power of ten.
   [[nodiscard]] std::vector<double> ticks(double max_count) const;
-  /// Makes the axis show all values, with a little room; `with_zero`: zero, too.
-  void fit(std::span<const double> values, bool with_zero);
+  /// Sets the range to contain all values with a margin; also zero if `with_zero`.
+  void set_range_to_fit(std::span<const double> values, bool with_zero);
 };
 
-/// Margins around an area of axes, in pixels: tick labels and axis titles left and below, a title
-/// above.
+/// Margins around the axes, in pixels: left and below for tick labels and axis titles, above for
+/// the plot title; and the width of a plot.
 constexpr double left_margin_px = 66.0;
 constexpr double right_margin_px = 18.0;
 constexpr double top_margin_px = 30.0;
@@ -43,7 +45,7 @@ struct PlotArea {
 
   [[nodiscard]] Point2 to_px(double x_value, double y_value) const;
   [[nodiscard]] std::vector<Point2> to_px(std::span<const Point2> points) const;
-  /// Returns the height of the rotated names of x below the area, beyond the usual margin.
+  /// Returns the additional height, in pixels, that rotated names below the x axis need.
   [[nodiscard]] double extra_margin_px() const;
   /// Draws the grid behind the values.
   void draw_grid(SvgDrawing& drawing) const;
@@ -51,11 +53,11 @@ struct PlotArea {
   void draw_axes(SvgDrawing& drawing, const std::string& title) const;
 
  private:
-  [[nodiscard]] bool has_turned_names() const;
+  [[nodiscard]] bool has_rotated_names() const;
   void draw_names(SvgDrawing& drawing) const;
 };
 
-/// Symbol of one kind of line, mark or area in a legend.
+/// Symbol of a legend entry: line, mark or area.
 struct LegendSymbol {
   PlotColour colour = PlotColour::blue;
   std::optional<LineStyle> line = {};
@@ -65,7 +67,7 @@ struct LegendSymbol {
   void draw(SvgDrawing& drawing, Point2 at) const;
 };
 
-/// One legend at the bottom of a picture, each label once for each colour.
+/// The legend at the bottom of a picture, with one entry per label and colour.
 class Legend {
  public:
   void add(const std::string& label, const LegendSymbol& symbol);

@@ -38,8 +38,8 @@ Json pair(const std::pair<double, double>& values) {
   return {round_to_six_digits(values.first), round_to_six_digits(values.second)};
 }
 
-/// Metres to a tenth of a millimetre; other units are as large.
-Json points(const std::vector<Point2>& source) {
+/// Rounds coordinates to 4 decimals: 0.1 mm in metres; other units have similar sizes.
+Json points_to_json(const std::vector<Point2>& source) {
   Json all = Json::array();
   const auto rounded = [](double value) { return std::round(value * 1e4) / 1e4; };
   for (const Point2& point : source) {
@@ -49,24 +49,25 @@ Json points(const std::vector<Point2>& source) {
   return all;
 }
 
-Json lists(const std::vector<std::vector<Point2>>& source) {
+Json lines_to_json(const std::vector<std::vector<Point2>>& source) {
   Json all = Json::array();
-  for (const auto& list : source) all.push_back(points(list));
+  for (const auto& list : source) all.push_back(points_to_json(list));
   return all;
 }
 
 Json make_layer_json(const MapLayer& layer) {
   Json json{{"label", layer.label}, {"colour", name_of(layer.colour)}};
-  if (!layer.circles.empty()) json["circles"] = points(layer.circles);
-  if (!layer.crosses.empty()) json["crosses"] = points(layer.crosses);
-  if (!layer.lines.empty()) json["lines"] = lists(layer.lines);
-  if (!layer.filled_polygons.empty()) json["polygons"] = lists(layer.filled_polygons);
-  if (!layer.dots.empty()) json["dots"] = points(layer.dots);
-  if (!layer.squares.empty()) json["squares"] = points(layer.squares);
+  if (!layer.circles.empty()) json["circles"] = points_to_json(layer.circles);
+  if (!layer.crosses.empty()) json["crosses"] = points_to_json(layer.crosses);
+  if (!layer.lines.empty()) json["lines"] = lines_to_json(layer.lines);
+  if (!layer.filled_polygons.empty()) json["polygons"] = lines_to_json(layer.filled_polygons);
+  if (!layer.dots.empty()) json["dots"] = points_to_json(layer.dots);
+  if (!layer.squares.empty()) json["squares"] = points_to_json(layer.squares);
   return json;
 }
 
-/// Names in labels may be any bytes.
+/// Returns JSON as text; invalid UTF-8 is replaced, because labels may contain names with any
+/// bytes.
 std::string dump_json(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -80,7 +81,7 @@ std::string_view name_of(PlotColour colour) {
   return names.at(static_cast<std::size_t>(colour));
 }
 
-std::string plot_json(const LinePlot& plot) {
+std::string plot_to_json(const LinePlot& plot) {
   Json json{{"title", plot.title}, {"x_label", plot.x_label}, {"y_label", plot.y_label}};
   Json& all = json["series"] = Json::array();
   for (const Series& series : plot.series) {
@@ -105,7 +106,7 @@ std::string plot_json(const LinePlot& plot) {
   return dump_json(json);
 }
 
-std::string plot_json(const HeatMap& plot) {
+std::string plot_to_json(const HeatMap& plot) {
   return dump_json(
       Json{{"title", plot.title},
            {"heat",
@@ -116,11 +117,11 @@ std::string plot_json(const HeatMap& plot) {
              {"spacing", round_to_six_digits(plot.spacing_m)},
              {"values", to_json_array(plot.values)},
              {"label", plot.value_label},
-             {"crosses", points(plot.crosses)}}}});
+             {"crosses", points_to_json(plot.crosses)}}}});
 }
 
-std::string plot_json(std::string_view title, const std::vector<MapPlot>& frames,
-                      const std::vector<MapLayer>& backdrop) {
+std::string plot_to_json(std::string_view title, const std::vector<MapPlot>& frames,
+                         const std::vector<MapLayer>& backdrop) {
   require(!frames.empty(), "frames of a map", 0.0, "at least one");
   Json json{{"title", title}, {"unit", frames.front().unit}};
   if (const auto& shown = frames.front().shown) {
@@ -142,12 +143,14 @@ std::string plot_json(std::string_view title, const std::vector<MapPlot>& frames
   return dump_json(json);
 }
 
-std::string plot_json(const PicturePlot& plot) {
+std::string plot_to_json(const PicturePlot& plot) {
   const Image image = paint_pixels(plot);
-  Json json{
-      {"title", plot.title},           {"x_label", plot.x_label},
-      {"y_label", plot.y_label},       {"x_range", pair(plot.x_range)},
-      {"y_range", pair(plot.y_range)}, {"image", data_url("image/png", encode_png(image.view()))}};
+  Json json{{"title", plot.title},
+            {"x_label", plot.x_label},
+            {"y_label", plot.y_label},
+            {"x_range", pair(plot.x_range)},
+            {"y_range", pair(plot.y_range)},
+            {"image", make_data_url("image/png", encode_png(image.view()))}};
   if (plot.x_tick > 0.0) json["x_tick"] = plot.x_tick;
   if (plot.y_tick > 0.0) json["y_tick"] = plot.y_tick;
   return dump_json(json);

@@ -16,15 +16,15 @@
 
 namespace panonav::viewer {
 
-/// Returns the pixels of an image file (PNG, JPEG) of others as a JPEG of our own, so that a
-/// browser gets nothing else of the file. Throws FileError on other files.
-[[nodiscard]] std::string encode_again(std::span<const std::uint8_t> stored);
+/// Decodes an image file (PNG, JPEG) and returns its pixels as a new JPEG, so that a browser gets
+/// no other bytes of a possibly malicious file. Throws FileError on other files.
+[[nodiscard]] std::string reencode_as_jpeg(std::span<const std::uint8_t> stored);
 
-/// Reads pictures of references on a thread of its own, one after another: a memory on a server may
-/// be slow, and neither the page nor other viewers wait for it. Any thread may call.
+/// Reads pictures of references one after the other on a separate thread, so that neither the page
+/// nor other viewers wait for a memory on a slow server. May be called from any thread.
 class ReferencePictures {
  public:
-  /// Returns the stored picture of a reference by its name; empty where there is none.
+  /// Returns the stored picture of the reference `name`; empty if there is none.
   using Read = std::function<std::vector<std::uint8_t>(const std::string& name)>;
 
   explicit ReferencePictures(Read stored) : stored_(std::move(stored)) {}
@@ -32,11 +32,12 @@ class ReferencePictures {
   ReferencePictures(const ReferencePictures&) = delete;
   ReferencePictures& operator=(const ReferencePictures&) = delete;
 
-  /// Begins to read the JPEG of that reference, empty where there is none, and calls `ready` when
-  /// it has come; nullopt if 256 others are waiting, or after `stop`.
+  /// Starts to read the picture of the reference `name` as a JPEG (empty if there is none), and
+  /// calls `ready` when the future is ready. Returns nullopt if 256 others are waiting, or after
+  /// `stop`.
   [[nodiscard]] std::optional<std::future<std::string>> read(std::string name,
                                                              std::function<void()> ready);
-  /// Waits for the picture that is being read, and drops the others.
+  /// Waits for the picture being read and drops the waiting ones.
   void stop();
 
  private:
@@ -45,12 +46,12 @@ class ReferencePictures {
     std::function<void()> ready;
   };
 
-  void work();
+  void run_tasks();
 
   const Read stored_;
   std::mutex mutex_;
-  std::condition_variable came_;
-  std::deque<Task> waiting_;
+  std::condition_variable changed_;
+  std::deque<Task> waiting_tasks_;
   bool is_stopped_ = false;
   std::thread thread_;
 };

@@ -43,41 +43,44 @@ std::string make_plot_element(const ReportPlot& report_plot) {
   return std::visit(
       [&](const auto& plot) {
         using Plot = std::decay_t<decltype(plot)>;
-        if constexpr (std::is_same_v<Plot, UnfoldingMap>) {
-          return make_panel("plan", plot.title, plot_json(plot.title, plot.frames, plot.backdrop),
+        if constexpr (std::is_same_v<Plot, MapAnimation>) {
+          return make_panel("plan", plot.title,
+                            plot_to_json(plot.title, plot.frames, plot.backdrop),
                             report_plot.caption);
         } else if constexpr (std::is_same_v<Plot, MapPlot>) {
-          return make_panel("plan", plot.title, plot_json(plot.title, {plot}), report_plot.caption);
+          return make_panel("plan", plot.title, plot_to_json(plot.title, {plot}),
+                            report_plot.caption);
         } else if constexpr (std::is_same_v<Plot, HeatMap>) {
-          return make_panel("plan", plot.title, plot_json(plot), report_plot.caption);
+          return make_panel("plan", plot.title, plot_to_json(plot), report_plot.caption);
         } else {
-          return make_panel("chart", plot.title, plot_json(plot), report_plot.caption);
+          return make_panel("chart", plot.title, plot_to_json(plot), report_plot.caption);
         }
       },
       report_plot.plot);
 }
 
-/// The picture itself: as it is where it is PNG or JPEG, as SVG otherwise.
+/// Returns the picture in a file as a data URL: PNG, JPEG or SVG.
 std::string embed_file(const std::filesystem::path& path) {
   constexpr std::size_t max_bytes = std::size_t{64} << 20U;
   const auto bytes = read_file(path, max_bytes);
-  if (path.extension() == ".svg") return data_url("image/svg+xml", bytes);
+  if (path.extension() == ".svg") return make_data_url("image/svg+xml", bytes);
   const bool png = image_format(bytes, path.string()) == ImageFormat::png;
-  return data_url(png ? "image/png" : "image/jpeg", bytes);
+  return make_data_url(png ? "image/png" : "image/jpeg", bytes);
 }
 
 std::string make_view_element(const ReportView& view) {
   const Image picture = to_picture(view.panorama);
-  // Equal scales of both angles would be true to the eye, but a small view must be visible at all.
+  // Equal scales of both angles would show true shapes, but a view of few rows must still be
+  // visible.
   const double shape =
       std::clamp(static_cast<double>(picture.width()) / picture.height(), 2.5, 10.0);
   std::string html =
       "<figure><div class=\"view\"><img style=\"aspect-ratio:" + format_fixed(shape, 2) +
       "\" alt=\"" + escape_html(view.caption) + "\" src=\"" +
-      data_url("image/jpeg", encode_jpeg(picture.view())) + "\">";
+      make_data_url("image/jpeg", encode_jpeg(picture.view())) + "\">";
   for (const ViewMark& mark : view.marks) {
     const double percent = 50.0 - mark.azimuth_rad * 50.0 / std::numbers::pi;
-    html += "<i" + std::string(mark.through ? "" : " class=\"arrow\"") +
+    html += "<i" + std::string(mark.dashed_through_view ? "" : " class=\"arrow\"") +
             " style=\"left:" + format_fixed(percent, 2) + "%;--key:var(--" +
             std::string(name_of(mark.colour)) + ")\"></i>";
   }

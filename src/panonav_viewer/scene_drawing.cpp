@@ -17,23 +17,25 @@ namespace {
 
 using Triangle = std::array<simulation::Vector3, 3>;
 
-/// Triangles that share corners, to the millimetre, are of one object.
+/// Groups triangles into bodies: triangles that share corners, to the millimetre, belong to one
+/// body.
 std::vector<std::vector<Triangle>> find_bodies(const std::vector<Triangle>& triangles) {
-  std::map<std::array<long, 3>, std::size_t> body_at;  // a corner's body, as first numbered
-  std::vector<std::size_t> joined;                     // to this body; itself: its own
+  std::map<std::array<long, 3>, std::size_t> body_at;  // body number first assigned to a corner
+  std::vector<std::size_t> parent_body;                // union-find parent of each body number
   const auto body = [&](std::size_t number) {
-    while (joined[number] != number) number = joined[number] = joined[joined[number]];
+    while (parent_body[number] != number)
+      number = parent_body[number] = parent_body[parent_body[number]];
     return number;
   };
   std::vector<std::size_t> number_of;
   for (const Triangle& triangle : triangles) {
-    const std::size_t own = joined.size();
-    joined.push_back(own);
+    const std::size_t own = parent_body.size();
+    parent_body.push_back(own);
     number_of.push_back(own);
     for (const simulation::Vector3& v : triangle) {
       const std::array corner{std::lround(1e3 * v.x_m), std::lround(1e3 * v.y_m),
                               std::lround(1e3 * v.z_m)};
-      joined[body(own)] = body(body_at.try_emplace(corner, own).first->second);
+      parent_body[body(own)] = body(body_at.try_emplace(corner, own).first->second);
     }
   }
   std::map<std::size_t, std::vector<Triangle>> bodies;
@@ -45,8 +47,8 @@ std::vector<std::vector<Triangle>> find_bodies(const std::vector<Triangle>& tria
   return result;
 }
 
-/// Returns the convex hull, counter-clockwise; two points if all are on one line, to a hundredth of
-/// a square millimetre.
+/// Returns the convex hull, counter-clockwise; two points if all points are on one line (areas
+/// below 1e-8 m^2).
 std::vector<Point2> compute_convex_hull(std::vector<Point2> points) {
   std::ranges::sort(points, {}, [](const Point2& p) { return std::pair(p.x_m, p.y_m); });
   const auto is_left = [](const Point2& a, const Point2& b, const Point2& c) {
@@ -67,7 +69,7 @@ std::vector<Point2> compute_convex_hull(std::vector<Point2> points) {
   return hull;
 }
 
-/// Intersects it with a horizontal plane: both ends, or fewer points.
+/// Intersects a triangle with a horizontal plane; returns both ends of the segment, or nothing.
 std::vector<Point2> cut_triangle(const Triangle& triangle, double height_m) {
   std::vector<Point2> ends;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -83,17 +85,19 @@ std::vector<Point2> cut_triangle(const Triangle& triangle, double height_m) {
 }  // namespace
 
 std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
-  constexpr double lowest_m = 0.1;    // carpets and sills do not count
-  constexpr double headroom_m = 1.9;  // nor do lamps, lintels and ceilings
-  constexpr double room_m = 4.0;      // what is as large is cut through, not seen from above
-  constexpr double around_m = 3.0;    // far trees would make the floor a spot
+  constexpr double min_top_m = 0.1;         // excludes carpets and sills
+  constexpr double max_bottom_m = 1.9;      // excludes lamps, lintels and ceilings
+  constexpr double max_solid_size_m = 4.0;  // larger bodies are shown as sections
+  constexpr double shown_margin_m = 3.0;    // distant trees would make the floor tiny
   constexpr std::size_t max_bodies = 30;
   MapLayer walls{.label = "walls", .colour = PlotColour::dark_grey};
   MapLayer furniture{.label = "furniture and other things", .colour = PlotColour::grey};
   const auto is_near = [&](const std::vector<Point2>& points) {
     return std::ranges::any_of(points, [&](const Point2& p) {
-      return p.x_m > scene.floor_low.x_m - around_m && p.x_m < scene.floor_high.x_m + around_m &&
-             p.y_m > scene.floor_low.y_m - around_m && p.y_m < scene.floor_high.y_m + around_m;
+      return p.x_m > scene.floor_low.x_m - shown_margin_m &&
+             p.x_m < scene.floor_high.x_m + shown_margin_m &&
+             p.y_m > scene.floor_low.y_m - shown_margin_m &&
+             p.y_m < scene.floor_high.y_m + shown_margin_m;
     });
   };
   std::map<std::string, std::vector<Triangle>> objects;
@@ -106,8 +110,8 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
   for (const auto& [name, object] : objects) {
     std::vector<std::vector<Triangle>> bodies = find_bodies(object);
     if (bodies.size() > max_bodies) bodies = {object};
-    std::vector<std::vector<Point2>> thin;
-    std::size_t solid = 0;
+    std::vector<std::vector<Point2>> flat_outlines;
+    std::size_t solid_count = 0;
     for (const std::vector<Triangle>& body : bodies) {
       std::vector<Point2> corners;
       double bottom_m = std::numeric_limits<double>::infinity();
@@ -119,24 +123,26 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
           top_m = std::max(top_m, v.z_m);
         }
       }
-      if (top_m < lowest_m || bottom_m > headroom_m || !is_near(corners)) continue;
+      if (top_m < min_top_m || bottom_m > max_bottom_m || !is_near(corners)) continue;
       const std::vector<Point2> outline = compute_convex_hull(std::move(corners));
       const auto [west, east] = std::ranges::minmax(outline, {}, &Point2::x_m);
       const auto [south, north] = std::ranges::minmax(outline, {}, &Point2::y_m);
-      if (std::max(east.x_m - west.x_m, north.y_m - south.y_m) > room_m) {
+      if (std::max(east.x_m - west.x_m, north.y_m - south.y_m) > max_solid_size_m) {
         for (const Triangle& triangle : body) {
           std::vector<Point2> line = cut_triangle(triangle, scene.camera_height_m);
           if (line.size() == 2 && is_near(line)) walls.lines.push_back(std::move(line));
         }
       } else if (outline.size() == 2) {
-        thin.push_back(outline);
+        flat_outlines.push_back(outline);
       } else {
         furniture.filled_polygons.push_back(outline);
-        ++solid;
+        ++solid_count;
       }
     }
-    // A screen or a wall; not the faces of a shelf.
-    if (solid == 0) walls.lines.insert(walls.lines.end(), thin.begin(), thin.end());
+    // Flat bodies are walls if the object has no solid body (a screen); otherwise they are faces,
+    // as of a shelf.
+    if (solid_count == 0)
+      walls.lines.insert(walls.lines.end(), flat_outlines.begin(), flat_outlines.end());
   }
   return {furniture, walls};
 }

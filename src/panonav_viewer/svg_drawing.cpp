@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Rounds to a hundredth of a pixel.
+/// Formats a number of pixels, rounded to two decimals.
 std::string format_px(double value) {
   const double rounded = std::round(value * 100.0) / 100.0;
   std::array<char, 32> text;
@@ -45,7 +45,7 @@ bool is_finite(const Point2& point) {
 }
 
 std::string format_stroke(PlotColour colour, double width) {
-  return " fill='none' stroke='" + std::string(hex(colour)) + "' stroke-width='" +
+  return " fill='none' stroke='" + std::string(to_css_colour(colour)) + "' stroke-width='" +
          format_px(width) + "' stroke-linejoin='round'";
 }
 
@@ -54,12 +54,12 @@ std::string format_box(const SvgBox& box) {
          format_px(box.width) + "' height='" + format_px(box.height) + "'";
 }
 
-std::string mark_text(const Point2& at, MarkShape shape, double radius) {
+std::string format_mark(const Point2& at, MarkShape shape, double radius) {
   const std::string r = format_px(radius);
   const std::string side = format_px(2.0 * radius);
   const double left = at.x_m - radius;
   switch (shape) {
-    case MarkShape::dot:  // a line without length, round at its ends
+    case MarkShape::dot:  // a line of length 0 with round ends
       return "M" + format_point(at.x_m, at.y_m) + "h0";
     case MarkShape::ring:
       return "M" + format_point(left, at.y_m) + "a" + r + "," + r + " 0 1 0 " + side + ",0a" + r +
@@ -74,7 +74,8 @@ std::string mark_text(const Point2& at, MarkShape shape, double radius) {
   return {};
 }
 
-/// `svg` and `log` are files for the program's standard input and errors.
+/// Runs ffmpeg with the file `svg` as input, `picture` as output and `log` for its errors; returns
+/// its exit code.
 int run_ffmpeg(const fs::path& svg, const fs::path& picture, const fs::path& log) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -135,13 +136,13 @@ void SvgDrawing::add_polygon(std::span<const Point2> corners, PlotColour colour,
   }
   if (text.empty()) return;
   text.pop_back();
-  body_ += "<polygon points='" + text + "' fill='" + std::string(hex(colour)) + "' fill-opacity='" +
-           format_px(opacity) + "'/>\n";
+  body_ += "<polygon points='" + text + "' fill='" + std::string(to_css_colour(colour)) +
+           "' fill-opacity='" + format_px(opacity) + "'/>\n";
 }
 
 void SvgDrawing::add_box(const SvgBox& box, PlotColour colour, double opacity) {
-  body_ += "<rect" + format_box(box) + " fill='" + std::string(hex(colour)) + "' fill-opacity='" +
-           format_px(opacity) + "'/>\n";
+  body_ += "<rect" + format_box(box) + " fill='" + std::string(to_css_colour(colour)) +
+           "' fill-opacity='" + format_px(opacity) + "'/>\n";
 }
 
 void SvgDrawing::add_frame(const SvgBox& box, PlotColour colour) {
@@ -154,12 +155,12 @@ void SvgDrawing::add_marks(std::span<const Point2> points, PlotColour colour,
                            const MarkStyle& style) {
   std::string path;
   for (const Point2& point : points) {
-    if (is_finite(point)) path += mark_text(point, style.shape, style.radius);
+    if (is_finite(point)) path += format_mark(point, style.shape, style.radius);
   }
   if (path.empty()) return;
   body_ += "<path d='" + path + "'";
   if (style.shape == MarkShape::square) {
-    body_ += " fill='" + std::string(hex(colour)) + "'/>\n";
+    body_ += " fill='" + std::string(to_css_colour(colour)) + "'/>\n";
   } else {
     const bool is_dot = style.shape == MarkShape::dot;
     body_ += format_stroke(colour, is_dot ? 2.0 * style.radius : style.line_width) +
@@ -168,7 +169,7 @@ void SvgDrawing::add_marks(std::span<const Point2> points, PlotColour colour,
 }
 
 void SvgDrawing::add_text(Point2 at, std::string_view text, const TextStyle& style) {
-  constexpr std::size_t max_characters = 160;  // more than a picture is wide
+  constexpr std::size_t max_characters = 160;  // wider than any picture
   std::string escaped;
   for (const char c : shorten_middle(to_readable_line(text), max_characters)) {
     escaped += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
@@ -186,7 +187,7 @@ void SvgDrawing::add_text(Point2 at, std::string_view text, const TextStyle& sty
 void SvgDrawing::add_image(const SvgBox& box, ImageView image) {
   body_ += "<image" + format_box(box) +
            " preserveAspectRatio='none' style='image-rendering:pixelated' href='" +
-           data_url("image/png", encode_png(image)) + "'/>\n";
+           make_data_url("image/png", encode_png(image)) + "'/>\n";
 }
 
 void SvgDrawing::begin_clip(const SvgBox& box) {

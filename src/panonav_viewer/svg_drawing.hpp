@@ -12,7 +12,7 @@
 
 namespace panonav::viewer {
 
-/// A rectangle of a drawing, in pixels from its upper left corner.
+/// A rectangle in a drawing, in pixels from the upper left corner.
 struct SvgBox {
   double left = 0.0;
   double top = 0.0;
@@ -27,51 +27,51 @@ enum class MarkShape { dot, ring, cross, square };
 struct MarkStyle {
   MarkShape shape = MarkShape::dot;
   double radius = 3.0;      ///< px
-  double line_width = 1.5;  ///< px, of rings and crosses
+  double line_width = 1.5;  ///< px; only for rings and crosses
 };
 
 struct LineStyle {
   double width = 2.0;  ///< px
-  int dashes = 0;      ///< 0: none; further numbers: other patterns
+  int dashes = 0;      ///< pattern number; 0: no dashes
 };
 
 struct TextStyle {
-  std::string_view anchor = "start";  ///< which part lies at the point: "start", "middle", "end"
+  std::string_view anchor = "start";  ///< text part at the point: "start", "middle", "end"
   double size = 12.0;                 ///< px
   double rotation_deg = 0.0;          ///< clockwise, about the point
 };
 
 /// A picture of lines, marks and text, drawn from back to front. Coordinates are pixels from the
-/// upper left corner; points that are not finite are left out and interrupt lines. Text of any
-/// origin is shown as it is and has no effect.
+/// upper left corner. Points that are not finite are omitted and interrupt lines. Text from any
+/// source is escaped.
 class SvgDrawing {
  public:
   void add_path(std::span<const Point2> points, PlotColour colour, const LineStyle& style = {});
   void add_polygon(std::span<const Point2> corners, PlotColour colour, double opacity);
   void add_box(const SvgBox& box, PlotColour colour, double opacity = 1.0);
-  /// Its outline.
+  /// Adds the outline of a box.
   void add_frame(const SvgBox& box, PlotColour colour);
   void add_marks(std::span<const Point2> points, PlotColour colour, const MarkStyle& style);
-  /// Text of more than 160 characters loses its middle.
+  /// Adds text; more than 160 characters are shortened in the middle.
   void add_text(Point2 at, std::string_view text, const TextStyle& style = {});
-  /// Fills the box with the pixels, whose edges stay sharp.
+  /// Adds an image that fills the box; its pixels keep sharp edges.
   void add_image(const SvgBox& box, ImageView image);
   /// Clips drawing to the box until `end_clip`.
   void begin_clip(const SvgBox& box);
   void end_clip();
 
-  /// Returns the whole text of the SVG file.
+  /// Returns the text of the SVG file.
   [[nodiscard]] std::string to_text(double width, double height) const;
 
  private:
   std::string body_;
 };
 
-/// Estimates the width in pixels of text of 12 px; a little more than most fonts need.
+/// Estimates the width, in pixels, of text of size 12 px, a little above that of most fonts.
 [[nodiscard]] double estimate_text_width(std::string_view text);
 
-/// Writes SVG text to `path`, or a PNG made by the program ffmpeg if the name does not end in .svg;
-/// the file appears whole or not at all. Throws FileError if it cannot be written, Error if ffmpeg
+/// Writes an SVG file, or a PNG file by the program ffmpeg if `path` does not end in .svg. The file
+/// is complete or does not appear at all. Throws FileError if it cannot be written, Error if ffmpeg
 /// cannot be started.
 void write_drawing(const std::filesystem::path& path, const std::string& svg);
 

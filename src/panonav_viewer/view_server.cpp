@@ -65,34 +65,34 @@ std::string_view name_of(ViewerInput wish) {
   return "";
 }
 
-/// A moment as viewers ask for it: made ready once, on the server's thread.
+/// A moment for viewers: its JSON and pictures are encoded once, on the server's thread.
 class Frame {
  public:
   Frame(recordings::RunMoment moment, std::size_t number)
       : moment_(std::move(moment)), number_(number) {}
 
   [[nodiscard]] std::size_t number() const noexcept { return number_; }
-  /// Bytes of its pictures.
+  /// Returns the size of its pictures in bytes.
   [[nodiscard]] std::size_t bytes() const noexcept {
     return moment_.encoded_picture.size() +
            (moment_.picture ? moment_.picture->pixels().size() : 0) +
            (moment_.panorama ? moment_.panorama->values().size_bytes() : 0);
   }
   const std::string& json() {
-    if (json_.empty()) json_ = moment_json(moment_, number_);
+    if (json_.empty()) json_ = moment_to_json(moment_, number_);
     return json_;
   }
-  /// "camera", "panorama" or "best"; empty where there is none.
+  /// Returns the JPEG or PNG of "camera", "panorama" or "best"; empty if there is none.
   const std::string& picture(const std::string& which) {
     const auto found = pictures_.find(which);
-    return found != pictures_.end() ? found->second : pictures_[which] = encoded(which);
+    return found != pictures_.end() ? found->second : pictures_[which] = encode_picture(which);
   }
 
  private:
-  [[nodiscard]] std::string encoded(const std::string& which) {
+  [[nodiscard]] std::string encode_picture(const std::string& which) {
     std::vector<std::uint8_t> bytes;
     if (which == "best") {
-      if (!moment_.best_match.empty()) return encode_again(moment_.best_match);
+      if (!moment_.best_match.empty()) return reencode_as_jpeg(moment_.best_match);
     } else if (which == "panorama" && moment_.panorama) {
       const Image image = to_picture(*moment_.panorama);
       bytes = encode_jpeg(image.view());
@@ -110,7 +110,7 @@ class Frame {
   std::map<std::string, std::string> pictures_;
 };
 
-std::string event(const std::string& name, const std::string& data) {
+std::string format_event(const std::string& name, const std::string& data) {
   return "event: " + name + "\ndata: " + data + "\n\n";
 }
 
@@ -124,22 +124,22 @@ struct ViewServer::Implementation {
         server({.address = options.address,
                 .port = options.port,
                 .headers = answer_headers,
-                .judge_head = [this](const auto& head) { return judge(head); }},
+                .judge_head = [this](const auto& head) { return verify_request(head); }},
                [this](const server::HttpRequest& request) { return answer(request); }) {}
 
   ~Implementation() {
     reference_pictures.stop();
     std::unique_lock lock(mutex);
     ended = true;
-    if (viewing == 0) return;
+    if (viewer_count == 0) return;
     server.poke();
-    came.wait_for(lock, std::chrono::seconds(1), [this] { return viewing == 0; });
+    changed.wait_for(lock, std::chrono::seconds(1), [this] { return viewer_count == 0; });
     lock.unlock();
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }
 
-  /// Refuses strangers, who do not know the token.
-  [[nodiscard]] server::HeadVerdict judge(const server::HttpRequest& head) const {
+  /// Refuses requests without the token or from another origin.
+  [[nodiscard]] server::HeadVerdict verify_request(const server::HttpRequest& head) const {
     if (head.path.starts_with('/') && server::is_same_origin(head) &&
         server::is_same_secret(std::string_view(head.path).substr(1, token.size()), token)) {
       return {.is_trusted = true};
@@ -148,30 +148,30 @@ struct ViewServer::Implementation {
   }
 
   [[nodiscard]] server::HttpAnswer answer(const server::HttpRequest& request) {
-    const auto only = [](int status) { return server::HttpAnswer{.status = status}; };
+    const auto status_only = [](int status) { return server::HttpAnswer{.status = status}; };
     const std::string_view resource = std::string_view(request.path).substr(1 + token.size());
     if ((options.replay || options.takes != ViewerInput::none) && resource == "/control") {
-      if (request.method != "POST") return only(405);
-      return only(handle_control(request.body) ? 204 : 400);
+      if (request.method != "POST") return status_only(405);
+      return status_only(handle_control(request.body) ? 204 : 400);
     }
-    if (request.method != "GET") return only(405);
+    if (request.method != "GET") return status_only(405);
     if (resource == "/") return {.type = "text/html; charset=utf-8", .content = page};
     if (resource == "/events") return events();
     constexpr std::string_view views = "/view/";
     if (resource.starts_with(views)) {
       const auto number = parse_index(resource.substr(views.size()));
-      return number ? reference(*number) : only(404);
+      return number ? reference(*number) : status_only(404);
     }
     constexpr std::string_view pictures = "/picture/";
-    if (!resource.starts_with(pictures)) return only(404);
+    if (!resource.starts_with(pictures)) return status_only(404);
     const std::string_view rest = resource.substr(pictures.size());
     const std::size_t slash = rest.find('/');
     const auto number = parse_index(rest.substr(0, slash));
-    if (slash == std::string_view::npos || !number) return only(404);
+    if (slash == std::string_view::npos || !number) return status_only(404);
     return picture(*number, std::string(rest.substr(slash + 1)));
   }
 
-  /// Returns the picture of a reference, by its index among those sent.
+  /// Returns the picture of a reference by its index among the references sent.
   [[nodiscard]] server::HttpAnswer reference(std::size_t number) {
     std::string name;
     {
@@ -190,7 +190,7 @@ struct ViewServer::Implementation {
       std::string bytes;
       try {
         bytes = picture->get();
-      } catch (const std::exception&) {  // no memory, no picture in it, or the viewer ends
+      } catch (const std::exception&) {  // no memory, invalid picture, or the viewer ends
         return server::HttpAnswer{.status = 500};
       }
       if (bytes.empty()) return server::HttpAnswer{.status = 404};
@@ -217,17 +217,17 @@ struct ViewServer::Implementation {
     explicit Viewer(Implementation& all) : all_(all) {
       {
         const std::lock_guard lock(all.mutex);
-        ++all.viewing;
+        ++all.viewer_count;
       }
-      all.came.notify_all();
+      all.changed.notify_all();
     }
     ~Viewer() {
       {
         const std::lock_guard lock(all_.mutex);
-        --all_.viewing;
-        all_.left = Clock::now();
+        --all_.viewer_count;
+        all_.last_disconnected = Clock::now();
       }
-      all_.came.notify_all();
+      all_.changed.notify_all();
     }
     Viewer(const Viewer&) = delete;
     Viewer& operator=(const Viewer&) = delete;
@@ -239,12 +239,12 @@ struct ViewServer::Implementation {
       {
         const std::lock_guard lock(all_.mutex);
         if (!greeted_) {
-          text = "retry: 500\n" + event("past", past_json(all_.past));
+          text = "retry: 500\n" + format_event("past", past_to_json(all_.past));
           if (!all_.frames.empty()) next_ = all_.frames.back()->number();
           greeted_ = true;
         }
         if (retained_ != all_.retained.times) {
-          text += event("retained", retained_json(all_.retained.moment));
+          text += format_event("retained", retained_to_json(all_.retained.moment));
           retained_ = all_.retained.times;
         }
         for (const auto& frame : all_.frames) {
@@ -253,14 +253,14 @@ struct ViewServer::Implementation {
         sent_end_ = all_.ended;
       }
       for (const auto& frame : unsent) {
-        text += event("moment", frame->json());
+        text += format_event("moment", frame->json());
         next_ = frame->number() + 1;
       }
-      if (sent_end_) text += event("ended", "{}");
+      if (sent_end_) text += format_event("ended", "{}");
       const auto now = Clock::now();
-      // Detects viewers that left without closing the connection.
-      if (text.empty() && now - said_ > std::chrono::seconds(2)) text = ": still there\n\n";
-      if (!text.empty()) said_ = now;
+      // A comment line detects viewers that left without closing the connection.
+      if (text.empty() && now - last_sent_ > std::chrono::seconds(2)) text = ": still there\n\n";
+      if (!text.empty()) last_sent_ = now;
       return text;
     }
 
@@ -268,19 +268,20 @@ struct ViewServer::Implementation {
     Implementation& all_;
     bool greeted_ = false;
     bool sent_end_ = false;
-    std::size_t next_ = 0;      // number of the next frame to send
+    std::size_t next_ = 0;      // index of the next frame to send
     std::size_t retained_ = 0;  // as of `RetainedParts::times`
-    Clock::time_point said_ = Clock::now();
+    Clock::time_point last_sent_ = Clock::now();
   };
 
   [[nodiscard]] server::HttpAnswer events() {
-    if (viewing >= options.max_viewers) return {.status = 503};
+    if (viewer_count >= options.max_viewers) return {.status = 503};
     return {.type = "text/event-stream",
             .more = [viewer = std::make_shared<Viewer>(*this)] { return viewer->more(); }};
   }
 
-  /// {"play": true} or {"play": false}, {"step": 1}, {"speed": 2} of a replay; {"goal": [x, y]} or
-  /// {"pose": [x, y, heading or null]} where the run takes it: false where it is none of them.
+  /// Handles a control message: {"play": true or false}, {"step": 1} or {"speed": 2} of a replay;
+  /// {"goal": [x, y]} or {"pose": [x, y, heading or null]} if the run accepts it. Returns false for
+  /// any other message.
   bool handle_control(const std::string& text) {
     const auto json = nlohmann::json::parse(text, nullptr, false);
     if (!json.is_object()) return false;
@@ -299,11 +300,12 @@ struct ViewServer::Implementation {
     pace.speed = speed;
     pace.playing = playing;
     pace.steps += steps.get<std::size_t>();
-    came.notify_all();
+    changed.notify_all();
     return true;
   }
 
-  /// A wish of a viewer, alone in its message.
+  /// Stores a goal or pose that a viewer sent as the only member of its message; returns false if
+  /// it is invalid or not accepted.
   bool take(const nlohmann::json& json) {
     const std::string key(name_of(options.takes));
     if (key.empty() || json.size() != 1 || !json.contains(key)) return false;
@@ -317,7 +319,7 @@ struct ViewServer::Implementation {
     if (size == 3 && !values[2].is_null()) {
       if (!values[2].is_number()) return false;
       pose.heading_rad = values[2].get<double>();
-      constexpr double max_heading = 6.3;  // a turn
+      constexpr double max_heading = 6.3;  // slightly above one full turn, 2 pi
       if (!(std::abs(*pose.heading_rad) <= max_heading)) return false;
     }
     const auto& known = retained.moment.references;
@@ -332,30 +334,33 @@ struct ViewServer::Implementation {
     return true;
   }
 
-  /// Returns when the moment of this stamp may be shown.
+  /// Returns when the moment with this time stamp is due.
   void wait_for_turn(std::unique_lock<std::mutex>& lock, double stamp_s) {
-    // Stamps may jump: a recording of two days, a clock set back.
+    // Time stamps may jump, as in recordings of two days or when a clock is set back.
     constexpr double max_gap_s = 2.0;
-    constexpr auto grace = std::chrono::seconds(2);  // a page that is loaded again is soon back
-    if (!pace.last_s) came.wait(lock, [this] { return viewing > 0; });
+    constexpr auto reload_grace = std::chrono::seconds(2);  // a page being reloaded is back by then
+    if (!pace.last_s) changed.wait(lock, [this] { return viewer_count > 0; });
     const double gap_s = pace.last_s ? std::clamp(stamp_s - *pace.last_s, 0.0, max_gap_s) : 0.0;
     pace.last_s = stamp_s;
     while (pace.steps == 0) {
       const auto due = pace.released + std::chrono::duration_cast<Clock::duration>(
                                            std::chrono::duration<double>(gap_s / pace.speed));
       const auto now = Clock::now();
-      const bool alone = viewing == 0;
-      if ((pace.playing && now >= due) || (alone && now >= left + grace)) break;
-      if (pace.playing && !alone) {
-        came.wait_until(lock, due);
-      } else if (alone) {
-        came.wait_until(lock, pace.playing ? std::min(due, left + grace) : left + grace);
+      const bool has_no_viewer = viewer_count == 0;
+      if ((pace.playing && now >= due) ||
+          (has_no_viewer && now >= last_disconnected + reload_grace))
+        break;
+      if (pace.playing && !has_no_viewer) {
+        changed.wait_until(lock, due);
+      } else if (has_no_viewer) {
+        changed.wait_until(lock, pace.playing ? std::min(due, last_disconnected + reload_grace)
+                                              : last_disconnected + reload_grace);
       } else {
-        came.wait(lock);
+        changed.wait(lock);
       }
     }
     if (pace.steps > 0) --pace.steps;
-    if (viewing == 0 && !pace.playing) pace.playing = true;  // whoever held it is gone
+    if (viewer_count == 0 && !pace.playing) pace.playing = true;  // the viewer that paused has left
     pace.released = Clock::now();
   }
 
@@ -366,7 +371,7 @@ struct ViewServer::Implementation {
       past.push_back({moment.stamp_s, moment.pose,
                       moment.truth ? std::optional(moment.truth->position()) : std::nullopt,
                       moment.probability, moment.sure, moment.state});
-      // Every second moment of a long run is dropped, repeatedly.
+      // Drop every second moment of a long run whenever the list is full.
       constexpr std::size_t max_past = 4096;
       if (past.size() == max_past) {
         for (std::size_t i = 1; 2 * i < past.size(); ++i) past[i] = std::move(past[2 * i]);
@@ -375,14 +380,15 @@ struct ViewServer::Implementation {
       retained.take(moment);
       frames.push_back(std::make_shared<Frame>(std::move(moment), number++));
       kept_bytes += frames.back()->bytes();
-      // A viewer requests the pictures of a moment some time after its event.
-      const std::size_t max_frames = viewing > 0 ? 16 : 1;
+      // Keep some frames, because a viewer requests the pictures of a moment some time after its
+      // event.
+      const std::size_t max_frames = viewer_count > 0 ? 16 : 1;
       constexpr std::size_t max_bytes = 64U << 20U;
       while (frames.size() > max_frames || (frames.size() > 1 && kept_bytes > max_bytes)) {
         kept_bytes -= frames.front()->bytes();
         frames.pop_front();
       }
-      if (viewing == 0) return;
+      if (viewer_count == 0) return;
     }
     server.poke();
   }
@@ -390,11 +396,11 @@ struct ViewServer::Implementation {
   const ViewServerOptions options;
   const std::string token;
   const std::string page;
-  std::atomic<std::size_t> viewing = 0;  // changes under the mutex
-  std::mutex mutex;                      // of what follows, up to the server
-  std::condition_variable came;
+  std::atomic<std::size_t> viewer_count = 0;  // changed only under the mutex
+  std::mutex mutex;                           // guards the following members up to the server
+  std::condition_variable changed;
   std::deque<std::shared_ptr<Frame>> frames;
-  std::size_t kept_bytes = 0;  // of the frames
+  std::size_t kept_bytes = 0;  // size of the pictures in all frames
   std::vector<PastMoment> past;
   RetainedParts retained;
   std::optional<ReferencePose> wish;
@@ -402,14 +408,14 @@ struct ViewServer::Implementation {
     bool playing = true;
     double speed = 1.0;
     std::size_t steps = 0;
-    std::optional<double> last_s;  // stamp of the moment before
+    std::optional<double> last_s;  // stamp of the previous moment
     Clock::time_point released;
   } pace;
-  Clock::time_point left;  // when a viewer did, the last time
+  Clock::time_point last_disconnected;  // when the last viewer disconnected
   std::size_t number = 0;
   bool ended = false;
   ReferencePictures reference_pictures{options.thumbnail};
-  server::HttpServer server;  // last: its thread uses the others
+  server::HttpServer server;  // last, because its thread uses the other members
 };
 
 ViewServer::ViewServer(const ViewServerOptions& options)
@@ -432,7 +438,7 @@ std::optional<ReferencePose> ViewServer::consume_viewer_input() {
 }
 
 std::size_t ViewServer::viewers() const {
-  return implementation_->viewing;
+  return implementation_->viewer_count;
 }
 
 }  // namespace panonav::viewer

@@ -330,7 +330,7 @@ void read_ros_bytes(Bytes bytes) {
 }
 
 #ifdef PANONAV_FUZZ_WORLDS
-void read_world(Bytes bytes) {
+void read_gazebo_world(Bytes bytes) {
   expect_value_or_line([&] { (void)simulation::load_gazebo(file_of("world.sdf", bytes)); });
 }
 #endif
@@ -352,7 +352,7 @@ constexpr std::array targets{
     FuzzTarget{"undo", undo_changes},
     FuzzTarget{"ros_messages", read_ros_bytes},
 #ifdef PANONAV_FUZZ_WORLDS
-    FuzzTarget{"world", read_world},
+    FuzzTarget{"world", read_gazebo_world},
 #endif
 };
 

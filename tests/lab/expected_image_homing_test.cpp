@@ -158,7 +158,7 @@ TEST(ExpectedImageHoming, HasThePublishedTable) {
   }
   EXPECT_LT(farthest, 2.0 / 3.0);
   EXPECT_GT(farthest, 0.6);
-  for (int i = 0; i < 360; ++i) EXPECT_EQ(homing.pixels(0)[i], i);
+  for (int i = 0; i < 360; ++i) EXPECT_EQ(homing.expected_pixel_indices(0)[i], i);
 }
 
 TEST(ExpectedImageHoming, RefusesWhatItCannotCompare) {

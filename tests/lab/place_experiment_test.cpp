@@ -79,7 +79,7 @@ TEST(PlaceExperiment, OfOnePlaceTellsItFromOthersAndIsTheSameOnAnyNumberOfThread
   }
   std::vector<const simulation::PlaceRecording*> all;
   for (const simulation::PlaceRecording& place : places) all.push_back(&place);
-  const auto rates = recognition_rates(all, two);
+  const auto rates = measure_recognition_rates(all, two);
   ASSERT_EQ(rates.size(), 16U);
   for (std::size_t i = 0; i < rates.size(); ++i) {
     std::cout << rates[i].memory << " asked for " << rates[i].queries << ": known "

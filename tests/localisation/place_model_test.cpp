@@ -77,8 +77,8 @@ TEST(PlaceModel, DoesNotNeedPoses) {
   for (const ViewId view : without.views()) without.set_pose(view, std::nullopt);
   const PlaceModel blind = learn_place_model(ColumnRanking(without));
   const PlaceModel posed = learn_place_model(ColumnRanking(place.memory));
-  EXPECT_TRUE(blind.learnt && posed.learnt && posed.beside);
-  EXPECT_FALSE(blind.beside);
+  EXPECT_TRUE(blind.learnt && posed.learnt && posed.nearest_view_difference);
+  EXPECT_FALSE(blind.nearest_view_difference);
   EXPECT_EQ(blind.mirrored, posed.mirrored);
   // Positions can only make it stricter.
   EXPECT_GE(blind.threshold, posed.threshold);

@@ -53,8 +53,8 @@ TEST(MotionHistory, APublisherThatBeginsAnewDoesNotMoveTheRobot) {
 TEST(MotionHistory, KeepsSecondsOnlyHoweverManyMessagesCome) {
   MotionHistory motion;
   for (int i = 0; i < 100'000; ++i) (void)motion.add(i * ms, {0.001 * i, 0.0, 0.0});
-  EXPECT_TRUE(motion.at(99'999 * ms - MotionHistory::kept_ns + 2 * ms));
-  EXPECT_FALSE(motion.at(99'999 * ms - MotionHistory::kept_ns - 2 * ms));
+  EXPECT_TRUE(motion.at(99'999 * ms - MotionHistory::max_age_ns + 2 * ms));
+  EXPECT_FALSE(motion.at(99'999 * ms - MotionHistory::max_age_ns - 2 * ms));
   MotionHistory flood;
   for (int i = 0; i < 100'000; ++i) (void)flood.add(i, {});
   EXPECT_FALSE(flood.at(89'000));

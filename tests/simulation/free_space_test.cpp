@@ -49,7 +49,7 @@ TEST(Occupancy, DistancesAreThoseOfAFullSearch) {
                         1 + static_cast<int>(random.index(40))};
     std::vector<std::uint8_t> cells(static_cast<std::size_t>(raster.columns * raster.rows));
     for (auto& cell : cells) cell = random.uniform() < 0.02 ? 1 : 0;
-    const auto distances = distance_to_cells(cells, raster);
+    const auto distances = compute_distances_to_cells(cells, raster);
     for (int j = 0; j < raster.rows; ++j) {
       for (int i = 0; i < raster.columns; ++i) {
         double nearest = std::numeric_limits<double>::infinity();
@@ -84,7 +84,7 @@ TEST(Occupancy, EverySampledPointOfATriangleLiesInAMarkedCellAndNoCellIsFar) {
           {random.uniform(0.0, 2.0), random.uniform(0.0, 2.0), random.uniform(-1.0, 2.0)});
     mesh.triangles.push_back({0, 1, 2});
     scene.meshes.push_back(mesh);
-    const auto cells = occupied_cells(scene, raster, 0.0, 0.6);
+    const auto cells = find_occupied_cells(scene, raster, 0.0, 0.6);
     std::vector<std::uint8_t> hit(cells.size(), 0);
     for (int n = 0; n < 20000; ++n) {
       double s = random.uniform();

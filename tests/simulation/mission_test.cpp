@@ -81,7 +81,7 @@ TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {
     ASSERT_EQ(run.path.size(), run.decisions.size());
     EXPECT_NE(run.end, NavigationDecision::State::moving);
     EXPECT_GE(run.shortest_m, 0.0);
-    arrived += static_cast<int>(run.arrives(0.2));
+    arrived += static_cast<int>(run.has_arrived(0.2));
     // No robot ever stands in a thing.
     for (const Pose2& pose : run.path) {
       EXPECT_GE(place.free_space->clearance_m(pose.position()), place.scene.robot_radius_m);
@@ -108,7 +108,7 @@ TEST(Missions, ARobotThatIsCarriedAwayFindsItsGoalAllTheSame) {
     const std::size_t next = *runs[i].kidnapped_at + 1;
     ASSERT_LT(next, runs[i].path.size());
     EXPECT_EQ(runs[i].path[next], *missions[i].kidnapped_to);
-    arrived += static_cast<int>(runs[i].arrives(0.2));
+    arrived += static_cast<int>(runs[i].has_arrived(0.2));
   }
   ASSERT_GE(carried, 4);
   EXPECT_GE(arrived, carried - 1);
@@ -151,7 +151,7 @@ TEST(Missions, ATourGoesOnFromGoalToGoalAmongPeople) {
         EXPECT_EQ(runs[i].path.front(), runs[i - 1].path.back());
       }
       EXPECT_GT(runs[i].shortest_m, 0.5);
-      arrived += static_cast<int>(runs[i].arrives(0.15));
+      arrived += static_cast<int>(runs[i].has_arrived(0.15));
     }
     EXPECT_GE(arrived, 2) << monte_carlo;
   }
@@ -186,7 +186,7 @@ TEST(Missions, ADriveWithLinesRecordsARouteThatIsRepeated) {
   }
   const Mission mission{remembered.graph.view(way.size() - 1), way.front(), {}};
   const auto run = run_missions(place, remembered, {mission}, {}, 3, executor).front();
-  EXPECT_TRUE(run.arrives(0.125));
+  EXPECT_TRUE(run.has_arrived(0.125));
   const auto on_route = std::ranges::count(run.decisions, true, &NavigationDecision::on_route);
   EXPECT_GT(2 * static_cast<std::size_t>(on_route), run.decisions.size());
 }

@@ -28,7 +28,7 @@ TEST(People, WalkAtAWalkingPaceThroughFreePlaces) {
   for (int i = 0; i < 200; ++i) {
     std::vector<Point2> before;
     for (std::size_t k = 0; k < people.size(); ++k) before.push_back(people.position(k));
-    people.pass(0.5, nowhere, 0.2);
+    people.advance(0.5, nowhere, 0.2);
     for (std::size_t k = 0; k < people.size(); ++k) {
       EXPECT_LE(distance(before[k], people.position(k)), 0.4 + 1e-9);
       EXPECT_GT(space->clearance_m(people.position(k)), 0.0);
@@ -47,9 +47,9 @@ TEST(People, NeverWalkIntoARobotAndGoAnotherWayInTheEnd) {
   // Whoever stands there goes first.
   int moments_on_top = 0;
   for (int i = 0; i < 400; ++i) {
-    const bool touched = people.touch(robot, robot_radius_m);
-    people.pass(0.1, robot, robot_radius_m);
-    const bool touches = people.touch(robot, robot_radius_m);
+    const bool touched = people.has_person_within(robot, robot_radius_m);
+    people.advance(0.1, robot, robot_radius_m);
+    const bool touches = people.has_person_within(robot, robot_radius_m);
     // Nobody comes to touch it.
     EXPECT_TRUE(touched || !touches) << i;
     moments_on_top += static_cast<int>(touches);
@@ -62,8 +62,8 @@ TEST(People, TheSameSeedGivesTheSameWalks) {
   People one(space, 3, 8);
   People two(space, 3, 8);
   for (int i = 0; i < 50; ++i) {
-    one.pass(0.3, nowhere, 0.2);
-    two.pass(0.3, nowhere, 0.2);
+    one.advance(0.3, nowhere, 0.2);
+    two.advance(0.3, nowhere, 0.2);
     for (std::size_t k = 0; k < one.size(); ++k) EXPECT_EQ(one.position(k), two.position(k));
   }
 }

@@ -14,20 +14,20 @@ namespace {
 
 TEST(MomentJson, HoldsWhatIsKnownWhateverItIs) {
   recordings::RunMoment moment{.stamp_s = std::numeric_limits<double>::quiet_NaN()};
-  EXPECT_EQ(json::parse(moment_json(moment, 3)), json::parse(R"({"n": 3, "t": null})"));
+  EXPECT_EQ(json::parse(moment_to_json(moment, 3)), json::parse(R"({"n": 3, "t": null})"));
   moment = moment_at(1.25);
   moment.pose->x_m = std::numeric_limits<double>::infinity();
   moment.covariance = std::array{1.0, 2.0, 0.0, 2.0, 5.0, 0.0, 0.0, 0.0, 9.0};
   moment.truth = ReferencePose{1.00004, 2.0, std::nullopt};
   moment.values = {{"a \"name\"\n</script>", "\xff\xfe"}, {"event", "one"}, {"event", "two"}};
-  const json parsed = json::parse(moment_json(moment, 0));
+  const json parsed = json::parse(moment_to_json(moment, 0));
   EXPECT_EQ(parsed["pose"], json::parse("[null, 2.0, 0.5]"));
   EXPECT_EQ(parsed["covariance"], json::parse("[1.0, 2.0, 5.0]"));
   EXPECT_EQ(parsed["truth"], json::parse("[1.0, 2.0, null]"));
   EXPECT_EQ(parsed["values"]["a \"name\"\n</script>"], "\uFFFD\uFFFD");
   EXPECT_EQ(parsed["values"]["event"], "one, two");
-  EXPECT_EQ(moment_json(moment, 0).find('\n'), std::string::npos);  // one line of an event
-  EXPECT_EQ(retained_json(moment), "");
+  EXPECT_EQ(moment_to_json(moment, 0).find('\n'), std::string::npos);  // one line of an event
+  EXPECT_EQ(retained_to_json(moment), "");
 }
 
 TEST(MomentJson, TellsModesComparisonsAndStages) {
@@ -37,7 +37,7 @@ TEST(MomentJson, TellsModesComparisonsAndStages) {
   moment.comparisons = {{7, 100}, {2, 4'000'000'000U}};
   moment.homing = recordings::RunHoming{1.5, std::numeric_limits<double>::quiet_NaN()};
   moment.stages_ms = {{"reading", 1.25}, {"filter", 0.5}};
-  const json parsed = json::parse(moment_json(moment, 0));
+  const json parsed = json::parse(moment_to_json(moment, 0));
   EXPECT_EQ(parsed["modes"], json::parse("[[0.75, 1.0, 2.0, 0.5, 1.0, 2.0, 5.0],"
                                          "[0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]"));
   EXPECT_EQ(parsed["compared"], json::parse("[7, 100, 2, 4000000000]"));
@@ -51,7 +51,7 @@ TEST(MomentJson, TellsWhatStays) {
   moment.reference_views = {{"a\xff", 0.5}, {"b", std::nullopt}};
   moment.regions = {{{{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}}, 3}};
   moment.walls = {{{0.0, 0.0}, {5.0, 0.0}}};
-  const json parsed = json::parse(retained_json(moment));
+  const json parsed = json::parse(retained_to_json(moment));
   EXPECT_EQ(parsed["names"], json::parse(R"(["a\ufffd", "b"])"));
   EXPECT_EQ(parsed["headings"], json::parse("[0.5, null]"));
   EXPECT_EQ(parsed["regions"], json::parse("[[3, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]]"));
@@ -62,7 +62,7 @@ TEST(MomentJson, TellsWhatStays) {
   recordings::RunMoment later{.stamp_s = 1.0};
   later.references = {{5.0, 6.0}};
   retained.take(later);
-  const json kept = json::parse(retained_json(retained.moment));
+  const json kept = json::parse(retained_to_json(retained.moment));
   EXPECT_EQ(kept["references"], json::parse("[5.0, 6.0]"));
   EXPECT_FALSE(kept.contains("names"));
   EXPECT_EQ(kept["walls"], parsed["walls"]);

@@ -200,7 +200,7 @@ std::array<double, 3> seen(PlotColour colour, const std::array<double, 9>& matri
   std::array<double, 3> linear{};
   for (std::size_t c = 0; c < 3; ++c) {
     const double value =
-        std::stoi(std::string(hex(colour).substr(1 + 2 * c, 2)), nullptr, 16) / 255.0;
+        std::stoi(std::string(to_css_colour(colour).substr(1 + 2 * c, 2)), nullptr, 16) / 255.0;
     linear[c] = value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
   }
   const auto times_rgb = [&](const std::array<double, 9>& m, const std::array<double, 3>& v) {
@@ -231,7 +231,8 @@ TEST(PlotColours, StayApartForColourBlindReaders) {
         const auto one = seen(static_cast<PlotColour>(a), eye);
         const auto other = seen(static_cast<PlotColour>(b), eye);
         EXPECT_GT(std::hypot(one[0] - other[0], one[1] - other[1], one[2] - other[2]), 15.0)
-            << hex(static_cast<PlotColour>(a)) << " and " << hex(static_cast<PlotColour>(b));
+            << to_css_colour(static_cast<PlotColour>(a)) << " and "
+            << to_css_colour(static_cast<PlotColour>(b));
       }
     }
   }

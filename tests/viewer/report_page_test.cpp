@@ -91,7 +91,7 @@ TEST_F(ReportPages, PicturesOfTheFolderAreEmbeddedByteForByte) {
   folder.write("c.svg", svg);
   ReportPage page("t", "l");
   page.add_pictures({{"a.png", "png"}, {"b.jpg", "jpeg"}, {"c.svg", "svg"}});
-  page.add_pictures({{data_url("image/png", png), "already"}});
+  page.add_pictures({{make_data_url("image/png", png), "already"}});
   const std::string written = write(page);
   EXPECT_EQ(pictures_of(written), 4U);
   const auto source = [&](const std::string& alt) {
@@ -121,7 +121,7 @@ TEST_F(ReportPages, AStoryBeginsThePageAndLinksToItsParts) {
                    .meaning = "error",
                    .part = 3},
                   {.title = "taken",
-                   .shown = ReportPicture{data_url("image/png", {}), "hall"},
+                   .shown = ReportPicture{make_data_url("image/png", {}), "hall"},
                    .value = "2 m",
                    .meaning = "way"}},
                  "Begin here", {"panonav demo"});
@@ -177,13 +177,13 @@ TEST_F(ReportPages, MapsKeepTheirLayersAndFrames) {
   EXPECT_EQ(one["shown"], json::parse("[-2.0, -1.0, 4.0, 3.0]"));  // lower corner first
   EXPECT_FALSE(one.contains("backdrop"));
   const json unfolding = data_of(
-      {UnfoldingMap{.title = "all", .frames = {first, {.title = "second"}}, .backdrop = {layer}},
+      {MapAnimation{.title = "all", .frames = {first, {.title = "second"}}, .backdrop = {layer}},
        ""});
   EXPECT_EQ(unfolding["title"], "all");
   EXPECT_EQ(unfolding["backdrop"], json::array({drawn}));
   ASSERT_EQ(unfolding["frames"].size(), 2U);
   EXPECT_EQ(unfolding["frames"][1], json::parse(R"({"title": "second", "layers": []})"));
-  EXPECT_THROW((void)data_of({UnfoldingMap{.title = "none"}, ""}), ContractError);
+  EXPECT_THROW((void)data_of({MapAnimation{.title = "none"}, ""}), ContractError);
 }
 
 TEST_F(ReportPages, HeatMapsKeepTheirCells) {
@@ -250,7 +250,7 @@ TEST_F(ReportPages, RunsKeepTheirPicturesChangesAndRoute) {
   recordings::RunMoment second = moment_at(1.0);
   second.goal = Pose2{7.0, 8.0, 0.0};
   run.add(second);
-  run.unordered();
+  run.set_unordered();
   run.route({.title = "route", .columns = 1, .rows = 1, .values = {0.5F}},
             {{.along_m = 1.5, .changed_deg = {{-10.04, 20.06}}}, {.true_along_m = 2.5}});
   EXPECT_EQ(run.size(), 2U);

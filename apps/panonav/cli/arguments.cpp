@@ -34,17 +34,17 @@ struct Arguments::Implementation {
     std::string why;
   };
   std::vector<ArgumentInfo> infos = {};
-  std::vector<Take> takes = {};       ///< one for each of the infos
-  std::deque<Section> sections = {};  ///< a deque: takes keep references into it
+  std::vector<SetValue> value_setters = {};  ///< one for each of the infos
+  std::deque<Section> sections = {};         ///< a deque, as value_setters refer to its elements
   std::vector<Refusal> refusals = {};
   std::set<std::string, std::less<>> typed = {};  ///< flags
-  /// Reads and writes the flags outside options structs that may stand in option files.
+  /// Values typed for the flags of `allow_in_config_files`; nullopt: not set.
   std::map<std::string, std::optional<std::string>, std::less<>> plain = {};
   std::set<std::string, std::less<>> outputs = {};  ///< names of arguments that the verb writes
-  std::vector<NamedValue> values = {};              ///< all that were taken
+  std::vector<NamedValue> values = {};  ///< all values that were set, with their arguments
 
-  void take(std::size_t number, std::span<const std::string> words) {
-    takes[number](words);
+  void set_value(std::size_t number, std::span<const std::string> words) {
+    value_setters[number](words);
     const std::string& name = infos[number].name;
     for (const auto& word : words) values.push_back({name, word, outputs.contains(name)});
   }
@@ -52,7 +52,7 @@ struct Arguments::Implementation {
 
 namespace {
 
-/// `--cell-size-m` as `cell_size_m`.
+/// Converts `--cell-size-m` to `cell_size_m`.
 std::string to_member_name(std::string_view flag) {
   std::string name(flag.substr(2));
   std::replace(name.begin(), name.end(), '-', '_');
@@ -69,7 +69,7 @@ Number parse_whole_number(const std::string& flag, const std::string& text, Numb
   return value;
 }
 
-/// The longest of a flag's forms: "--out" of "-o,--out FILE".
+/// Returns the long form of a declared flag: "--out" for "-o,--out FILE".
 std::string long_flag(const std::string& declared) {
   const std::string forms = declared.substr(0, declared.find(' '));
   return forms.substr(forms.rfind(',') + 1);
@@ -87,7 +87,7 @@ Arguments::Arguments() : implementation_(std::make_unique<Implementation>()) {}
 Arguments::~Arguments() = default;
 
 ArgumentInfo& Arguments::add(const std::string& declared, const std::string& value,
-                             const std::string& help, Take take) {
+                             const std::string& help, SetValue set_value) {
   ArgumentInfo info;
   info.name = long_flag(declared);
   const std::size_t comma = declared.find(',');
@@ -95,7 +95,7 @@ ArgumentInfo& Arguments::add(const std::string& declared, const std::string& val
   const std::size_t blank = declared.find(' ');
   info.value = blank == std::string::npos ? value : declared.substr(blank + 1);
   info.help = help;
-  implementation_->takes.push_back(std::move(take));
+  implementation_->value_setters.push_back(std::move(set_value));
   return implementation_->infos.emplace_back(std::move(info));
 }
 
@@ -121,7 +121,7 @@ void Arguments::optional_positionals(const std::string& name, std::vector<std::s
 }
 
 void Arguments::option(const std::string& flag, std::string& value, const std::string& help) {
-  add(flag, "TEXT", help, [&value](auto words) { value = words.front(); }).initial = value;
+  add(flag, "TEXT", help, [&value](auto words) { value = words.front(); }).default_value = value;
 }
 
 void Arguments::required_option(const std::string& flag, std::string& value,
@@ -169,7 +169,7 @@ void Arguments::option(const std::string& flag, int& value, int low, const std::
   auto& info = add(flag, "INT", help, [&value, low, name = long_flag(flag)](auto words) {
     value = parse_whole_number(name, words.front(), low);
   });
-  info.initial = std::to_string(value);
+  info.default_value = std::to_string(value);
   info.range = "from " + std::to_string(low);
 }
 
@@ -204,18 +204,19 @@ void Arguments::add_section(const std::string& section, const std::string& prefi
   OptionLister lister([&](const ListedOption& option) {
     auto& text = added.entries[std::string(option.info.name)].text;
     std::string help(option.info.help);
-    // Begins with a capital letter, unless the first word is a symbol.
+    // Capitalises the first letter, unless the first word is a symbol of one letter or has
+    // capitals.
     if (help.size() > 1 && help[1] >= 'a' && help[1] <= 'z' && help[0] >= 'a' && help[0] <= 'z') {
       help[0] = static_cast<char>(help[0] - 'a' + 'A');
     }
     const std::string flag = to_flag(before + std::string(option.info.name));
     auto& info =
         add(flag, std::string(option.type), help, [&text](auto words) { text = words.front(); });
-    info.initial = option.value;
+    info.default_value = option.value;
     info.range = option.range;
     info.choices.assign(option.choices.begin(), option.choices.end());
     info.section = section;
-    info.common = false;
+    info.is_in_short_help = false;
   });
   added.visit(lister);
 }
@@ -228,17 +229,18 @@ void Arguments::allow_in_config_files(const std::string& section,
   }
 }
 
-void Arguments::set_common(std::initializer_list<std::string_view> flags, bool common) {
+void Arguments::set_in_short_help(std::initializer_list<std::string_view> flags,
+                                  bool is_in_short_help) {
   for (const auto flag : flags) {
     const auto found = std::ranges::find(implementation_->infos, flag, &ArgumentInfo::name);
     if (found == implementation_->infos.end()) {
       throw std::logic_error(std::string(flag) + " is not declared");
     }
-    found->common = common;
+    found->is_in_short_help = is_in_short_help;
   }
 }
 
-void Arguments::writes(std::initializer_list<std::string_view> names) {
+void Arguments::declare_outputs(std::initializer_list<std::string_view> names) {
   for (const auto name : names) {
     if (std::ranges::find(infos(), name, &ArgumentInfo::name) == infos().end()) {
       throw std::logic_error(std::string(name) + " is not declared");
@@ -255,26 +257,28 @@ std::string Arguments::explain_unknown_flag(const std::string& typed) const {
   return "no such option: " + typed + suggest_name(typed, names);
 }
 
-void Arguments::read(std::span<const std::string> words, std::string_view verb, bool may_miss) {
+void Arguments::read(std::span<const std::string> words, std::string_view verb,
+                     bool allow_missing) {
   const auto& infos = implementation_->infos;
   const auto find = [&infos](std::string_view name) {
     return std::ranges::find_if(infos, [&](const ArgumentInfo& info) {
       return !info.positional() && (info.name == name || info.short_form == name);
     });
   };
-  std::vector<std::string> loose;
-  std::vector<bool> seen(infos.size(), false);
+  std::vector<std::string> positional_words;
+  std::vector<bool> is_typed(infos.size(), false);
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     if (word == "--") {
-      loose.insert(loose.end(), words.begin() + static_cast<std::ptrdiff_t>(i) + 1, words.end());
+      positional_words.insert(positional_words.end(),
+                              words.begin() + static_cast<std::ptrdiff_t>(i) + 1, words.end());
       break;
     }
     if (!looks_like_flag(word)) {
-      loose.push_back(word);
+      positional_words.push_back(word);
       continue;
     }
-    // "--out=FILE" and "-oFILE" hold their value.
+    // "--out=FILE" and "-oFILE" contain their value.
     const bool is_long = word.starts_with("--");
     const std::string name = word.substr(0, is_long ? word.find('=') : 2);
     const auto found = find(name);
@@ -291,54 +295,54 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb, 
       values.push_back(words[++i]);
     }
     const auto number = static_cast<std::size_t>(found - infos.begin());
-    if (seen[number] && value_count > 0) throw UsageError(found->name + " is given twice");
-    seen[number] = true;
+    if (is_typed[number] && value_count > 0) throw UsageError(found->name + " is given twice");
+    is_typed[number] = true;
     implementation_->typed.insert(found->name);
-    implementation_->take(number, values);
+    implementation_->set_value(number, values);
     const auto plain = implementation_->plain.find(found->name);
     if (plain != implementation_->plain.end()) plain->second = values.front();
   }
-  read_positionals(loose, verb, may_miss);
-  for (std::size_t i = 0; i < infos.size() && !may_miss; ++i) {
-    if (infos[i].required && !infos[i].positional() && !seen[i]) {
+  read_positionals(positional_words, verb, allow_missing);
+  for (std::size_t i = 0; i < infos.size() && !allow_missing; ++i) {
+    if (infos[i].required && !infos[i].positional() && !is_typed[i]) {
       throw UsageError(infos[i].name + " is required");
     }
   }
 }
 
 void Arguments::read_positionals(std::span<const std::string> words, std::string_view verb,
-                                 bool may_miss) {
+                                 bool allow_missing) {
   const auto& infos = implementation_->infos;
   std::vector<std::size_t> positionals;
   for (std::size_t i = 0; i < infos.size(); ++i) {
     if (infos[i].positional()) positionals.push_back(i);
   }
-  // A memory file where something else belongs, and no memory in its place.
+  // Reports arguments in the wrong order: MEMORY is not a memory file, but another positional is.
   for (std::size_t i = 0; i < std::min(positionals.size(), words.size()); ++i) {
     if (infos[positionals[i]].name != "MEMORY" || infos[positionals[i]].repeated ||
         words[i].ends_with(".panonav") || is_server_address(words[i])) {
       continue;
     }
     const auto other = std::ranges::find_if(words, is_memory_file);
-    const auto there = static_cast<std::size_t>(other - words.begin());
+    const auto memory_index = static_cast<std::size_t>(other - words.begin());
     if (other == words.end()) continue;
     std::vector<std::string> swapped(words.begin(), words.end());
-    std::swap(swapped[i], swapped[there]);
+    std::swap(swapped[i], swapped[memory_index]);
     std::string command = "panonav " + std::string(verb);
     for (const auto& word : swapped) command.append(" ").append(quote_for_shell(word));
     throw UsageError("MEMORY is '" + words[i] + "' and " +
-                     infos[positionals[std::min(there, positionals.size() - 1)]].name + " is '" +
-                     *other + "': the arguments are in the wrong order (did you mean '" + command +
-                     "'?)");
+                     infos[positionals[std::min(memory_index, positionals.size() - 1)]].name +
+                     " is '" + *other + "': the arguments are in the wrong order (did you mean '" +
+                     command + "'?)");
   }
   std::size_t next = 0;
   for (const std::size_t i : positionals) {
     if (next == words.size()) {
-      if (infos[i].required && !may_miss) throw UsageError(infos[i].name + " is required");
+      if (infos[i].required && !allow_missing) throw UsageError(infos[i].name + " is required");
       continue;
     }
     const std::size_t count = infos[i].repeated ? words.size() - next : 1;
-    implementation_->take(i, words.subspan(next, count));
+    implementation_->set_value(i, words.subspan(next, count));
     next += count;
   }
   if (next < words.size()) {
@@ -363,7 +367,7 @@ void Arguments::resolve(const std::optional<std::string>& config,
     if (plain == implementation_->plain.end()) continue;
     const auto text = file->take_text(info.section, to_member_name(info.name));
     if (text && !implementation_->typed.contains(info.name)) {
-      implementation_->take(i, std::span(&*text, 1));
+      implementation_->set_value(i, std::span(&*text, 1));
       plain->second = text;
     }
   }
@@ -402,22 +406,22 @@ void Arguments::reject_options(std::span<const std::string> options, const std::
   }
 }
 
-void Arguments::require_equal(const std::string& section, const Visit& typed, const Visit& kept,
-                              const std::string& as) const {
+void Arguments::require_equal(const std::string& section, const Visit& typed, const Visit& stored,
+                              const std::string& message_end) const {
   std::vector<std::pair<std::string, std::string>> typed_values;
   OptionLister list_typed([&](const ListedOption& option) {
     typed_values.emplace_back(option.info.name, option.value);
   });
   typed(list_typed);
   std::size_t next = 0;
-  OptionLister list_kept([&](const ListedOption& option) {
+  OptionLister list_stored([&](const ListedOption& option) {
     const auto& [name, value] = typed_values[next++];
     if (value == option.value || !is_set(section, name)) return;
     const auto declared =
         std::ranges::find(implementation_->sections, section, &Implementation::Section::name);
-    throw ContractError(to_flag(declared->prefix + name), value, option.value + as);
+    throw ContractError(to_flag(declared->prefix + name), value, option.value + message_end);
   });
-  kept(list_kept);
+  stored(list_stored);
 }
 
 std::vector<std::string> Arguments::sections() const {
@@ -460,7 +464,7 @@ std::string Arguments::config_template(std::string_view verb) const {
       const auto plain = implementation_->plain.find(info.name);
       if (info.section != section.name || plain == implementation_->plain.end()) continue;
       text += "# " + info.help + "\n" + (plain->second ? "" : "# ") + to_member_name(info.name) +
-              " = " + quote_for_toml(plain->second.value_or(info.initial)) + "\n";
+              " = " + quote_for_toml(plain->second.value_or(info.default_value)) + "\n";
     }
   }
   if (implementation_->sections.empty()) {

@@ -45,13 +45,13 @@ std::vector<std::string> list_proposals(const Description& description) {
   return words;
 }
 
-bool positionals_are_files(const Description& description) {
+bool has_file_positionals(const Description& description) {
   return std::ranges::any_of(description.arguments, [](const ArgumentInfo& argument) {
     return argument.positional() && accepts_files(argument);
   });
 }
 
-/// First words of verbs, with aliases; "route" once.
+/// Returns the first words of all verbs and their aliases, each word once.
 std::vector<std::string> list_first_words(std::span<const Description> verbs) {
   std::vector<std::string> words;
   for (const auto& [verb, arguments] : verbs) {
@@ -62,7 +62,7 @@ std::vector<std::string> list_first_words(std::span<const Description> verbs) {
   return words;
 }
 
-/// First and second words of the verbs of two words: {"route", {"record", "follow"}}.
+/// Returns the second words of two-word verbs by first word: {"route", {"record", "follow"}}.
 std::vector<std::pair<std::string, std::vector<std::string>>> list_second_words(
     std::span<const Description> verbs) {
   std::vector<std::pair<std::string, std::vector<std::string>>> found;
@@ -84,7 +84,7 @@ std::string case_pattern(const Verb& verb) {
   return text;
 }
 
-std::string bash_script(std::span<const Description> verbs) {
+std::string make_bash_script(std::span<const Description> verbs) {
   std::string script =
       "# Completion of panonav for bash; made by: panonav completion bash\n"
       "_panonav() {\n"
@@ -110,7 +110,7 @@ std::string bash_script(std::span<const Description> verbs) {
         "  " + case_pattern(description.verb) + ")\n    flags='" + list_flags(description) + "'\n";
     const auto words = list_proposals(description);
     if (!words.empty()) script += "    words='" + join_words(words) + "'\n";
-    if (positionals_are_files(description)) script += "    files=1\n";
+    if (has_file_positionals(description)) script += "    files=1\n";
     std::string cases;
     for (const auto& argument : description.arguments) {
       if (argument.positional() || argument.value.empty()) continue;
@@ -130,7 +130,7 @@ std::string bash_script(std::span<const Description> verbs) {
          "complete -F _panonav panonav";
 }
 
-/// Text within single quotes of zsh; `special` also get a backslash.
+/// Escapes a text for single quotes of zsh; characters of `special` also get a backslash.
 std::string quote_for_zsh(std::string_view text, std::string_view special) {
   std::string result;
   for (const char c : text) {
@@ -140,15 +140,15 @@ std::string quote_for_zsh(std::string_view text, std::string_view special) {
   return result;
 }
 
-/// ":FILE:_files", once for each word of the value.
-std::string zsh_values(const ArgumentInfo& argument) {
+/// Returns ":FILE:_files" for each word of the argument's value, or its choices.
+std::string format_zsh_values(const ArgumentInfo& argument) {
   std::string text;
   std::string_view left = argument.positional() ? argument.name : argument.value;
   while (!left.empty()) {
     const std::size_t end = std::min(left.find(' '), left.size());
     std::string action = accepts_files(argument) ? "_files" : " ";
     if (!argument.choices.empty()) {
-      // Built-in names beside files, or nothing but the choices.
+      // Proposes files and the choices if files are accepted, otherwise only the choices.
       const bool files = accepts_files(argument);
       action = files ? "{_alternative \"names\\:name\\:(" : "(";
       action += join_words(argument.choices);
@@ -160,7 +160,8 @@ std::string zsh_values(const ArgumentInfo& argument) {
   return text;
 }
 
-/// Returns the summary of the verb that begins with the word.
+/// Returns the summary of the verb with this name or alias; for the first word of two-word verbs a
+/// general text.
 std::string find_summary(std::string_view word, std::span<const Description> verbs) {
   const auto found = std::ranges::find_if(verbs, [word](const Description& description) {
     return description.verb.name == word || description.verb.alias == word;
@@ -168,7 +169,7 @@ std::string find_summary(std::string_view word, std::span<const Description> ver
   return std::string(found == verbs.end() ? "Verbs of two words" : found->verb.summary);
 }
 
-std::string zsh_script(std::span<const Description> verbs) {
+std::string make_zsh_script(std::span<const Description> verbs) {
   std::string script =
       "#compdef panonav\n"
       "# Completion of panonav for zsh; made by: panonav completion zsh\n"
@@ -193,8 +194,8 @@ std::string zsh_script(std::span<const Description> verbs) {
     script += "  " + case_pattern(description.verb) + ")\n    _arguments";
     for (const auto& argument : description.arguments) {
       if (argument.positional()) {
-        script +=
-            " \\\n      '" + std::string(argument.repeated ? "*" : "") + zsh_values(argument) + "'";
+        script += " \\\n      '" + std::string(argument.repeated ? "*" : "") +
+                  format_zsh_values(argument) + "'";
         continue;
       }
       for (const auto& form : {argument.short_form, argument.name}) {
@@ -202,8 +203,8 @@ std::string zsh_script(std::span<const Description> verbs) {
         const bool attached = !argument.value.empty() && form.starts_with("--") &&
                               argument.value.find(' ') == std::string::npos;
         script += " \\\n      '" + form + (attached ? "=" : "") + "[" +
-                  quote_for_zsh(format_help_line(argument), "[]:\\") + "]" + zsh_values(argument) +
-                  "'";
+                  quote_for_zsh(format_help_line(argument), "[]:\\") + "]" +
+                  format_zsh_values(argument) + "'";
       }
     }
     script += "\n    ;;\n";
@@ -224,7 +225,7 @@ std::string quote_for_fish(std::string_view text) {
   return result + "'";
 }
 
-std::string fish_script(std::span<const Description> verbs) {
+std::string make_fish_script(std::span<const Description> verbs) {
   std::string script =
       "# Completion of panonav for fish; made by: panonav completion fish\n"
       "function __panonav_verb\n"
@@ -249,7 +250,7 @@ std::string fish_script(std::span<const Description> verbs) {
       const std::string start = "complete -c panonav -n '__panonav_verb " + std::string(name) + "'";
       const auto words = list_proposals(description);
       if (!words.empty()) script += start + " -a " + quote_for_fish(join_words(words)) + "\n";
-      if (positionals_are_files(description)) script += start + " -F\n";
+      if (has_file_positionals(description)) script += start + " -F\n";
       for (const auto& argument : description.arguments) {
         if (argument.positional()) continue;
         script += start + " -l " + argument.name.substr(2);
@@ -270,9 +271,9 @@ struct Shell {
   std::string (*script)(std::span<const Description>);
 };
 constexpr std::array<Shell, 3> shells{{
-    {"bash", bash_script},
-    {"zsh", zsh_script},
-    {"fish", fish_script},
+    {"bash", make_bash_script},
+    {"zsh", make_zsh_script},
+    {"fish", make_fish_script},
 }};
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace panonav::command {
 
 namespace {
 
-/// An argument and its help beside it, or below it where it is long.
+/// Formats an argument with its help to the right, or below it if the argument is long.
 std::string format_row(const std::string& left, std::string_view right, std::size_t column) {
   std::string line = "  " + left;
   if (line.size() + 2 > column) {
@@ -51,21 +51,21 @@ std::span<const ExitMeaning> exit_meanings() {
 std::string wrap_text(std::string_view text, std::size_t indent, std::size_t column) {
   constexpr std::size_t width = 80;
   std::string lines;
-  bool begins = true;
+  bool is_line_start = true;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find_first_of(" \n"), text.size());
     const auto word = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     if (word.empty()) continue;
-    if (!begins && column + 1 + word.size() > width) {
+    if (!is_line_start && column + 1 + word.size() > width) {
       lines += '\n';
       lines.append(indent, ' ');
       column = indent;
-      begins = true;
+      is_line_start = true;
     }
-    lines.append(begins ? "" : " ").append(word);
-    column += word.size() + (begins ? 0 : 1);
-    begins = false;
+    lines.append(is_line_start ? "" : " ").append(word);
+    column += word.size() + (is_line_start ? 0 : 1);
+    is_line_start = false;
   }
   return lines;
 }
@@ -76,7 +76,7 @@ std::string format_help_line(const ArgumentInfo& argument) {
     if (!text.empty()) notes += (notes.empty() ? "" : "; ") + text;
   };
   if (argument.required && !argument.positional()) note("required");
-  if (!argument.initial.empty()) note("default " + argument.initial);
+  if (!argument.default_value.empty()) note("default " + argument.default_value);
   note(argument.range);
   const std::string choices = join_texts(argument.choices);
   if (!argument.positional() && !choices.empty()) note("one of " + choices);
@@ -120,7 +120,7 @@ std::string format_help(const Description& description, bool all) {
   for (const bool positional : {true, false}) {
     for (const auto& argument : arguments) {
       if (argument.positional() != positional) continue;
-      if (!all && !argument.common) {
+      if (!all && !argument.is_in_short_help) {
         ++hidden;
         continue;
       }

@@ -13,12 +13,12 @@ namespace panonav::command {
 
 using nlohmann::ordered_json;
 
-/// null where there is no value.
+/// Returns the value as JSON; null if there is none.
 template <class Value>
 [[nodiscard]] ordered_json to_json_or_null(const std::optional<Value>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
-/// null where the number is not finite.
+/// Returns the number as JSON; null if it is not finite.
 [[nodiscard]] inline ordered_json to_json_or_null(double value) {
   return std::isfinite(value) ? ordered_json(value) : ordered_json();
 }
@@ -32,8 +32,8 @@ template <class Value>
   return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", to_json_or_null(pose.heading_rad)}};
 }
 
-/// The document on one line. Bytes of names that are not UTF-8 become the replacement character
-/// U+FFFD.
+/// Returns the document as one line of text. Bytes that are not valid UTF-8 become the replacement
+/// character U+FFFD.
 [[nodiscard]] inline std::string json_line(const ordered_json& document) {
   return document.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }

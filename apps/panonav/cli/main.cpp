@@ -20,15 +20,16 @@ namespace {
 
 using panonav::command::ExitCode;
 
-/// One line, whatever the message holds.
+/// Prints the message as one line on standard error; control characters are escaped.
 void report(std::string_view verb, std::string_view message) {
   std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": "
             << panonav::to_readable_line(
-                   panonav::command::name_flags(panonav::mask_passwords(message)))
+                   panonav::command::replace_options_by_flags(panonav::mask_passwords(message)))
             << '\n';
 }
 
-/// Prints rows of memories on servers that are left out as bad, as long as the session lives.
+/// Prints a warning for each damaged row that is skipped while reading a memory on a server. The
+/// session must outlive this object.
 class LeftOutWarnings {
  public:
   LeftOutWarnings(panonav::command::Session& session, std::string_view verb) {
@@ -60,7 +61,8 @@ ExitCode run(std::string_view& verb, std::span<const std::string> words) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // A file that hits its size limit is then a failed write with a message, not a killed process.
+  // Ignores the signal for file size limits, so that such a write fails with a message instead of
+  // killing the process.
   std::signal(SIGXFSZ, SIG_IGN);
   std::string_view verb;
   try {
@@ -80,7 +82,7 @@ int main(int argc, char** argv) {
     report(verb, error.what());
     return static_cast<int>(ExitCode::bad_input);
   } catch (const std::filesystem::filesystem_error& error) {
-    // A path that the system does not take, such as a name of 300 characters.
+    // The system rejects the path, such as a name of 300 characters.
     report(verb, error.path1().string() + ": cannot be used: " + error.code().message());
     return static_cast<int>(ExitCode::bad_input);
   } catch (const std::bad_alloc&) {

@@ -32,7 +32,7 @@ constexpr std::array<Meaning, 4> files{{
     {"FILE of --config", "Options in sections; panonav VERB --config-template prints an example."},
 }};
 
-/// Escapes a text so that roff shows it unchanged; lines are filled.
+/// Escapes a text so that roff shows it unchanged; newlines become blanks.
 std::string escape_roff(std::string_view text) {
   std::string shown;
   for (const char c : text) {

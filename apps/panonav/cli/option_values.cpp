@@ -26,7 +26,7 @@ std::string to_flag(std::string_view option) {
   return flag;
 }
 
-std::string name_flags(std::string_view message) {
+std::string replace_options_by_flags(std::string_view message) {
   constexpr std::string_view lead = "the option ";
   std::string named;
   for (std::size_t at = message.find(lead); at != std::string_view::npos; at = message.find(lead)) {

@@ -11,21 +11,21 @@
 
 namespace panonav::command {
 
-/// The values that the user set for one option of a struct.
+/// Records how the user set one option of a struct.
 struct OptionEntry {
   std::optional<std::string> text;  ///< typed on the command line
   bool in_file = false;             ///< given in the --config file
 };
 
-/// The entries by name of the option.
+/// Maps option names to their entries.
 using OptionEntries = std::map<std::string, OptionEntry>;
 
-/// `cell_size_m` as `--cell-size-m`.
+/// Converts `cell_size_m` to `--cell-size-m`.
 [[nodiscard]] std::string to_flag(std::string_view option);
 
-/// Replaces "the option NAME", as messages of the library have it, by the flag: "the option
-/// image_topic" becomes "--image-topic".
-[[nodiscard]] std::string name_flags(std::string_view message);
+/// Replaces "the option NAME" in messages of the library by the flag: "the option image_topic"
+/// becomes "--image-topic".
+[[nodiscard]] std::string replace_options_by_flags(std::string_view message);
 
 /// Returns the texts with commas between them.
 [[nodiscard]] std::string join_texts(const auto& texts) {
@@ -40,11 +40,11 @@ using OptionEntries = std::map<std::string, OptionEntry>;
 /// True if the word is a flag, not a positional or a negative number.
 [[nodiscard]] bool looks_like_flag(std::string_view word);
 
-/// Throws UsageError unless the whole text is one finite number.
+/// Parses the value of a flag. Throws UsageError unless the whole text is one finite number.
 [[nodiscard]] double parse_number(std::string_view flag, std::string_view text);
 
-/// Writes texts into the members that it visits. Throws UsageError on a text of the wrong type;
-/// ranges are left to `validate`.
+/// Parses the typed texts into the members of an options struct. Throws UsageError on a text of the
+/// wrong type; `validate` checks ranges afterwards.
 class TextApplier final : public OptionVisitor {
  public:
   explicit TextApplier(const OptionEntries& entries) : entries_(entries) {}
@@ -59,16 +59,16 @@ class TextApplier final : public OptionVisitor {
   const OptionEntries& entries_;
 };
 
-/// A member of an options struct as texts show it.
+/// Describes a member of an options struct for help, completion and config files.
 struct ListedOption {
   const OptionInfo& info;
-  std::string_view type;  ///< what stands for its value: "INT"
+  std::string_view type;  ///< placeholder of its value, such as "INT"
   std::string value;
-  std::string range;  ///< of a number; empty: any
+  std::string range;  ///< allowed numbers; empty: any
   std::span<const std::string_view> choices;
 };
 
-/// Shows each member that it visits to a function.
+/// Calls a function with the description of each member that it visits.
 class OptionLister final : public OptionVisitor {
  public:
   explicit OptionLister(std::function<void(const ListedOption&)> list) : list_(std::move(list)) {}

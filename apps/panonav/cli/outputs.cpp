@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Device and inode: the same for all names of a file.
+/// Device and inode, which are the same for all names of a file.
 using FileId = std::pair<dev_t, ino_t>;
 
 struct FoundFile {
@@ -27,7 +27,7 @@ struct FoundFile {
   mode_t mode = 0;
 };
 
-/// nullopt where nothing is.
+/// Returns id and type of the file; nullopt if there is none.
 std::optional<FoundFile> find_file(const fs::path& path) {
   struct stat status {};
   if (path.empty() || ::stat(path.c_str(), &status) != 0) return std::nullopt;
@@ -39,7 +39,7 @@ bool is_file(const fs::path& path, const FileId& id) {
   return found && found->id == id;
 }
 
-/// True if the file is in the folder or below it; links are followed, each folder once.
+/// True if the file is in the folder or one below it. Follows links, but visits each folder once.
 bool is_in_folder(const fs::path& folder, const FileId& id, std::set<FileId>& visited) {
   std::error_code error;
   fs::directory_iterator entry(folder, error);
@@ -55,7 +55,8 @@ bool is_in_folder(const fs::path& folder, const FileId& id, std::set<FileId>& vi
   return false;
 }
 
-/// True if a text in quotation marks is the file's path, as a camera file names its mask.
+/// True if the TOML file at `path` contains the file's path in quotation marks, as a camera file
+/// names its mask.
 bool is_named_by_toml(const fs::path& path, const FileId& id) {
   constexpr std::size_t max_bytes = 1U << 20U;
   std::string text;
@@ -63,7 +64,7 @@ bool is_named_by_toml(const fs::path& path, const FileId& id) {
     const auto bytes = read_file(path, max_bytes);
     text.assign(bytes.begin(), bytes.end());
   } catch (const FileError&) {
-    return false;  // whoever reads it says what is wrong
+    return false;  // the reader of the file reports the error
   }
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find_first_of("\"'\n", begin), text.size());
@@ -75,14 +76,14 @@ bool is_named_by_toml(const fs::path& path, const FileId& id) {
   return false;
 }
 
-bool is_read_through(const std::string& value, const FileId& id, bool is_page) {
-  // "NAME=MEMORY" of serve names a file, too.
+bool refers_to_file(const std::string& value, const FileId& id, bool is_page) {
+  // Also checks the part after '=', as serve takes "NAME=MEMORY".
   for (const std::string& path : {value, value.substr(value.find('=') + 1)}) {
     const auto found = find_file(path);
     if (!found) continue;
     if (found->id == id) return true;
     if (S_ISDIR(found->mode)) {
-      if (is_page) continue;  // no recording has one
+      if (is_page) continue;  // recordings contain no index.html
       std::set<FileId> visited{found->id};
       if (is_in_folder(path, id, visited)) return true;
       continue;
@@ -106,16 +107,15 @@ void require_separate_outputs(std::span<const NamedValue> values) {
     const bool is_page = found && S_ISDIR(found->mode);
     if (is_page) found = find_file(path /= "index.html");
     const bool exists = found && S_ISREG(found->mode);
-    if (found && !exists) continue;  // a pipe or a device takes what anybody writes
+    if (found && !exists) continue;  // a pipe or device is not overwritten
     for (std::size_t j = 0; j < values.size(); ++j) {
       const NamedValue& other = values[j];
       const bool is_same_name =
           j < i && other.is_output &&
           fs::path(other.value).lexically_normal() == fs::path(values[i].value).lexically_normal();
-      const bool is_same_file =
-          exists && i != j &&
-          (other.is_output ? is_file(other.value, found->id)
-                           : is_read_through(other.value, found->id, is_page));
+      const bool is_same_file = exists && i != j &&
+                                (other.is_output ? is_file(other.value, found->id)
+                                                 : refers_to_file(other.value, found->id, is_page));
       if (is_same_name || is_same_file) {
         throw UsageError(values[i].name + " is " + path.string() + ", which " + other.name + " " +
                          other.value + (other.is_output ? " writes" : " reads") +

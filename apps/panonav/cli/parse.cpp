@@ -8,14 +8,14 @@ namespace panonav::command {
 
 namespace {
 
-/// "route record": a verb of two words; the second one is empty where there is none.
+/// Splits a name such as "route record" into two words; the second is empty for names of one word.
 std::pair<std::string_view, std::string_view> split_verb(std::string_view verb) {
   const std::size_t blank = verb.find(' ');
   if (blank == std::string_view::npos) return {verb, {}};
   return {verb.substr(0, blank), verb.substr(blank + 1)};
 }
 
-/// All verbs of two words that begin with this one.
+/// Returns all two-word verbs whose first word is `first`.
 std::vector<std::string_view> find_verbs_beginning_with(std::span<const Verb> verbs,
                                                         std::string_view first) {
   std::vector<std::string_view> found;
@@ -46,26 +46,26 @@ const Verb* find_verb(std::span<const Verb> verbs, std::span<const std::string> 
 const Verb& find_required_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
   if (const Verb* verb = find_verb(verbs, words)) return *verb;
   if (words.empty()) throw UsageError("a verb is missing");
-  const auto longer = find_verbs_beginning_with(verbs, words[0]);
-  if (!longer.empty() && words.size() == 1) {
-    throw UsageError("'" + words[0] + "' needs a second word: " + join_texts(longer));
+  const auto two_word_verbs = find_verbs_beginning_with(verbs, words[0]);
+  if (!two_word_verbs.empty() && words.size() == 1) {
+    throw UsageError("'" + words[0] + "' needs a second word: " + join_texts(two_word_verbs));
   }
-  const std::string typed = longer.empty() ? words[0] : words[0] + " " + words[1];
+  const std::string typed = two_word_verbs.empty() ? words[0] : words[0] + " " + words[1];
   if (looks_like_flag(typed)) throw UsageError("no such option: " + typed + "; a verb is missing");
   std::vector<std::string_view> names;
   for (const auto& verb : verbs) {
     names.push_back(verb.name);
     if (!verb.alias.empty()) names.push_back(verb.alias);
   }
-  if (words.size() > 1) {  // the second word is part of what was meant, or is an argument
+  if (words.size() > 1) {  // the second word may belong to the verb
     const std::string both = words[0] + " " + words[1];
     if (const auto meant = suggest_name(both, names); !meant.empty()) {
       throw UsageError("'" + both + "' is not a verb" + meant);
     }
   }
-  throw UsageError(
-      "'" + typed + "' is not a verb" +
-      (longer.empty() ? suggest_name(typed, names) : "; allowed: " + join_texts(longer)));
+  throw UsageError("'" + typed + "' is not a verb" +
+                   (two_word_verbs.empty() ? suggest_name(typed, names)
+                                           : "; allowed: " + join_texts(two_word_verbs)));
 }
 
 std::vector<std::string> verb_names() {
@@ -76,8 +76,9 @@ std::vector<std::string> verb_names() {
 
 const Verb& find_named_verb(std::span<const Verb> verbs, const std::vector<std::string>& words) {
   const Verb& verb = find_required_verb(verbs, words);
-  const std::size_t own = split_verb(verb.name).second.empty() ? 1 : 2;
-  if (words.size() > own) throw UsageError("'" + words[own] + "' is one argument too many");
+  const std::size_t own_count = split_verb(verb.name).second.empty() ? 1 : 2;
+  if (words.size() > own_count)
+    throw UsageError("'" + words[own_count] + "' is one argument too many");
   return verb;
 }
 
@@ -88,29 +89,29 @@ ExitCode print_text(const std::string& text, Session& session) {
 
 namespace {
 
-/// A verb with all that it takes; `run` refers to the arguments.
-struct Declared {
+/// A verb with its declared arguments and their values; `run` refers to both.
+struct DeclaredVerb {
   CommonArguments common;
   Arguments arguments;
   Run run;
-  std::size_t own = 0;   ///< arguments of this verb; those of every verb come behind them
-  bool ignored = false;  ///< --help is found before
+  std::size_t own_count = 0;  ///< number of the verb's own arguments; common ones follow them
+  bool ignored = false;       ///< unused target of --help, which `parse` handles itself
 
   [[nodiscard]] Description description(const Verb& verb) const {
     Description description{verb, arguments.infos()};
-    for (std::size_t i = own; i < description.arguments.size(); ++i) {
+    for (std::size_t i = own_count; i < description.arguments.size(); ++i) {
       description.arguments[i].of_every_verb = true;
     }
     return description;
   }
 };
 
-std::shared_ptr<Declared> declare(const Verb& verb) {
-  auto declared = std::make_shared<Declared>();
+std::shared_ptr<DeclaredVerb> declare(const Verb& verb) {
+  auto declared = std::make_shared<DeclaredVerb>();
   auto& arguments = declared->arguments;
   auto& common = declared->common;
   declared->run = verb.declare(arguments);
-  declared->own = arguments.infos().size();
+  declared->own_count = arguments.infos().size();
   arguments.flag("--json", common.session.json, "Print results as JSON on standard output");
   arguments.flag("-q,--quiet", common.session.quiet,
                  "Print only results and errors: no progress, no notes and no \"Next:\" lines");
@@ -146,8 +147,9 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   }
   if (!words.empty() && is_help_flag(words[0])) return make_print_command({}, overview(verbs));
   if (words.size() > 1 && is_help_flag(words[1])) {
-    const auto longer = find_verbs_beginning_with(verbs, words[0]);
-    if (!longer.empty()) return make_print_command({}, "Verbs of two words: " + join_texts(longer));
+    const auto two_word_verbs = find_verbs_beginning_with(verbs, words[0]);
+    if (!two_word_verbs.empty())
+      return make_print_command({}, "Verbs of two words: " + join_texts(two_word_verbs));
   }
   const Verb& verb = find_required_verb(verbs, words);
   const auto declared = declare(verb);
@@ -162,15 +164,15 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
     return make_print_command(verb.name,
                               format_help(declared->description(verb), word == "--help-all"));
   }
-  const bool wants_template =
+  const bool is_template_requested =
       std::ranges::find(translated, "--config-template") != translated.end();
   const auto& common = declared->common;
-  declared->arguments.read(translated, verb.name, wants_template);
+  declared->arguments.read(translated, verb.name, is_template_requested);
   if (common.session.quiet && common.session.verbose) {
     throw UsageError("--quiet and --verbose cannot be combined");
   }
   declared->arguments.resolve(common.config, [&] {
-    // One file may serve several verbs, so the sections of all of them are allowed in it.
+    // Allows the sections of all verbs, as one file may serve several verbs.
     std::vector<std::string> sections;
     for (const auto& other : verbs) {
       const auto more = declare(other)->arguments.sections();
@@ -178,11 +180,11 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
     }
     return sections;
   });
-  if (wants_template) {
+  if (is_template_requested) {
     return make_print_command(verb.name, declared->arguments.config_template(verb.name));
   }
   return {verb.name, common.session, [declared](Session& session) {
-            return declared->run(session);  // with its arguments still alive
+            return declared->run(session);  // keeps the arguments alive
           }};
 }
 

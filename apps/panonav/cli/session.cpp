@@ -24,7 +24,8 @@ bool supports_colours(int descriptor) {
          std::string_view(terminal) != "dumb";
 }
 
-// Names may contain control sequences of a terminal. Line ends and the session's own styles stay.
+// Escapes control sequences, which names may contain, but keeps line ends and the session's own
+// styles.
 std::string escape_control_characters(std::string_view text) {
   constexpr std::array<std::string_view, 5> kept{"\n", "\033[0m", "\033[1m", "\033[31m",
                                                  "\033[32m"};
@@ -45,8 +46,9 @@ std::string escape_control_characters(std::string_view text) {
   return result;
 }
 
-// Estimates the time left from the rate so far; empty for the first steps and seconds.
-std::string estimate_time_left(double elapsed_s, std::size_t done, std::size_t total) {
+// Returns the time left, estimated from the rate so far, as a text; empty before 5 steps and 2
+// seconds have passed.
+std::string format_time_left(double elapsed_s, std::size_t done, std::size_t total) {
   if (elapsed_s < 2.0 || total < 10 || done < 5 || 20 * done < total || done >= total) return {};
   const double left_s = elapsed_s * static_cast<double>(total - done) / static_cast<double>(done);
   if (left_s < 90.0) return ", about " + format_fixed(std::max(1.0, left_s), 0) + " s left";
@@ -63,7 +65,7 @@ Session::Session(const SessionOptions& options)
 void Session::write_line(std::string_view line) {
   const std::lock_guard lock(mutex_);
   erase_bar();
-  std::cerr << escape_control_characters(name_flags(mask_passwords(line))) << '\n';
+  std::cerr << escape_control_characters(replace_options_by_flags(mask_passwords(line))) << '\n';
 }
 
 void Session::print(std::string_view text) {
@@ -174,7 +176,7 @@ void Progress::draw() {
   const std::chrono::duration<double> elapsed = Clock::now() - start_;
   session_.draw_bar(label_ + " [" + std::string(filled, '=') + std::string(width - filled, ' ') +
                     "] " + std::to_string(done_) + "/" + std::to_string(total_) +
-                    estimate_time_left(elapsed.count(), done_, total_));
+                    format_time_left(elapsed.count(), done_, total_));
 }
 
 }  // namespace panonav::command

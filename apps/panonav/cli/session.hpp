@@ -17,43 +17,46 @@ namespace panonav::command {
 struct SessionOptions {
   bool json = false;     ///< results as JSON
   bool quiet = false;    ///< results and errors only
-  bool verbose = false;  ///< what is done, and when
+  bool verbose = false;  ///< each step and its time
   int threads = 0;       ///< 0: one per core
 };
 
-/// The environment of a verb: its threads, and its output for people and machines.
+/// Provides a verb with its threads and with its text and JSON output.
 class Session {
  public:
   explicit Session(const SessionOptions& options);
 
-  /// The caller is a machine: results as JSON, nothing else on standard output.
+  /// True if results are printed as JSON; nothing else then goes to standard output.
   [[nodiscard]] bool json() const noexcept { return options_.json; }
   [[nodiscard]] bool quiet() const noexcept { return options_.quiet; }
   [[nodiscard]] Executor& executor() noexcept { return executor_; }
 
-  /// One line on standard output.
+  /// Prints one line on standard output.
   void print(std::string_view line);
-  /// One line on standard error that is no error: a warning or a hint. Silent with --quiet.
+  /// Prints a warning or a hint as one line on standard error, not with --quiet.
   void note(std::string_view line);
-  /// One line on standard error that the user needs to go on: not silent with --quiet either.
+  /// Prints one line on standard error, also with --quiet: the user needs it to continue.
   void prompt(std::string_view line) { write_line(line); }
-  /// Prints the line on standard error with --verbose, after the seconds since the start.
+  /// With --verbose, prints the seconds since the start and the line on standard error.
   void detail(std::string_view line);
-  /// Says why there is no answer, on standard error.
+  /// Prints on standard error why there is no answer, and returns that exit code.
   [[nodiscard]] ExitCode no_answer(std::string_view line);
-  /// A command to type, on standard output, its words as a shell wants them. Silent with --quiet.
+  /// Prints a command for the user to type next, quoted for a shell, on standard output. Prints
+  /// nothing with --quiet or --json.
   void suggest(std::initializer_list<std::string_view> command, std::string_view lead = "Next:");
   /// Flushes standard output.
   void flush();
-  /// Throws FileError when standard output could not be written (a full disk behind a redirection).
+  /// Flushes standard output. Throws FileError if it could not be written, for example to a full
+  /// disk.
   void finish_output();
 
-  /// The text in bold or in colour where standard output is a terminal that wants it.
+  /// Returns the text in bold or in colour if standard output is a terminal that supports it,
+  /// otherwise unchanged.
   [[nodiscard]] std::string bold(std::string_view text) const;
   [[nodiscard]] std::string green(std::string_view text) const;
   [[nodiscard]] std::string red(std::string_view text) const;
 
-  /// A line on standard error that the next one takes away; only for terminals.
+  /// Draws a progress bar on standard error, which the next output erases; only for terminals.
   void draw_bar(std::string_view bar);
   void clear_bar();
 
@@ -63,7 +66,7 @@ class Session {
   void erase_bar();
   SessionOptions options_;
   bool colours_;
-  std::mutex mutex_;  // of what is written: warnings come from any thread
+  std::mutex mutex_;  // guards output, as any thread may print warnings
   bool bar_drawn_ = false;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   Executor executor_;
@@ -71,7 +74,8 @@ class Session {
 
 /// Shows a progress bar with the time left on standard error: only on a terminal, only if the work
 /// takes longer than a second, and not with --quiet. The destructor removes the bar. With
-/// --verbose, begin and end of the work are printed. Not thread-safe: advance it from one thread.
+/// --verbose, begin and end of the work are printed. Not thread-safe: call `advance` from one
+/// thread only.
 class Progress {
  public:
   Progress(Session& session, std::string label, std::size_t total);
@@ -82,7 +86,7 @@ class Progress {
   void advance(std::size_t steps = 1);
   /// Changes the label and draws the bar at once.
   void relabel(std::string label);
-  /// Takes the bar away until the next advance.
+  /// Erases the bar until the next `advance`.
   void clear() { session_.clear_bar(); }
 
  private:

@@ -14,26 +14,26 @@ namespace panonav::command {
 
 namespace {
 
-// Signal handlers may only use static variables.
+// Static, as a signal handler cannot reach other variables.
 volatile std::sig_atomic_t signal_pipe = -1;
-std::atomic<std::int64_t> asked_at_ns = 0;  // 0: not yet
+std::atomic<std::int64_t> first_signal_ns = 0;  // 0: not yet
 
-std::int64_t steady_ns() {
+std::int64_t monotonic_time_ns() {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
   return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
-// A program that ends others may send a signal to this one and then to its group: one request,
-// also where the run has ended in between.
+// Handles SIGINT and SIGTERM. Signals within half a second count as one, as some programs signal
+// the process and then its group.
 void on_signal(int number) {
-  constexpr std::int64_t one_request_ns = 500'000'000;
-  const std::int64_t now_ns = steady_ns();
+  constexpr std::int64_t min_repeat_delay_ns = 500'000'000;
+  const std::int64_t now_ns = monotonic_time_ns();
   std::int64_t first_ns = 0;
-  if (asked_at_ns.compare_exchange_strong(first_ns, now_ns)) {
+  if (first_signal_ns.compare_exchange_strong(first_ns, now_ns)) {
     const char signal_byte = 's';
     (void)!write(signal_pipe, &signal_byte, 1);
-  } else if (now_ns - first_ns >= one_request_ns) {
+  } else if (now_ns - first_ns >= min_repeat_delay_ns) {
     signal(number, SIG_DFL);
     raise(number);
   }
@@ -44,13 +44,13 @@ void on_signal(int number) {
 StopSignals::StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
   if (pipe2(pipe_.data(), O_CLOEXEC) != 0) throw Error("no pipe can be made");
   signal_pipe = pipe_[1];
-  asked_at_ns = 0;
+  first_signal_ns = 0;
   struct sigaction action {};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, &interrupt_);
   sigaction(SIGTERM, &action, &terminate_);
-  waiting_ = std::thread([this] {
+  waiting_thread_ = std::thread([this] {
     char signal_byte = 0;
     while (read(pipe_[0], &signal_byte, 1) < 0) {
     }
@@ -59,13 +59,13 @@ StopSignals::StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
 }
 
 StopSignals::~StopSignals() {
-  if (asked_at_ns == 0) {
+  if (first_signal_ns == 0) {
     sigaction(SIGINT, &interrupt_, nullptr);
     sigaction(SIGTERM, &terminate_, nullptr);
   }
-  const char over = 'o';
-  (void)!write(pipe_[1], &over, 1);
-  waiting_.join();
+  const char end_byte = 'o';
+  (void)!write(pipe_[1], &end_byte, 1);
+  waiting_thread_.join();
   signal_pipe = -1;
   close(pipe_[0]);
   close(pipe_[1]);

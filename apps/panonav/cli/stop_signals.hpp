@@ -7,9 +7,9 @@
 
 namespace panonav::command {
 
-/// Calls `stop` on another thread when the user or the system asks the program to end; a second
-/// time, half a second later or more, ends it at once, also when this object is gone: what the run
-/// has to store comes after it. One at a time.
+/// Calls `stop` on another thread at the first SIGINT or SIGTERM. A further signal at least half a
+/// second later ends the program at once, also after this object is destroyed, as the run may still
+/// be storing results. Only one object may exist at a time.
 class StopSignals {
  public:
   /// Throws Error.
@@ -23,7 +23,7 @@ class StopSignals {
   std::array<int, 2> pipe_{-1, -1};
   struct sigaction interrupt_ {};
   struct sigaction terminate_ {};
-  std::thread waiting_;
+  std::thread waiting_thread_;
 };
 
 }  // namespace panonav::command

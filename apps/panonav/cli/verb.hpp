@@ -15,26 +15,26 @@ class Session;
 /// The exit codes of the program.
 enum class ExitCode : int {
   done = 0,
-  no_answer = 1,  ///< lost, no path; for a data set only if nothing at all was answered
-  bad_input = 2,  ///< one line on standard error says what is wrong
-  fault = 3,      ///< the program itself failed; never meant to happen
+  no_answer = 1,  ///< lost or no path; for a data set only if no image had an answer
+  bad_input = 2,  ///< one line on standard error explains the error
+  fault = 3,      ///< internal error of the program
 };
 
-/// The work of a verb, once its arguments are known. Throws panonav::Error on bad input. The
-/// `Arguments` that it was declared with are still there when it runs.
+/// Runs a verb after its arguments were parsed. Throws panonav::Error on bad input. The `Arguments`
+/// with which it was declared outlive the call.
 using Run = std::function<ExitCode(Session&)>;
 
-/// One verb of the command line. Its help, its manual page and the completion of shells are made
-/// from this and from the arguments that it declares (cli/texts.hpp).
+/// One verb of the command line. Help, manual page and shell completion are made from this and from
+/// the arguments that the verb declares (cli/texts.hpp).
 struct Verb {
   std::string_view name;     ///< one word, or two with a blank between: "route record"
   std::string_view summary;  ///< one plain line
-  std::string_view details;  ///< what a user must know beyond the options; lines are joined
-  std::string_view example;  ///< command lines that work as they stand, the most useful ones first
+  std::string_view details;  ///< what a user must know besides the options; lines are joined
+  std::string_view example;  ///< complete command lines, the most useful ones first
   Run (*declare)(Arguments&);
-  std::string_view alias = {};  ///< another spelling that is taken
-  /// Translates arguments of another convention (ROS) to those of the command line; null: there is
-  /// none.
+  std::string_view alias = {};  ///< another accepted spelling of the name
+  /// Translates arguments of another convention (ROS) to those of the command line; null: not
+  /// needed.
   std::vector<std::string> (*translate)(std::span<const std::string> words,
                                         std::span<const ArgumentInfo> infos) = nullptr;
 };

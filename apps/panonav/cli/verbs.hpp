@@ -20,10 +20,10 @@ namespace panonav::command {
 /// before a verb runs.
 void register_components();
 
-/// Returns every verb of this build, in the order in which a newcomer meets them.
+/// Returns every verb of this build, in the order of the overview.
 [[nodiscard]] std::vector<Verb> all_verbs();
 [[nodiscard]] std::vector<std::string> verb_names();
-/// Returns the verb that the words name. Throws UsageError when they name none or say more.
+/// Returns the verb that the words name. Throws UsageError if there is none or if words remain.
 [[nodiscard]] const Verb& find_named_verb(std::span<const Verb> verbs,
                                           const std::vector<std::string>& words);
 

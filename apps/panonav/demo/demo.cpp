@@ -66,7 +66,7 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
   page.add_pictures(
       {mirror,
        embed_image(overlay.view(),
-                   "Calibration from " + std::to_string(recordings.calibrated_on) +
+                   "Calibration from " + std::to_string(recordings.calibration_image_count) +
                        " raw images. Green: rim; orange: inner radius; red: centre. The error of "
                        "the centre is " +
                        centre_px + " pixels. The error of the rim's radius is " +
@@ -84,12 +84,12 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
   return mirror;
 }
 
-std::vector<LocalisedView> localise_all(const Localiser& localiser, const ViewEncoder& pipeline,
+std::vector<LocalisedView> localise_all(const Localiser& localiser, const ViewEncoder& encoder,
                                         const Dataset& queries, Executor& executor) {
   std::vector<std::optional<LocalisedView>> answers(queries.entries.size());
   parallel_for(executor, queries.entries.size(), [&](std::size_t i) {
     const auto& entry = queries.entries[i];
-    PackedSignature signature = pipeline.packed(pipeline.read(entry));
+    PackedSignature signature = encoder.packed(encoder.read(entry));
     Place found = localiser.localise(signature);
     const ReferencePose& pose = *entry.pose;
     answers[i] = LocalisedView{
@@ -105,8 +105,8 @@ struct Outcome {
   std::vector<double> errors_m;
   std::vector<double> nearest_errors_m;
   std::vector<double> heading_errors_rad;
-  double known = 0.0;        ///< share of all questions
-  double bytes_share = 0.0;  ///< of a full scan
+  double known = 0.0;        ///< share of the images that were recognised
+  double bytes_share = 0.0;  ///< bytes read, as a share of those of a full scan
 };
 
 Outcome summarise_outcome(const std::vector<LocalisedView>& queries, const VisualMemory& memory) {
@@ -142,10 +142,10 @@ std::string format_median(const std::vector<double>& values, double unit, int di
 }
 
 void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
-                      const std::vector<LocalisedView>& queries, const Outcome& own,
-                      const Outcome& foreign, double spacing_m, viewer::ReportPage& page) {
+                      const std::vector<LocalisedView>& queries, const Outcome& in_office,
+                      const Outcome& in_other_room, double spacing_m, viewer::ReportPage& page) {
   const std::string spacing = format_fixed(100.0 * spacing_m, 0) + " cm";
-  page.begin_part("Localisation", {format_median(own.errors_m, 100.0, 1, "cm"),
+  page.begin_part("Localisation", {format_median(in_office.errors_m, 100.0, 1, "cm"),
                                    "median error of the position computed from one image"});
   page.add_text("The robot stored a view every " + spacing + ". Then it was placed at " +
                 std::to_string(queries.size()) +
@@ -154,34 +154,35 @@ void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapL
                 "another room. There, the correct answer is that the place is unknown.");
   page.add_figures(
       {{std::to_string(memory.size()), "stored views with a spacing of " + spacing},
-       {format_median(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
-       {format_median(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
+       {format_median(in_office.errors_m, 100.0, 1, "cm"), "median error of the position"},
+       {format_median(in_office.heading_errors_rad, degrees(1.0), 2, "degrees"),
         "median error of the heading"},
-       {format_percent(own.known), "of the places in the office recognised"},
-       {format_percent(foreign.known), "of the images from the other room wrongly recognised"}});
+       {format_percent(in_office.known), "of the places in the office recognised"},
+       {format_percent(in_other_room.known),
+        "of the images from the other room wrongly recognised"}});
   page.add_text(
       "The circles on the map are the stored views. The green crosses are the true positions of "
       "the robot. A line leads from each cross to the position that the robot computed; a short "
       "line means a small error. If the robot used the position of the most similar view as its "
       "answer, the median error would be " +
-      format_median(own.nearest_errors_m, 100.0, 1, "cm") +
+      format_median(in_office.nearest_errors_m, 100.0, 1, "cm") +
       ". The robot is more accurate because it interpolates between views.");
   page.add_plots(
       {{draw_answers(memory, scene, queries), "True positions and the error of each answer"}});
 }
 
-/// The first place that was recognised stands for all.
+/// Returns the first image whose place was recognised, or the first image.
 const LocalisedView& choose_view(const std::vector<LocalisedView>& queries) {
   const auto known = std::find_if(queries.begin(), queries.end(),
                                   [](const auto& view) { return view.found.known; });
   return known == queries.end() ? queries.front() : *known;
 }
 
-viewer::UnfoldingMap add_levels_part(const VisualMemory& memory,
+viewer::MapAnimation add_levels_part(const VisualMemory& memory,
                                      const std::vector<viewer::MapLayer>& scene,
                                      const LocalisedView& view, double spacing_m,
                                      viewer::ReportPage& page) {
-  AreasShown areas = draw_areas(memory, scene, view);
+  AreaAnimation areas = draw_areas(memory, scene, view);
   const std::string first = format_fixed(areas.areas_m2.front(), 1);
   const std::string last = format_fixed(areas.areas_m2.back(), 2);
   page.begin_part(
@@ -205,28 +206,29 @@ viewer::UnfoldingMap add_levels_part(const VisualMemory& memory,
 
 void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
                   const DemoNavigation& navigation, viewer::ReportPage& page) {
-  const auto in_out = [&](const char* name) { return (options.out / name).string(); };
+  const auto path_in_out = [&](const char* name) { return (options.out / name).string(); };
   page.begin_section("Commands for this data");
   page.add_text(
       "The recordings and the memory of this run are in the folder of this page. Every command has "
       "the option --help.");
-  const std::string memory = in_out("office.panonav");
+  const std::string memory = path_in_out("office.panonav");
   const simulation::SimulatedWorldOptions seen = demo_world_options(options, 0);
   std::string mission;
   for (const std::string& word : navigation.first_mission) mission += " " + word;
   page.add_commands(
       {"alias panonav=build/release/bin/panonav", "panonav info " + memory,
-       "panonav localise " + memory + " " + in_out("query_run"),
-       "panonav localise " + memory + " " + in_out("elsewhere_run") + "    # another room: unknown",
+       "panonav localise " + memory + " " + path_in_out("query_run"),
+       "panonav localise " + memory + " " + path_in_out("elsewhere_run") +
+           "    # another room: unknown",
        "panonav localise " + memory + " " + recordings.query_run.entries.front().path.string() +
            " --areas",
-       "panonav track " + in_out("corridor.panonav") + " " + in_out("walk_run") + " --report " +
-           in_out("track_report"),
+       "panonav track " + path_in_out("corridor.panonav") + " " + path_in_out("walk_run") +
+           " --report " + path_in_out("track_report"),
        "panonav home view_00000.png " + recordings.query_run.entries.front().path.string() +
-           " --memory " + memory + " --report " + in_out("way_home"),
+           " --memory " + memory + " --report " + path_in_out("way_home"),
        "panonav navigate " + memory + " --scene office --scene-seed " +
            std::to_string(seen.simulation.scene.scene_seed) + " --exposure " +
-           format_number(seen.sensor.exposure) + mission + " --picture " + in_out("path.svg"),
+           format_number(seen.sensor.exposure) + mission + " --picture " + path_in_out("path.svg"),
        "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
            (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
 }
@@ -234,9 +236,9 @@ void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
 /// The results of all parts.
 struct DemoResults {
   std::size_t views = 0;
-  std::size_t questions = 0;
-  Outcome own;
-  Outcome foreign;
+  std::size_t query_count = 0;
+  Outcome in_office;
+  Outcome in_other_room;
   DemoTrack track;
   DemoMaps maps;
   DemoHoming homing;
@@ -261,12 +263,12 @@ ordered_json to_json(const DemoResults& done, const fs::path& out) {
   const DemoNavigation& navigation = done.navigation;
   return {{"report", (out / "index.html").string()},
           {"views", done.views},
-          {"questions", done.questions},
-          {"position_error_m", median_or_null(done.own.errors_m)},
-          {"heading_error_rad", median_or_null(done.own.heading_errors_rad)},
-          {"known", done.own.known},
-          {"known_elsewhere", done.foreign.known},
-          {"bytes_share", done.own.bytes_share},
+          {"questions", done.query_count},
+          {"position_error_m", median_or_null(done.in_office.errors_m)},
+          {"heading_error_rad", median_or_null(done.in_office.heading_errors_rad)},
+          {"known", done.in_office.known},
+          {"known_elsewhere", done.in_other_room.known},
+          {"bytes_share", done.in_office.bytes_share},
           {"track_images", done.track.images},
           {"track_places_at_first", done.track.places_at_first},
           {"track_until_localised", to_json_or_null(done.track.until_localised)},
@@ -297,43 +299,43 @@ std::string format_delay(const std::optional<std::size_t>& images) {
   return (images ? "after " : "") + format_image_count(images);
 }
 
-std::string of(std::size_t part, std::size_t all) {
+std::string format_part_of(std::size_t part, std::size_t all) {
   return std::to_string(part) + " of " + std::to_string(all);
 }
 
 void print(const DemoResults& done, Session& session) {
   session.print("panonav demo: " + std::to_string(done.views) + " views of an office stored, " +
-                std::to_string(done.questions) + " images localised, " +
+                std::to_string(done.query_count) + " images localised, " +
                 format_fixed(done.seconds, 0) + " s");
   session.print(
-      "  position: median error " + format_median(done.own.errors_m, 100.0, 1, "cm") +
-      "; heading: " + format_median(done.own.heading_errors_rad, degrees(1.0), 2, "degrees"));
+      "  position: median error " + format_median(done.in_office.errors_m, 100.0, 1, "cm") +
+      "; heading: " + format_median(done.in_office.heading_errors_rad, degrees(1.0), 2, "degrees"));
   session.print(
-      "  places in the office recognised: " + format_percent(done.own.known) +
-      "; images of another room wrongly recognised: " + format_percent(done.foreign.known));
+      "  places in the office recognised: " + format_percent(done.in_office.known) +
+      "; images of another room wrongly recognised: " + format_percent(done.in_other_room.known));
   session.print("  tracking: localised " + format_delay(done.track.until_localised) +
                 "; after the robot was kidnapped, localised again " +
                 format_delay(done.track.until_found_again) + "; median error " +
                 format_median(done.track.errors_m, 100.0, 1, "cm") + "; " +
-                of(done.track.wrong, done.track.localised) + " answers wrong");
+                format_part_of(done.track.wrong, done.track.localised) + " answers wrong");
   const auto centimetres = [](double metres) { return format_fixed(100.0 * metres, 0) + " cm"; };
   session.print(
       "  arrangement from images alone: error " +
       (done.maps.lattice ? centimetres(done.maps.lattice->truth_from_map.rms_m) : "none") +
       "; map of a drive: error " + centimetres(done.maps.map_rms_m) + "; odometry alone: error " +
       centimetres(done.maps.wheels_rms_m));
-  session.print(
-      "  homing from a distance of one metre: " + of(done.homing.arrived, done.homing.runs.size()) +
-      " runs ended within 10 cm; median " +
-      format_fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
+  session.print("  homing from a distance of one metre: " +
+                format_part_of(done.homing.arrived, done.homing.runs.size()) +
+                " runs ended within 10 cm; median " +
+                format_fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
   session.print("  route of " + format_fixed(done.route.length_m, 0) +
                 " m, repeated from a start 0.3 m beside it: " +
-                of(done.route.completed, done.route.runs.size()) +
+                format_part_of(done.route.completed, done.route.runs.size()) +
                 " runs reached the end; median distance from the route " +
                 format_median(done.route.lateral_m, 100.0, 1, "cm"));
   const DemoNavigation& navigation = done.navigation;
   session.print(
-      "  navigation: " + of(navigation.arrived, navigation.runs.size()) +
+      "  navigation: " + format_part_of(navigation.arrived, navigation.runs.size()) +
       " missions arrived; median ratio of driven path to shortest path " +
       (navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2)) +
       "; mission with a kidnapped robot: " + std::string(name_of(navigation.kidnapped.end)) +
@@ -381,20 +383,20 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
   next_part("store views and localise");
   MemoryFile file =
       memorise_run(recordings->memory_run, out / "office.panonav", session.executor());
-  const auto pipeline =
+  const auto encoder =
       std::make_shared<const ViewEncoder>(file.header(), recordings->memory_run.source);
   const VisualMemory memory = file.load();
   const Localiser localiser(memory);
-  const auto queries =
-      localise_all(localiser, *pipeline, recordings->query_run, session.executor());
+  const auto queries = localise_all(localiser, *encoder, recordings->query_run, session.executor());
   const auto elsewhere =
-      localise_all(localiser, *pipeline, recordings->elsewhere_run, session.executor());
-  DemoResults done{.views = memory.size(), .questions = queries.size()};
-  done.own = summarise_outcome(queries, memory);
-  done.foreign = summarise_outcome(elsewhere, memory);
+      localise_all(localiser, *encoder, recordings->elsewhere_run, session.executor());
+  DemoResults done{.views = memory.size(), .query_count = queries.size()};
+  done.in_office = summarise_outcome(queries, memory);
+  done.in_other_room = summarise_outcome(elsewhere, memory);
   const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings->office_scene);
-  add_answers_part(memory, scene, queries, done.own, done.foreign, options.spacing_m(), page);
-  story.position_error = format_median(done.own.errors_m, 100.0, 1, "cm");
+  add_answers_part(memory, scene, queries, done.in_office, done.in_other_room, options.spacing_m(),
+                   page);
+  story.position_error = format_median(done.in_office.errors_m, 100.0, 1, "cm");
   next_part("adjustable accuracy");
   story.areas = add_levels_part(memory, scene, choose_view(queries), options.spacing_m(), page);
   next_part("track the robot");
@@ -412,11 +414,11 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
       demonstrate_route(recordings->office_scene, options.route_m(), options.seed, session, page);
   next_part("drive to goals");
   done.navigation = demonstrate_navigation(options, *recordings, file, memory, done.maps.arranged,
-                                           pipeline, session, page);
+                                           encoder, session, page);
   add_commands(options, *recordings, done.navigation, page);
   story.found_again = format_image_count(done.track.until_found_again);
-  story.gathering = std::move(done.track.gathering);
-  story.arrived = of(done.navigation.arrived, done.navigation.runs.size());
+  story.convergence = std::move(done.track.convergence);
+  story.arrived = format_part_of(done.navigation.arrived, done.navigation.runs.size());
   story.missions = std::move(done.navigation.all);
   add_story(std::move(story), page);
   page.write(out, "index.html", "panonav demo");
@@ -438,7 +440,7 @@ Run declare_demo(Arguments& arguments) {
   auto seed = std::make_shared<std::optional<std::uint64_t>>();
   arguments.option("-o,--out FOLDER", *out,
                    "Folder for the page: a new folder, or the folder of an earlier demo");
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   arguments.option("--seed", *seed, "Seed of the simulated office (default: 1)");
   arguments.flag("--quick", values->quick,
                  "Run a short demonstration with fewer and smaller images and fewer missions");

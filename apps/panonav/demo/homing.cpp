@@ -16,20 +16,20 @@ namespace panonav::command {
 
 namespace {
 
-constexpr double close_m = 0.1;
+constexpr double max_arrival_distance_m = 0.1;
 
-/// Places like the one that a user would come back to: a start one metre off in the open, so that
-/// no wall stands in between.
+/// Samples random homes, each with a start at a distance of one metre and without obstacles in
+/// between.
 std::vector<lab::HomingTask> sample_tasks(const lab::HomingPlace& place, int count,
                                           std::uint64_t seed) {
-  constexpr double away_m = 1.0;
+  constexpr double start_distance_m = 1.0;
   std::vector<lab::HomingTask> tasks;
   Random random(seed, 1);
   while (tasks.size() < static_cast<std::size_t>(count)) {
     const Pose2 goal = place.free_space->random_pose(random);
     const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
-    const Pose2 start{goal.x_m + away_m * std::cos(direction_rad),
-                      goal.y_m + away_m * std::sin(direction_rad),
+    const Pose2 start{goal.x_m + start_distance_m * std::cos(direction_rad),
+                      goal.y_m + start_distance_m * std::sin(direction_rad),
                       random.uniform(-std::numbers::pi, std::numbers::pi)};
     if (place.free_space->is_free_between(goal.position(), start.position())) {
       tasks.push_back({goal, start});
@@ -38,8 +38,8 @@ std::vector<lab::HomingTask> sample_tasks(const lab::HomingPlace& place, int cou
   return tasks;
 }
 
-/// All robots at once, step by step.
-viewer::UnfoldingMap draw_runs(const simulation::Scene& office,
+/// Draws all runs at once, one frame per step.
+viewer::MapAnimation draw_runs(const simulation::Scene& office,
                                const std::vector<lab::HomingRun>& runs) {
   viewer::MapLayer homes{.label = "home", .colour = viewer::PlotColour::black};
   viewer::MapLayer starts{.label = "start", .colour = viewer::PlotColour::green};
@@ -49,7 +49,7 @@ viewer::UnfoldingMap draw_runs(const simulation::Scene& office,
     starts.circles.push_back(run.path.front().position());
     longest = std::max(longest, run.path.size());
   }
-  viewer::UnfoldingMap map{.title = "Drives home in the office",
+  viewer::MapAnimation map{.title = "Drives home in the office",
                            .backdrop = viewer::scene_layers(office)};
   map.backdrop.push_back(homes);
   map.backdrop.push_back(starts);
@@ -58,9 +58,9 @@ viewer::UnfoldingMap draw_runs(const simulation::Scene& office,
     viewer::MapLayer bad{.label = "ended elsewhere", .colour = viewer::PlotColour::vermilion};
     for (const lab::HomingRun& run : runs) {
       std::vector<Point2> line = positions_of(run.path);
-      const bool over = line.size() <= step + 1;
+      const bool has_ended = line.size() <= step + 1;
       line.resize(std::min(line.size(), step + 1));
-      viewer::MapLayer& layer = over && !run.is_success(close_m) ? bad : good;
+      viewer::MapLayer& layer = has_ended && !run.is_success(max_arrival_distance_m) ? bad : good;
       layer.dots.push_back(line.back());
       if (line.size() > 1) layer.lines.push_back(std::move(line));
     }
@@ -97,11 +97,11 @@ DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::ui
   homing.runs = lab::run_home(place, tasks, {}, seed, session.executor());
   std::size_t steps = 0;
   for (const lab::HomingRun& run : homing.runs) {
-    homing.arrived += run.is_success(close_m) ? 1 : 0;
+    homing.arrived += run.is_success(max_arrival_distance_m) ? 1 : 0;
     homing.distances_m.push_back(run.end_distance_m);
     steps += run.path.size() - 1;
   }
-  const auto seen_from = [&](const Pose2& pose) {
+  const auto take_view_at = [&](const Pose2& pose) {
     const lab::HomingCamera& camera = place.camera;
     return simulation::take_panorama(*place.renderer, pose, camera.rendering, camera.frame,
                                      camera.sensor, seed, session.executor());
@@ -127,7 +127,7 @@ DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::ui
   page.add_plots({{draw_runs(office, homing.runs),
                    "All runs at once, step by step, from the green circles to the black squares. A "
                    "run that ends at another place turns orange."}});
-  page.add_views(make_report_views(seen_from(shown.goal), seen_from(shown.path.front()),
+  page.add_views(make_report_views(take_view_at(shown.goal), take_view_at(shown.path.front()),
                                    shown.vectors.front()));
   return homing;
 }

@@ -9,15 +9,16 @@
 
 namespace panonav::command {
 
-/// Runs robots home to places in the office, each from one view of the place and about a metre
-/// away.
+/// Results of simulated drives home, each with one view of the home and from a distance of one
+/// metre.
 struct DemoHoming {
   std::vector<lab::HomingRun> runs;
-  std::size_t arrived = 0;          ///< within 10 cm, and they know it
-  std::vector<double> distances_m;  ///< between home and where each run ended
+  std::size_t arrived = 0;          ///< runs that ended within 10 cm and reported it
+  std::vector<double> distances_m;  ///< distance from home at the end of each run
 };
 
-/// Runs them and adds a part that plays them to the page. The same seed gives the same runs.
+/// Simulates the drives and adds a part with their animation to the page. The same seed gives the
+/// same runs.
 DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::uint64_t seed,
                               Session& session, viewer::ReportPage& page);
 

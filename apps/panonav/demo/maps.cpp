@@ -42,14 +42,14 @@ viewer::MapPlot draw_drive(const simulation::PlaceRecording& place,
   return plot;
 }
 
-/// The groups of views at one time while the arrangement grows.
-struct Growth {
+/// Poses and groups of the views at one step of the arrangement.
+struct GrowthStep {
   std::vector<Pose2> poses;
   std::vector<std::size_t> groups;
 };
 
-/// Draws the views as dots coloured by their true positions from west to east, so that a sorted map
-/// shows as a gradient.
+/// Draws the views as squares, coloured by their true positions from west to east, so that a
+/// correct map shows a colour gradient.
 std::vector<viewer::MapLayer> colour_by_position(const std::vector<Point2>& positions,
                                                  const std::vector<Point2>& truth) {
   constexpr std::array colours{viewer::PlotColour::blue,   viewer::PlotColour::sky,
@@ -68,9 +68,10 @@ std::vector<viewer::MapLayer> colour_by_position(const std::vector<Point2>& posi
   return layers;
 }
 
-/// Draws how the views join: groups at their final positions, single views at random positions.
-viewer::UnfoldingMap draw_growth(const Lattice& arranged, const VisualMemory& office,
-                                 const std::vector<Growth>& growth, std::uint64_t seed) {
+/// Animates how the views form groups. Groups are drawn at their final positions, other views at
+/// random positions.
+viewer::MapAnimation draw_growth(const Lattice& arranged, const VisualMemory& office,
+                                 const std::vector<GrowthStep>& growth, std::uint64_t seed) {
   std::vector<Point2> truth;
   std::vector<Point2> ends;
   for (const Lattice::Node& node : arranged.nodes) {
@@ -78,25 +79,26 @@ viewer::UnfoldingMap draw_growth(const Lattice& arranged, const VisualMemory& of
     ends.push_back(node.pose.position());
   }
   ends = simulation::align_to(ends, truth);
-  std::vector<Point2> anywhere = ends;
+  std::vector<Point2> random_positions = ends;
   Random random(seed, 1);
-  for (std::size_t i = anywhere.size(); i > 1; --i) {
-    std::swap(anywhere[i - 1], anywhere[static_cast<std::size_t>(random.index(i))]);
+  for (std::size_t i = random_positions.size(); i > 1; --i) {
+    std::swap(random_positions[i - 1], random_positions[static_cast<std::size_t>(random.index(i))]);
   }
-  viewer::UnfoldingMap map{.title = "Arrangement of the views"};
+  viewer::MapAnimation map{.title = "Arrangement of the views"};
   map.frames.push_back(
-      {.title = "random positions", .layers = colour_by_position(anywhere, truth)});
-  for (const Growth& at : growth) {
+      {.title = "random positions", .layers = colour_by_position(random_positions, truth)});
+  for (const GrowthStep& growth_step : growth) {
     std::map<std::size_t, std::vector<std::size_t>> groups;
-    for (std::size_t i = 0; i < at.groups.size(); ++i) groups[at.groups[i]].push_back(i);
-    std::vector<Point2> positions = anywhere;
+    for (std::size_t i = 0; i < growth_step.groups.size(); ++i)
+      groups[growth_step.groups[i]].push_back(i);
+    std::vector<Point2> positions = random_positions;
     std::size_t found = 0;
     for (const auto& [unused, views] : groups) {
       if (views.size() < 3) continue;
       std::vector<Point2> now;
       std::vector<Point2> end;
       for (const std::size_t view : views) {
-        now.push_back(at.poses[view].position());
+        now.push_back(growth_step.poses[view].position());
         end.push_back(ends[view]);
       }
       now = simulation::align_to(now, end);
@@ -167,12 +169,12 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
                           Session& session, viewer::ReportPage& page) {
   constexpr std::size_t frames = 40;
   DemoMaps maps;
-  std::vector<Growth> growth;
-  std::size_t joins = 0;
+  std::vector<GrowthStep> growth;
+  std::size_t step_count = 0;
   maps.arranged =
       arrange(office, {}, {}, session.executor(),
               [&](std::span<const Pose2> poses, std::span<const std::size_t> groups) {
-                if (joins++ % (office.size() / frames + 1) != 0) return;
+                if (step_count++ % (office.size() / frames + 1) != 0) return;
                 growth.push_back({{poses.begin(), poses.end()}, {groups.begin(), groups.end()}});
               });
   maps.lattice = compare_with_ground_truth(maps.arranged, office);

@@ -11,19 +11,18 @@
 
 namespace panonav::command {
 
-/// Maps made from the memory's views.
+/// Maps made from the views of the office and of a drive.
 struct DemoMaps {
-  Lattice arranged;                      ///< the office, its views in no order
-  std::optional<MapComparison> lattice;  ///< beside the truth
+  Lattice arranged;                      ///< arrangement of the office's unordered views
+  std::optional<MapComparison> lattice;  ///< comparison of `arranged` with the true positions
   double map_error = 1.0;                ///< shape difference of a map from a drive
-  double wheels_error = 1.0;             ///< of the wheels on the same drive
-  double map_rms_m = 0.0;                ///< of the map laid over the true way, in equal size
+  double wheels_error = 1.0;             ///< shape difference of the wheel odometry of the drive
+  double map_rms_m = 0.0;                ///< error of the map, aligned and scaled to the true path
   double wheels_rms_m = 0.0;
 };
 
-/// Arranges the views of `office` without their poses, makes a map of a drive through rooms of
-/// another place, and adds a part to the page that plays the first and
-/// draws the second.
+/// Arranges the views of `office` without their poses and maps a drive through rooms of another
+/// place. Adds a part to the page that animates the arrangement and draws the map.
 DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
                           Session& session, viewer::ReportPage& page);
 

@@ -33,10 +33,10 @@ constexpr std::uint64_t kidnapped_stream = 2;
 constexpr std::uint64_t screen_stream = 3;
 constexpr std::uint64_t noise_stream = 4;
 
-using Pipeline = std::shared_ptr<const ViewEncoder>;
+using SharedEncoder = std::shared_ptr<const ViewEncoder>;
 
-simulation::RememberedPlace remember_office(const VisualMemory& memory, const Lattice& arranged,
-                                            double spacing_m) {
+simulation::RememberedPlace make_remembered_office(const VisualMemory& memory,
+                                                   const Lattice& arranged, double spacing_m) {
   simulation::RememberedPlace remembered{memory, graph_from_lattice(arranged), {}, spacing_m};
   for (const ViewId view : remembered.graph.views()) {
     const ReferencePose& pose = *memory.info(view).pose;
@@ -45,25 +45,28 @@ simulation::RememberedPlace remember_office(const VisualMemory& memory, const La
   return remembered;
 }
 
-/// Images are rendered with the true camera and unwarped with the calibrated one.
-void set_camera_of_robot(simulation::MissionPlace& place, const DemoRecordings& recordings,
-                         const Pipeline& pipeline) {
-  const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
-  place.sight = simulation::make_view_sensor(place.renderer, recordings.true_camera, settled.frame,
-                                             settled.sensor, pipeline, nullptr);
+/// Sets the robot's camera: images are rendered with the true camera and unwarped with the
+/// calibrated one.
+void set_robot_camera(simulation::MissionPlace& place, const DemoRecordings& recordings,
+                      const SharedEncoder& encoder) {
+  const simulation::SimulatedWorldOptions& world_options = recordings.office_world->options();
+  place.view_sensor =
+      simulation::make_view_sensor(place.renderer, recordings.true_camera, world_options.frame,
+                                   world_options.sensor, encoder, nullptr);
 }
 
-/// A mission, and the office with a screen across the middle of its planned way.
+/// A mission, and the office with a screen across the middle of the planned path.
 struct ScreenedMission {
   simulation::Mission mission;
   simulation::MissionPlace place;
 };
 
-/// The first of `missions` that such a screen makes longer but not impossible.
+/// Returns the first of `missions` whose shortest path a screen makes longer but does not block;
+/// nullopt if there is none.
 std::optional<ScreenedMission> find_screened_mission(
     const simulation::MissionPlace& place, const simulation::RememberedPlace& remembered,
     const std::vector<simulation::Mission>& missions, const DemoRecordings& recordings,
-    const Pipeline& pipeline, Executor& executor) {
+    const SharedEncoder& encoder, Executor& executor) {
   constexpr double width_m = 0.6;
   constexpr double height_m = 1.0;
   constexpr double min_detour_m = 0.1;
@@ -73,15 +76,15 @@ std::optional<ScreenedMission> find_screened_mission(
       return distance(pose.position(), mission.start.position());
     });
     planner.set_goal(mission.goal);
-    const auto way =
+    const auto path =
         planner.plan_path(static_cast<std::size_t>(nearest - remembered.truth.begin()));
-    if (way.size() < 4) continue;
-    const Point2 before = remembered.truth[way[way.size() / 2 - 1]].position();
-    const Point2 behind = remembered.truth[way[way.size() / 2]].position();
-    const Pose2 across{0.5 * (before.x_m + behind.x_m), 0.5 * (before.y_m + behind.y_m),
-                       std::atan2(behind.y_m - before.y_m, behind.x_m - before.x_m)};
+    if (path.size() < 4) continue;
+    const Point2 before = remembered.truth[path[path.size() / 2 - 1]].position();
+    const Point2 after = remembered.truth[path[path.size() / 2]].position();
+    const Pose2 screen_pose{0.5 * (before.x_m + after.x_m), 0.5 * (before.y_m + after.y_m),
+                            std::atan2(after.y_m - before.y_m, after.x_m - before.x_m)};
     simulation::MissionPlace screened = place;
-    simulation::add_screen(screened.scene, across, width_m, height_m);
+    simulation::add_screen(screened.scene, screen_pose, width_m, height_m);
     screened.free_space = std::make_shared<const simulation::FreeSpace>(
         screened.scene, recordings.office_world->options().free_space);
     const Point2 goal = remembered.truth[*remembered.graph.node_of(mission.goal)].position();
@@ -91,14 +94,14 @@ std::optional<ScreenedMission> find_screened_mission(
       continue;
     screened.renderer = std::make_shared<const simulation::Renderer>(
         screened.scene, simulation::RendererOptions{}, executor);
-    set_camera_of_robot(screened, recordings, pipeline);
+    set_robot_camera(screened, recordings, encoder);
     return ScreenedMission{mission, std::move(screened)};
   }
   return std::nullopt;
 }
 
-/// All robots at once, look by look.
-viewer::UnfoldingMap draw_runs(const DemoNavigation& navigation,
+/// Draws all runs at once, one frame per image.
+viewer::MapAnimation draw_runs(const DemoNavigation& navigation,
                                const simulation::RememberedPlace& remembered,
                                const std::vector<simulation::Mission>& missions,
                                const simulation::Scene& office) {
@@ -113,16 +116,16 @@ viewer::UnfoldingMap draw_runs(const DemoNavigation& navigation,
         remembered.truth[*remembered.graph.node_of(missions[i].goal)].position());
     longest = std::max(longest, navigation.runs[i].path.size());
   }
-  viewer::UnfoldingMap map{.title = "All missions", .backdrop = viewer::scene_layers(office)};
+  viewer::MapAnimation map{.title = "All missions", .backdrop = viewer::scene_layers(office)};
   for (const viewer::MapLayer& layer : {views, starts, goals}) map.backdrop.push_back(layer);
   for (std::size_t step = 0; step < longest; ++step) {
     viewer::MapLayer good{.label = "path to the goal", .colour = viewer::PlotColour::blue};
     viewer::MapLayer bad{.label = "ended elsewhere", .colour = viewer::PlotColour::vermilion};
     for (const simulation::MissionRun& run : navigation.runs) {
       std::vector<Point2> line = positions_of(run.path);
-      const bool over = line.size() <= step + 1;
+      const bool has_ended = line.size() <= step + 1;
       line.resize(std::min(line.size(), step + 1));
-      viewer::MapLayer& layer = over && !run.arrives(navigation.within_m) ? bad : good;
+      viewer::MapLayer& layer = has_ended && !run.has_arrived(navigation.within_m) ? bad : good;
       layer.dots.push_back(line.back());
       if (line.size() > 1) layer.lines.push_back(std::move(line));
     }
@@ -132,14 +135,15 @@ viewer::UnfoldingMap draw_runs(const DemoNavigation& navigation,
 }
 
 /// Draws one run, decision by decision, over the planned path.
-viewer::UnfoldingMap draw_run(const std::string& title, const simulation::MissionPlace& place,
+viewer::MapAnimation draw_run(const std::string& title, const simulation::MissionPlace& place,
                               const simulation::RememberedPlace& remembered,
                               const PlannerOptions& options, ViewId goal,
                               const simulation::MissionRun& run) {
-  viewer::MapPlot backdrop = viewer::mission_plot(title, place, remembered, options, goal, run);
+  viewer::MapPlot backdrop =
+      viewer::make_mission_plot(title, place, remembered, options, goal, run);
   std::erase_if(backdrop.layers,
                 [](const viewer::MapLayer& layer) { return layer.label == "driven path"; });
-  viewer::UnfoldingMap map{.title = title, .backdrop = std::move(backdrop.layers)};
+  viewer::MapAnimation map{.title = title, .backdrop = std::move(backdrop.layers)};
   for (std::size_t step = 0; step < run.path.size(); ++step) {
     viewer::MapLayer driven{
         .label = "driven path", .colour = viewer::PlotColour::vermilion, .lines = {{}}};
@@ -162,13 +166,13 @@ viewer::UnfoldingMap draw_run(const std::string& title, const simulation::Missio
 viewer::RunPage replay_run(const simulation::MissionPlace& place,
                            const simulation::RememberedPlace& remembered,
                            const DemoRecordings& recordings, const MemoryFile& file,
-                           const Pipeline& pipeline, const PlannerOptions& options, ViewId goal,
+                           const SharedEncoder& encoder, const PlannerOptions& options, ViewId goal,
                            const simulation::MissionRun& run) {
-  const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
+  const simulation::SimulatedWorldOptions& world_options = recordings.office_world->options();
   std::optional<Panorama> seen;
-  const auto see = simulation::make_view_sensor(
-      place.renderer, recordings.true_camera, settled.frame, settled.sensor, pipeline, nullptr,
-      [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
+  const auto take_view = simulation::make_view_sensor(
+      place.renderer, recordings.true_camera, world_options.frame, world_options.sensor, encoder,
+      nullptr, [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
   AreaPlanner planner(remembered.graph, options);
   planner.set_goal(goal);
   viewer::RunPage page("A mission", run.decisions.size());
@@ -186,7 +190,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
       std::ranges::replace(name, '_', ' ');
       moment.values.emplace_back("event", std::move(name));
     }
-    const FourierSignature signature = see(pose, i);
+    const FourierSignature signature = take_view(pose, i);
     moment.panorama = std::exchange(seen, std::nullopt);
     if (decision.nearest) {
       moment.values.emplace_back("best_match", remembered.memory.info(*decision.nearest).name);
@@ -195,7 +199,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
           -home_vector(homing_view(remembered.memory.signature(*decision.nearest)),
                        homing_view(signature))
                .heading_rad;
-      if (!planned) {  // the page shows one plan: that of the start
+      if (!planned) {  // the page shows only the plan of the start
         for (const std::size_t node :
              planner.plan_path(*remembered.graph.node_of(*decision.nearest))) {
           moment.plan.push_back(remembered.truth[node]);
@@ -223,7 +227,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
 std::string describe_end(const simulation::MissionRun& run, double within_m) {
   const std::string name(name_of(run.end));
   if (run.end != NavigationDecision::State::arrived) return name;
-  return run.arrives(within_m) ? "arrived" : "arrived, but too far from the goal";
+  return run.has_arrived(within_m) ? "arrived" : "arrived, but too far from the goal";
 }
 
 /// Formats a heading with the outcome of a run, and a line for each step.
@@ -244,14 +248,14 @@ std::string describe_run(const simulation::MissionRun& run, double within_m) {
 }
 
 /// The plots of the page.
-struct Shown {
+struct MissionPlots {
   viewer::RunPage first;
-  viewer::UnfoldingMap all;
-  viewer::UnfoldingMap kidnapped;
-  std::optional<viewer::UnfoldingMap> screened;
+  viewer::MapAnimation all;
+  viewer::MapAnimation kidnapped;
+  std::optional<viewer::MapAnimation> screened;
 };
 
-void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage& page) {
+void add_part(const DemoNavigation& navigation, MissionPlots plots, viewer::ReportPage& page) {
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
   const std::string within = format_fixed(100.0 * navigation.within_m, 1) + " cm";
@@ -283,15 +287,15 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
       "The first mission, image by image. Short lines: the direction in which each stored view "
       "sends the robot. Thick line: the planned path. The stored view that is most similar to the "
       "robot's image is shown below the image, rotated to the same heading.");
-  page.add_run(shown.first);
+  page.add_run(plots.first);
   std::vector<viewer::ReportPlot> maps{
-      {std::move(shown.all),
+      {std::move(plots.all),
        "All missions at once. The path of a mission that did not reach its goal is orange."},
-      {std::move(shown.kidnapped),
+      {std::move(plots.kidnapped),
        "This robot was kidnapped in the middle of its path to the purple square. " +
            describe_run(navigation.kidnapped, navigation.within_m)}};
-  if (shown.screened) {
-    maps.push_back({std::move(*shown.screened),
+  if (plots.screened) {
+    maps.push_back({std::move(*plots.screened),
                     "A screen (short dark line) stands across the middle of the planned path. The "
                     "memory does not contain it. There is a path around it. " +
                         describe_run(*navigation.screened, navigation.within_m)});
@@ -305,19 +309,19 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
 DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoRecordings& recordings,
                                       const MemoryFile& file, const VisualMemory& memory,
                                       const Lattice& arranged,
-                                      std::shared_ptr<const ViewEncoder> pipeline, Session& session,
+                                      std::shared_ptr<const ViewEncoder> encoder, Session& session,
                                       viewer::ReportPage& page) {
   Executor& executor = session.executor();
   const simulation::RememberedPlace remembered =
-      remember_office(memory, arranged, options.spacing_m());
+      make_remembered_office(memory, arranged, options.spacing_m());
   simulation::MissionPlace place = simulation::make_mission_place(*recordings.office_world);
-  set_camera_of_robot(place, recordings, pipeline);
-  const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
+  set_robot_camera(place, recordings, encoder);
+  const auto sample_random_missions = [&](std::uint64_t stream, int count, bool kidnapped) {
     return simulation::sample_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
                                        Random(options.seed, stream).next());
   };
-  auto missions = random(mission_stream, options.mission_count(), false);
-  missions.push_back(random(kidnapped_stream, 1, true).front());
+  auto missions = sample_random_missions(mission_stream, options.mission_count(), false);
+  missions.push_back(sample_random_missions(kidnapped_stream, 1, true).front());
   const simulation::MissionOptions settings;
   const std::uint64_t noise = Random(options.seed, noise_stream).next();
   DemoNavigation navigation{.within_m = 0.5 * options.spacing_m()};
@@ -327,21 +331,22 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
   navigation.runs.pop_back();
   for (const simulation::MissionRun& run : navigation.runs) {
     navigation.steps.push_back(static_cast<double>(run.decisions.size()));
-    if (!run.arrives(navigation.within_m)) continue;
+    if (!run.has_arrived(navigation.within_m)) continue;
     ++navigation.arrived;
     if (run.shortest_m > 0.0) navigation.detours.push_back(run.travelled_m / run.shortest_m);
   }
-  const auto map_of = [&](const std::string& title, const simulation::MissionPlace& where,
-                          const simulation::Mission& mission, const simulation::MissionRun& run) {
+  const auto draw_mission = [&](const std::string& title, const simulation::MissionPlace& where,
+                                const simulation::Mission& mission,
+                                const simulation::MissionRun& run) {
     return draw_run(title, where, remembered, settings.planner, mission.goal, run);
   };
   const simulation::Mission& first = missions.front();
-  Shown shown{
-      .first = replay_run(place, remembered, recordings, file, pipeline, settings.planner,
-                          first.goal, navigation.runs.front()),
-      .all = draw_runs(navigation, remembered, missions, recordings.office_scene),
-      .kidnapped = map_of("Kidnapped on its path", place, missions.back(), navigation.kidnapped)};
-  navigation.all = shown.all;
+  MissionPlots plots{.first = replay_run(place, remembered, recordings, file, encoder,
+                                         settings.planner, first.goal, navigation.runs.front()),
+                     .all = draw_runs(navigation, remembered, missions, recordings.office_scene),
+                     .kidnapped = draw_mission("Kidnapped on its path", place, missions.back(),
+                                               navigation.kidnapped)};
+  navigation.all = plots.all;
   std::string log;
   const auto add_log = [&](const std::string& title, const simulation::Mission& mission,
                            const simulation::MissionRun& run) {
@@ -356,18 +361,18 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
                                   format_fixed(first.start.y_m, 3) + "," +
                                   format_fixed(degrees(first.start.heading_rad), 1)};
   constexpr int candidates = 30;
-  if (const auto screened =
-          find_screened_mission(place, remembered, random(screen_stream, candidates, false),
-                                recordings, pipeline, executor)) {
+  if (const auto screened = find_screened_mission(
+          place, remembered, sample_random_missions(screen_stream, candidates, false), recordings,
+          encoder, executor)) {
     navigation.screened = simulation::run_missions(screened->place, remembered, {screened->mission},
                                                    settings, noise, executor)
                               .front();
-    shown.screened = map_of("A screen across the path", screened->place, screened->mission,
-                            *navigation.screened);
+    plots.screened = draw_mission("A screen across the path", screened->place, screened->mission,
+                                  *navigation.screened);
     add_log("A screen across the path", screened->mission, *navigation.screened);
   }
   write_file(options.out / "mission.log", std::string_view(log));
-  add_part(navigation, std::move(shown), page);
+  add_part(navigation, std::move(plots), page);
   return navigation;
 }
 

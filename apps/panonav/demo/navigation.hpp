@@ -16,27 +16,27 @@
 
 namespace panonav::command {
 
-/// Robots that go to remembered views of the office, over nothing but the arrangement of its views.
+/// Results of missions to stored views of the office, planned on the arrangement of its views.
 struct DemoNavigation {
-  double within_m = 0.0;                     ///< half the views' spacing
+  double within_m = 0.0;  ///< accepted distance from the goal: half the views' spacing
   std::vector<simulation::MissionRun> runs;  ///< from random starts to random goals
-  std::size_t arrived = 0;                   ///< within `within_m`, and they know it
-  std::vector<double> detours;               ///< of those: way driven over the shortest one
-  std::vector<double> steps;                 ///< of all
-  simulation::MissionRun kidnapped;          ///< one more, kidnapped half way
-  /// One more, a screen across its way; empty: no screen leaves a way round.
+  std::size_t arrived = 0;                   ///< runs that ended within `within_m` and reported it
+  std::vector<double> detours;               ///< ratio of driven to shortest path, of arrived runs
+  std::vector<double> steps;                 ///< number of steps of each run
+  simulation::MissionRun kidnapped;          ///< another run, kidnapped in the middle of its path
+  /// Another run, with a screen across its path; nullopt if each screen would block all paths.
   std::optional<simulation::MissionRun> screened;
-  viewer::UnfoldingMap all;  ///< the runs, one look after the other
+  viewer::MapAnimation all;  ///< animation of the runs, one frame per image
   /// The first run as options of the verb `navigate`.
   std::vector<std::string> first_mission;
 };
 
-/// Runs the missions over the views of `memory`, the content of `file`, and adds a part that plays
-/// them to the page, with a log. The same seed gives the same runs.
+/// Simulates the missions with the views of `memory`, which was loaded from `file`. Adds a part
+/// with their animation to the page and writes a log. The same seed gives the same runs.
 DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoRecordings& recordings,
                                       const MemoryFile& file, const VisualMemory& memory,
                                       const Lattice& arranged,
-                                      std::shared_ptr<const ViewEncoder> pipeline, Session& session,
+                                      std::shared_ptr<const ViewEncoder> encoder, Session& session,
                                       viewer::ReportPage& page);
 
 }  // namespace panonav::command

@@ -40,16 +40,16 @@ viewer::MapPlot draw_answers(const VisualMemory& memory, const std::vector<viewe
   return map;
 }
 
-AreasShown draw_areas(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
-                      const LocalisedView& query) {
-  // Views within a quarter of the best dissimilarity stay candidates, as in `reproduce m04`: with
-  // none the first component alone would drop the true place for noise.
+AreaAnimation draw_areas(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
+                         const LocalisedView& query) {
+  // Views whose dissimilarity is up to 25 % above the best one stay candidates, as in `reproduce
+  // m04`. Without this tolerance, noise in the first component would exclude the true place.
   constexpr double tolerance = 0.25;
   const ReferenceAreas areas(memory);
   const auto levels =
       localise_hierarchically(memory, areas, query.signature, {.tolerance = tolerance});
-  AreasShown shown{.map = {.title = "Possible positions of the robot", .backdrop = scene}};
-  shown.map.backdrop.push_back(draw_references(memory, viewer::PlotColour::light_grey));
+  AreaAnimation animation{.map = {.title = "Possible positions of the robot", .backdrop = scene}};
+  animation.map.backdrop.push_back(draw_references(memory, viewer::PlotColour::light_grey));
   for (const auto& level : levels) {
     viewer::MapLayer area{.label = "possible positions", .colour = viewer::PlotColour::orange};
     for (const auto& candidate : level.candidates) {
@@ -58,14 +58,14 @@ AreasShown draw_areas(const VisualMemory& memory, const std::vector<viewer::MapL
     const viewer::MapLayer robot{.label = "the robot",
                                  .colour = viewer::PlotColour::vermilion,
                                  .crosses = {query.truth.position()}};
-    shown.areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
-    shown.map.frames.push_back(
+    animation.areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
+    animation.map.frames.push_back(
         {.title = std::to_string(level.components) +
                   (level.components == 1 ? " component: " : " components: ") +
-                  format_fixed(shown.areas_m2.back(), 2) + " m²",
+                  format_fixed(animation.areas_m2.back(), 2) + " m²",
          .layers = {area, robot}});
   }
-  return shown;
+  return animation;
 }
 
 viewer::HeatMap draw_similarity(const VisualMemory& memory, double spacing_m,
@@ -108,7 +108,7 @@ viewer::HeatMap draw_similarity(const VisualMemory& memory, double spacing_m,
 }
 
 viewer::ReportPicture embed_image(ImageView image, std::string caption) {
-  return {viewer::data_url("image/jpeg", encode_jpeg(image)), std::move(caption)};
+  return {viewer::make_data_url("image/jpeg", encode_jpeg(image)), std::move(caption)};
 }
 
 }  // namespace panonav::command

@@ -18,44 +18,45 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Says that the folder is a demo's; written first, so that an interrupted demo can be run again.
-constexpr std::string_view mark = "made_by_panonav_demo.txt";
+/// Name of the file that marks the folder of a demo. It is written first, so that an interrupted
+/// demo can be run again.
+constexpr std::string_view marker_file_name = "made_by_panonav_demo.txt";
 
-/// Everything else that a demo makes, or made in earlier versions.
-constexpr std::array<std::string_view, 32> made{"memory_run",
-                                                "query_run",
-                                                "elsewhere_run",
-                                                "corridor_run",
-                                                "walk_run",
-                                                "office.panonav",
-                                                "office.panonav-wal",
-                                                "office.panonav-shm",
-                                                "corridor.panonav",
-                                                "corridor.panonav-wal",
-                                                "corridor.panonav-shm",
-                                                "mirror.png",
-                                                "calibration.png",
-                                                "cylinder.png",
-                                                "map.svg",
-                                                "areas.svg",
-                                                "similarity.svg",
-                                                "tracked.svg",
-                                                "particles.svg",
-                                                "track.html",
-                                                "arranged.svg",
-                                                "drive.svg",
-                                                "homing.svg",
-                                                "way_home.png",
-                                                "route.svg",
-                                                "route_panorama.svg",
-                                                "mission.svg",
-                                                "mission.log",
-                                                "mission_kidnapped.svg",
-                                                "mission_screen.svg",
-                                                "missions.svg",
-                                                "index.html"};
+/// Names of all other files and folders that a demo writes, or wrote in earlier versions.
+constexpr std::array<std::string_view, 32> demo_file_names{"memory_run",
+                                                           "query_run",
+                                                           "elsewhere_run",
+                                                           "corridor_run",
+                                                           "walk_run",
+                                                           "office.panonav",
+                                                           "office.panonav-wal",
+                                                           "office.panonav-shm",
+                                                           "corridor.panonav",
+                                                           "corridor.panonav-wal",
+                                                           "corridor.panonav-shm",
+                                                           "mirror.png",
+                                                           "calibration.png",
+                                                           "cylinder.png",
+                                                           "map.svg",
+                                                           "areas.svg",
+                                                           "similarity.svg",
+                                                           "tracked.svg",
+                                                           "particles.svg",
+                                                           "track.html",
+                                                           "arranged.svg",
+                                                           "drive.svg",
+                                                           "homing.svg",
+                                                           "way_home.png",
+                                                           "route.svg",
+                                                           "route_panorama.svg",
+                                                           "mission.svg",
+                                                           "mission.log",
+                                                           "mission_kidnapped.svg",
+                                                           "mission_screen.svg",
+                                                           "missions.svg",
+                                                           "index.html"};
 
-/// A world with the places of one recording.
+/// A world with the planned poses of one recording.
 struct PlannedRun {
   simulation::SimulatedWorld world;
   std::vector<simulation::RecordedPose> poses;
@@ -74,7 +75,7 @@ simulation::SimulatedWorld make_world(const std::string& scene,
   return {scene, world_options, [](const auto&, const auto&) { return std::nullopt; }, executor};
 }
 
-/// Sees the same with half as many pixels each way.
+/// Returns a camera with the same field of view and half the pixels in each direction.
 Camera halve_resolution(Camera camera) {
   std::get<HyperboloidalModel>(camera.model).focal_length_px *= 0.5;
   camera.image_size = {camera.image_size.width / 2, camera.image_size.height / 2};
@@ -86,7 +87,7 @@ Camera halve_resolution(Camera camera) {
 
 std::optional<MirrorCircle> find_mirror_in_recording(const Dataset& recording, int count) {
   std::vector<Image> images;
-  // Spread over the run: what stays the same in all of them is the mirror.
+  // Takes images at equal intervals, so that only the mirror is the same in all of them.
   for (int i = 0; i < count; ++i) {
     const auto index =
         recording.entries.size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(count);
@@ -100,8 +101,8 @@ std::optional<MirrorCircle> find_mirror_in_recording(const Dataset& recording, i
   return find_mirror(views);
 }
 
-/// Drives as one recording. Between them somebody carries the robot away; its odometry knows
-/// nothing of that.
+/// Joins two drives to one recording. Between them the robot is carried to another place; the
+/// odometry continues without this motion.
 std::vector<simulation::RecordedPose> join_drives(
     std::vector<simulation::RecordedPose> walk,
     const std::vector<simulation::RecordedPose>& after) {
@@ -114,7 +115,7 @@ std::vector<simulation::RecordedPose> join_drives(
   return walk;
 }
 
-/// Along straight lines, facing forward.
+/// Plans a drive along the straight lines between the waypoints, heading forward.
 PlannedRun plan_drive(const simulation::SimulatedWorld& world, double spacing_m, int seed,
                       const std::vector<Point2>& way_points) {
   simulation::SimulatedWorld there = world.with({.path = simulation::RecordingPath::tour,
@@ -125,31 +126,31 @@ PlannedRun plan_drive(const simulation::SimulatedWorld& world, double spacing_m,
   return {std::move(there), std::move(poses), true};
 }
 
-// The remembered path through the corridor: a ring, 12 m by 8 m, and two narrow ones across it. In
-// one of these the robot could as well be in the other one, and either way round, as the plan is
-// the same turned by half and each of them the same as its neighbour.
+// Plans the stored path through the corridor: a ring of 12 m by 8 m and two narrow crossings. A
+// robot in a crossing has four possible poses: both crossings look the same, and the floor plan is
+// the same after half a turn.
 PlannedRun plan_remembered_ring(const simulation::SimulatedWorld& corridor, int seed) {
-  constexpr double remembered_every_m = 0.35;
-  PlannedRun ring = plan_drive(corridor, remembered_every_m, seed,
+  constexpr double reference_spacing_m = 0.35;
+  PlannedRun ring = plan_drive(corridor, reference_spacing_m, seed,
                                {{0.0, 0.0}, {12.0, 0.0}, {12.0, 8.0}, {0.0, 8.0}, {0.0, 0.4}});
   for (const double x : {4.0, 8.0}) {
-    const auto across = plan_drive(corridor, remembered_every_m, seed, {{x, 0.4}, {x, 7.6}});
-    ring.poses = join_drives(std::move(ring.poses), across.poses);
+    const auto cross_drive = plan_drive(corridor, reference_spacing_m, seed, {{x, 0.4}, {x, 7.6}});
+    ring.poses = join_drives(std::move(ring.poses), cross_drive.poses);
   }
   return ring;
 }
 
-// Plans a walk 10 cm from the remembered line, in two parts of at most `images` images: the robot
-// is carried from the end of the first to the start of the second. Also returns the last
-// image of the first.
+// Plans a walk 10 cm beside the stored path, in two parts of at most `images` images. The robot is
+// carried from the end of the first part to the start of the second. Also returns the index of the
+// last image of the first part.
 std::pair<PlannedRun, std::size_t> plan_kidnapped_walk(const simulation::SimulatedWorld& corridor,
                                                        std::size_t images, int walk_seed,
                                                        int after_seed) {
-  constexpr double driven_every_m = 0.25;
+  constexpr double walk_spacing_m = 0.25;
   PlannedRun walk =
-      plan_drive(corridor, driven_every_m, walk_seed, {{4.1, 6.0}, {4.1, 7.9}, {12.0, 7.9}});
+      plan_drive(corridor, walk_spacing_m, walk_seed, {{4.1, 6.0}, {4.1, 7.9}, {12.0, 7.9}});
   auto after =
-      plan_drive(corridor, driven_every_m, after_seed, {{7.9, 2.0}, {7.9, 0.1}, {12.0, 0.1}});
+      plan_drive(corridor, walk_spacing_m, after_seed, {{7.9, 2.0}, {7.9, 0.1}, {12.0, 0.1}});
   walk.poses.resize(std::min(walk.poses.size(), images));
   after.poses.resize(std::min(after.poses.size(), images));
   const std::size_t kidnapped_after = walk.poses.size() - 1;
@@ -157,10 +158,9 @@ std::pair<PlannedRun, std::size_t> plan_kidnapped_walk(const simulation::Simulat
   return {std::move(walk), kidnapped_after};
 }
 
-// Gives all runs the camera of the mirror that was found in their pictures.
+// Writes the calibrated camera into all data sets.
 void set_calibrated_camera(DemoRecordings& recordings, const MirrorCircle& mirror) {
-  // The shape and the mounting of the mirror cannot be read from images; the robot's maker knows
-  // them.
+  // Shape and mounting of the mirror cannot be found from images, so the true values are used.
   const Camera camera =
       camera_from_mirror(mirror, {.model = recordings.true_camera.model,
                                   .direction = recordings.true_camera.direction,
@@ -172,19 +172,20 @@ void set_calibrated_camera(DemoRecordings& recordings, const MirrorCircle& mirro
   }
 }
 
-// Returns a camera that renders colour images of the robot's views for the page.
+// Returns a function that renders the robot's views in colour, for the page.
 std::function<Image(const DatasetEntry&, Executor&)> make_colour_camera(
     const simulation::SimulatedWorld& world, const Camera& camera,
     const simulation::SensorOptions& sensor_options, Executor& executor) {
-  auto in_colour = std::make_shared<const simulation::Renderer>(
+  auto colour_renderer = std::make_shared<const simulation::Renderer>(
       world.scene(), simulation::RendererOptions{.channels = 3}, executor);
-  return [renderer = std::move(in_colour), frame = world.options().frame, sensor = sensor_options,
-          seen_by = camera](const DatasetEntry& entry, Executor& threads) {
+  return [renderer = std::move(colour_renderer), frame = world.options().frame,
+          sensor = sensor_options,
+          mirror_camera = camera](const DatasetEntry& entry, Executor& threads) {
     const simulation::Viewpoint viewpoint{
         .pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},
         .height_m = frame.camera_height_m};
-    return simulation::apply_sensor(renderer->render_image(viewpoint, seen_by, 3, threads), seen_by,
-                                    sensor, 1);
+    return simulation::apply_sensor(renderer->render_image(viewpoint, mirror_camera, 3, threads),
+                                    mirror_camera, sensor, 1);
   };
 }
 
@@ -194,10 +195,10 @@ simulation::SimulatedWorldOptions demo_world_options(const DemoOptions& options,
   simulation::SimulatedWorldOptions world_options;
   world_options.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
   world_options.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
-  // One ray a pixel suffices, as unwrapping averages over pixels; rendering then takes a third of
-  // the time.
+  // One ray per pixel is enough, as unwrapping averages over pixels; rendering takes a third of the
+  // time then.
   world_options.frame.rays_per_axis = 1;
-  // The value of automatic exposure in these rooms.
+  // Value that automatic exposure chooses in these rooms.
   world_options.sensor.exposure = 2.0;
   if (options.quick)
     world_options.mirror = halve_resolution(simulation::make_simulated_mirror_camera());
@@ -211,7 +212,7 @@ void prepare_demo_folder(const fs::path& out) {
     throw FileError(out.string(),
                     "is not a folder; allowed: a new folder, or the folder of an earlier demo");
   }
-  if (there && !fs::exists(out / mark, error) && !fs::is_empty(out, error)) {
+  if (there && !fs::exists(out / marker_file_name, error) && !fs::is_empty(out, error)) {
     throw FileError(out.string(),
                     "exists and was not made by panonav demo; allowed: a new folder, or the folder "
                     "of an earlier demo");
@@ -219,10 +220,10 @@ void prepare_demo_folder(const fs::path& out) {
   fs::create_directories(out, error);
   if (error) throw FileError(out.string(), "cannot be created: " + error.message());
   write_file(
-      out / mark,
+      out / marker_file_name,
       std::string_view(
           "panonav demo made this folder. Another run with this folder replaces its files.\n"));
-  for (const auto name : made) {
+  for (const auto name : demo_file_names) {
     fs::remove_all(out / name, error);
     if (error) throw FileError((out / name).string(), "cannot be removed: " + error.message());
   }
@@ -233,16 +234,17 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   simulation::SimulatedWorldOptions grid = demo_world_options(options, 0);
   grid.recording.path = simulation::RecordingPath::grid;
   grid.recording.spacing_m = options.spacing_m();
-  const simulation::RecordingOptions anywhere{.path = simulation::RecordingPath::random,
-                                              .heading = simulation::RecordingHeading::random,
-                                              .poses = options.query_count()};
+  const simulation::RecordingOptions random_recording{
+      .path = simulation::RecordingPath::random,
+      .heading = simulation::RecordingHeading::random,
+      .poses = options.query_count()};
   const auto seed_of = [&](int stream) {
     return demo_world_options(options, stream).simulation.scene.seed;
   };
   const PlannedRun office = plan(make_world("office", grid, executor));
-  const PlannedRun queries = plan(office.world.with(anywhere, seed_of(1)));
-  const PlannedRun elsewhere =
-      plan(make_world("lab", demo_world_options(options, 2), executor).with(anywhere, seed_of(2)));
+  const PlannedRun queries = plan(office.world.with(random_recording, seed_of(1)));
+  const PlannedRun elsewhere = plan(make_world("lab", demo_world_options(options, 2), executor)
+                                        .with(random_recording, seed_of(2)));
   const simulation::SimulatedWorld corridor =
       make_world("corridor", demo_world_options(options, 5), executor);
   const PlannedRun ring = plan_remembered_ring(corridor, seed_of(5));
@@ -267,9 +269,10 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   progress.clear();
 
   recordings.true_camera = std::get<Camera>(office.world.camera());
-  recordings.calibrated_on =
+  recordings.calibration_image_count =
       static_cast<int>(std::min<std::size_t>(6, recordings.memory_run.entries.size()));
-  const auto mirror = find_mirror_in_recording(recordings.memory_run, recordings.calibrated_on);
+  const auto mirror =
+      find_mirror_in_recording(recordings.memory_run, recordings.calibration_image_count);
   if (!mirror) return std::nullopt;
   recordings.mirror = *mirror;
   set_calibrated_camera(recordings, *mirror);

@@ -17,7 +17,7 @@ namespace panonav::command {
 
 namespace {
 
-constexpr double seconds_a_look = 0.3;
+constexpr double seconds_per_image = 0.3;
 
 viewer::PicturePlot draw_route_image(const RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
@@ -39,20 +39,20 @@ viewer::PicturePlot draw_route_image(const RoutePanorama& route) {
   return plot;
 }
 
-/// The first run, line by line.
+/// Returns the page that replays a run, line by line.
 viewer::RunPage replay_run(const lab::RouteScene& place, const RoutePanorama& panorama,
                            const lab::RouteRun& run, std::uint64_t seed, Executor& executor) {
   viewer::RunPage page("Repeated route", run.truth.size());
   std::vector<viewer::RouteMark> marks;
   for (std::size_t i = 0; i < run.truth.size(); ++i) {
     const Pose2& truth = run.truth[i];
-    const auto& seen = run.sightings[i];
-    recordings::RunMoment moment{.stamp_s = seconds_a_look * static_cast<double>(i)};
+    const auto& fix = run.line_fixes[i];
+    recordings::RunMoment moment{.stamp_s = seconds_per_image * static_cast<double>(i)};
     moment.truth = ReferencePose{truth.x_m, truth.y_m, truth.heading_rad};
-    moment.sure = seen.has_value();
-    moment.state = seen ? "on the route" : "off the route";
+    moment.sure = fix.has_value();
+    moment.state = fix ? "on the route" : "off the route";
     moment.values.emplace_back("lateral offset", format_fixed(100.0 * run.lateral_m[i], 1) + " cm");
-    if (seen) moment.pose = seen->pose;
+    if (fix) moment.pose = fix->pose;
     moment.panorama = simulation::take_panorama(
         *place.renderer, truth, {.rows = 40, .columns = 256, .rays_per_axis = 1},
         {.camera_height_m = place.scene.camera_height_m}, place.camera.sensor, seed, executor);
@@ -61,13 +61,13 @@ viewer::RunPage replay_run(const lab::RouteScene& place, const RoutePanorama& pa
       moment.plan.assign(panorama.poses().begin(), panorama.poses().end());
     }
     page.add(moment);
-    marks.push_back({.along_m = seen ? std::optional(seen->along_m) : std::nullopt});
+    marks.push_back({.along_m = fix ? std::optional(fix->along_m) : std::nullopt});
   }
   page.route(draw_route_image(panorama), marks);
   return page;
 }
 
-/// Repeats the route there and back, and measures both drives.
+/// Repeats the route once forward and once back, and measures both drives.
 DemoRoute repeat_and_measure(const lab::RouteScene& place, const RoutePanorama& panorama,
                              std::uint64_t seed, Executor& executor) {
   const RouteTracker tracker(panorama);
@@ -99,13 +99,13 @@ DemoRoute demonstrate_route(const simulation::Scene& office, double length_m, st
   constexpr double spacing_m = 0.1;
   Executor& executor = session.executor();
   lab::RouteScene place = lab::make_route_scene(office, "office", executor);
-  // The value of automatic exposure in these rooms.
+  // Value that automatic exposure chooses in these rooms.
   place.camera.sensor.exposure = 2.0;
-  const auto way = lab::plan_curved_route(place, length_m, spacing_m, seed);
-  const RoutePanorama panorama = lab::record_route(place, way, seed, executor);
+  const auto path = lab::plan_curved_route(place, length_m, spacing_m, seed);
+  const RoutePanorama panorama = lab::record_route(place, path, seed, executor);
   DemoRoute route = repeat_and_measure(place, panorama, seed, executor);
   viewer::MapPlot map{.title = "The route and both drives", .layers = viewer::scene_layers(office)};
-  std::ranges::move(lab::make_route_layers(way, route.runs), std::back_inserter(map.layers));
+  std::ranges::move(lab::make_route_layers(path, route.runs), std::back_inserter(map.layers));
 
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : format_fixed(100.0 * median(values), 1) + " cm";

@@ -19,7 +19,7 @@ void add_story(DemoStory story, viewer::ReportPage& page) {
                    "number of Fourier components. Cross: true position.",
         .part = 2},
        {.title = "Kidnapped robot",
-        .shown = viewer::ReportPlot{std::move(story.gathering), ""},
+        .shown = viewer::ReportPlot{std::move(story.convergence), ""},
         .value = std::move(story.found_again),
         .meaning = "until the robot was localised again after it was moved by hand. Dots: possible "
                    "positions. Ring: true position.",

@@ -13,16 +13,16 @@ namespace panonav::command {
 
 /// The content of the first screen of the page.
 struct DemoStory {
-  viewer::ReportPicture mirror;    ///< what the camera sees, in colour
-  viewer::UnfoldingMap areas;      ///< how the memory answers one question
-  std::string position_error;      ///< "1.4 cm"
-  std::string found_again;         ///< "4 images"
-  viewer::UnfoldingMap gathering;  ///< particles of the robot that is tracked
-  std::string arrived;             ///< "12 of 12"
-  viewer::UnfoldingMap missions;
+  viewer::ReportPicture mirror;      ///< image of the camera, in colour
+  viewer::MapAnimation areas;        ///< possible positions for one query
+  std::string position_error;        ///< "1.4 cm"
+  std::string found_again;           ///< "4 images"
+  viewer::MapAnimation convergence;  ///< particles of the tracked robot
+  std::string arrived;               ///< "12 of 12"
+  viewer::MapAnimation missions;
 };
 
-/// Four pictures that show what the program does, how well, and how to use it.
+/// Adds four pictures with results and the commands for the user's own images to the page.
 void add_story(DemoStory story, viewer::ReportPage& page);
 
 }  // namespace panonav::command

@@ -20,7 +20,8 @@ bool is_correct(const TrackedImage& image, double within_m) {
   return is_localised(image) && error_m && *error_m <= within_m;
 }
 
-/// Images of [begin, end) until the first that is right, that one included.
+/// Returns the number of images in [begin, end) up to and including the first correct one; nullopt
+/// if there is none.
 std::optional<std::size_t> count_images_until_right(const std::vector<TrackedImage>& images,
                                                     std::size_t begin, std::size_t end,
                                                     double within_m) {
@@ -45,7 +46,7 @@ DemoTrack summarise_outcome(const std::vector<TrackedImage>& images, std::size_t
   return track;
 }
 
-/// Describes the state at an image.
+/// Returns the title of an image's frame, which describes the state of the filter.
 std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, double within_m) {
   const std::string number = "image " + std::to_string(image.index + 1) + ": ";
   if (image.index == kidnapped_after + 1) return number + "the robot was moved by hand";
@@ -60,17 +61,19 @@ std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, 
   return number + "lost";
 }
 
-/// The particles gather: few of them, so that they fit into a small picture.
-viewer::UnfoldingMap draw_convergence(const std::vector<TrackedImage>& images,
-                                      const std::vector<Point2>& at_first,
+/// Animates how the particles converge. Few particles are drawn, so that they fit into a small
+/// picture.
+viewer::MapAnimation draw_convergence(const std::vector<TrackedImage>& images,
+                                      const std::vector<Point2>& initial_positions,
                                       std::vector<viewer::MapLayer> scene,
                                       std::size_t kidnapped_after, double within_m) {
-  viewer::UnfoldingMap map{.title = "", .backdrop = std::move(scene)};
-  const viewer::MapLayer everywhere{
-      .label = "possible positions", .colour = viewer::PlotColour::vermilion, .dots = at_first};
-  map.frames.push_back({.title = "before the first image", .layers = {everywhere}});
+  viewer::MapAnimation map{.title = "", .backdrop = std::move(scene)};
+  const viewer::MapLayer initial_particles{.label = "possible positions",
+                                           .colour = viewer::PlotColour::vermilion,
+                                           .dots = initial_positions};
+  map.frames.push_back({.title = "before the first image", .layers = {initial_particles}});
   for (const TrackedImage& image : images) {
-    viewer::MapLayer particles = everywhere;
+    viewer::MapLayer particles = initial_particles;
     particles.dots = positions_of(image.particles);
     const viewer::MapLayer truth{.label = "true position",
                                  .colour = viewer::PlotColour::black,
@@ -82,7 +85,7 @@ viewer::UnfoldingMap draw_convergence(const std::vector<TrackedImage>& images,
 }
 
 void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_after,
-              const viewer::RunPage& played, const viewer::MapPlot& whole,
+              const viewer::RunPage& replay_page, const viewer::MapPlot& path_map,
               viewer::ReportPage& page) {
   const std::string median_text =
       track.errors_m.empty() ? "none" : format_fixed(100.0 * median(track.errors_m), 1) + " cm";
@@ -110,8 +113,8 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
        {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
         "reported positions were wrong; the robot needs some images to notice that it was "
         "kidnapped"}});
-  page.add_run(played);
-  page.add_plots({{whole,
+  page.add_run(replay_page);
+  page.add_plots({{path_map,
                    "The whole run. Black: the true path, which starts again at the place to which "
                    "the robot was moved. Blue: the estimated path. Both agree except for the "
                    "images after the robot was kidnapped."}});
@@ -131,26 +134,29 @@ DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings&
                          .odometry = odometry,
                          .source = run.source});
   const VisualMemory& memory = tracker.memory();
-  const std::size_t particles_kept = count_shown_particles(run.entries.size());
-  const std::vector<Point2> at_first = positions_of(
-      recordings::resample_systematically(tracker.localiser().particles(), particles_kept));
+  const std::size_t particles_per_image = count_shown_particles(run.entries.size());
+  const std::vector<Point2> initial_positions = positions_of(
+      recordings::resample_systematically(tracker.localiser().particles(), particles_per_image));
   std::vector<TrackedImage> images;
-  viewer::RunPage played("A kidnapped robot", run.entries.size());
-  const ShownReferences shown(memory);
-  track(tracker, run, {.particles_kept = particles_kept, .recorded = &file, .shown = &shown},
+  viewer::RunPage replay_page("A kidnapped robot", run.entries.size());
+  const ShownReferences shown_references(memory);
+  track(tracker, run,
+        {.particles_per_image = particles_per_image,
+         .thumbnail_file = &file,
+         .shown_references = &shown_references},
         session.executor(), [&](TrackedImage&& image) {
           if (image.index == 0)
             image.moment->walls = viewer::scene_outlines(recordings.corridor_scene);
-          add(played, image);
+          add(replay_page, image);
           image.moment.reset();
           images.push_back(std::move(image));
         });
   DemoTrack result = summarise_outcome(images, recordings.kidnapped_after, options.spacing_m());
   result.places_at_first = images.front().estimate.modes.size();
   const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings.corridor_scene);
-  result.gathering =
-      draw_convergence(images, at_first, scene, recordings.kidnapped_after, options.spacing_m());
-  add_part(result, options.spacing_m(), recordings.kidnapped_after, played,
+  result.convergence = draw_convergence(images, initial_positions, scene,
+                                        recordings.kidnapped_after, options.spacing_m());
+  add_part(result, options.spacing_m(), recordings.kidnapped_after, replay_page,
            draw_track(memory, images, {scene, recordings.kidnapped_after}), page);
   return result;
 }

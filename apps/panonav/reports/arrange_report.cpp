@@ -17,19 +17,21 @@ namespace {
 
 using Springs = std::vector<std::pair<std::size_t, std::size_t>>;
 
-/// Selects the springs that hold, at most two of each view if there are many.
+/// Selects the springs that were not rejected. If there are more than 1500, a spring is dropped if
+/// both its views already have two shorter springs.
 Springs choose_springs(const Lattice& lattice) {
-  constexpr std::size_t many = 1500;
+  constexpr std::size_t max_unthinned_springs = 1500;
   std::vector<const Lattice::Spring*> all;
   for (const Lattice::Spring& spring : lattice.springs) {
     if (spring.weight >= min_spring_weight) all.push_back(&spring);
   }
-  const bool thin = all.size() > many;
-  if (thin) std::ranges::stable_sort(all, {}, [](const auto* spring) { return spring->length; });
+  const bool is_thinned = all.size() > max_unthinned_springs;
+  if (is_thinned)
+    std::ranges::stable_sort(all, {}, [](const auto* spring) { return spring->length; });
   std::vector<int> of(lattice.nodes.size(), 0);
   Springs shown;
   for (const Lattice::Spring* spring : all) {
-    if (thin && of[spring->a] >= 2 && of[spring->b] >= 2) continue;
+    if (is_thinned && of[spring->a] >= 2 && of[spring->b] >= 2) continue;
     ++of[spring->a];
     ++of[spring->b];
     shown.emplace_back(spring->a, spring->b);
@@ -37,8 +39,8 @@ Springs choose_springs(const Lattice& lattice) {
   return shown;
 }
 
-/// Each group moved, turned and scaled to where its views end; empty for those of one or two, which
-/// have no shape.
+/// Moves, rotates and scales each group to the final positions of its views. Views of groups that
+/// are too small for this get nullopt.
 std::vector<std::optional<Point2>> align_to_end(const std::vector<Pose2>& poses,
                                                 const std::vector<std::size_t>& components,
                                                 const std::vector<std::optional<Point2>>& end) {
@@ -65,7 +67,7 @@ std::vector<std::optional<Point2>> align_to_end(const std::vector<Pose2>& poses,
 
 }  // namespace
 
-LatticeStepCallback LatticeSteps::watch() {
+LatticeStepCallback LatticeSteps::step_callback() {
   constexpr std::size_t max_steps = 200;
   return [this](std::span<const Pose2> poses, std::span<const std::size_t> components) {
     const std::size_t number = count_++;
@@ -78,18 +80,19 @@ LatticeStepCallback LatticeSteps::watch() {
   };
 }
 
-viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
+viewer::MapAnimation LatticeSteps::unfold(const Lattice& lattice,
                                           const VisualMemory& memory) const {
   const auto end = align_to_truth(lattice, memory);
   const Springs springs = choose_springs(lattice);
-  constexpr std::size_t numbers = 600'000;
-  const std::size_t each = 1 + 2 * lattice.nodes.size() + 4 * springs.size();
-  const std::size_t frames = std::clamp<std::size_t>(numbers / each, 10, 100);
-  viewer::UnfoldingMap map{.title = "Arrangement, step by step"};
+  constexpr std::size_t max_coordinates = 600'000;
+  const std::size_t coordinates_per_frame = 1 + 2 * lattice.nodes.size() + 4 * springs.size();
+  const std::size_t frames =
+      std::clamp<std::size_t>(max_coordinates / coordinates_per_frame, 10, 100);
+  viewer::MapAnimation map{.title = "Arrangement, step by step"};
   const std::string of = " of " + std::to_string(count_);
   const auto add = [&](const std::string& title, const std::vector<std::optional<Point2>>& places,
                        const std::vector<std::size_t>& components) {
-    // The group that most views of the largest component are in.
+    // Finds the largest group of the drawn views.
     std::map<std::size_t, std::size_t> sizes;
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (places[i]) ++sizes[components[i]];

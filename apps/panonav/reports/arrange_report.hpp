@@ -12,15 +12,15 @@
 
 namespace panonav::command {
 
-/// Keeps how an arrangement unfolds: about a hundred of its steps, evenly chosen.
+/// Stores about a hundred steps of an arrangement, at equal intervals.
 class LatticeSteps {
  public:
-  /// For `arrange`; *this must outlive it.
-  [[nodiscard]] LatticeStepCallback watch();
-  /// The steps as a map that unfolds. Groups of views are laid over where they end, as they are
-  /// turned and deformed then; views alone and in pairs are not drawn. Of long arrangements
-  /// fewer steps and the two shortest springs of each view, so that a page stays small.
-  [[nodiscard]] viewer::UnfoldingMap unfold(const Lattice& lattice,
+  /// Returns the callback for `arrange` that stores steps. *this must outlive the callback.
+  [[nodiscard]] LatticeStepCallback step_callback();
+  /// Returns the steps as an animated map. Each group of views is aligned with its final position,
+  /// but keeps the shape of the step; groups of one or two views are not drawn. Large arrangements
+  /// get fewer steps and only the shortest springs of each view, so that the page stays small.
+  [[nodiscard]] viewer::MapAnimation unfold(const Lattice& lattice,
                                             const VisualMemory& memory) const;
 
  private:
@@ -34,8 +34,8 @@ class LatticeSteps {
   std::size_t every_ = 1;
 };
 
-/// Writes index.html: the arrangement as it unfolds, beside the true places where they are known,
-/// and its components. Throws FileError.
+/// Writes index.html with the animated arrangement, the true positions if they are known, and a
+/// table of the components. Throws FileError.
 void write_arrange_report(const std::filesystem::path& folder, const std::string& name,
                           const Lattice& lattice, const VisualMemory& memory,
                           const LatticeSteps& steps);

@@ -14,7 +14,8 @@ namespace panonav::command {
 
 namespace {
 
-/// Places as cells of a raster of their spacing. Places that share a cell show the last one.
+/// Rasterises the values of places; the cell size is the spacing of the places. If places share a
+/// cell, it has the value of the last one.
 viewer::HeatMap rasterise(const std::vector<Pose2>& places, double spacing_m,
                           const std::function<double(std::size_t)>& value) {
   Point2 low = places.front().position();
@@ -23,7 +24,7 @@ viewer::HeatMap rasterise(const std::vector<Pose2>& places, double spacing_m,
     low = {std::min(low.x_m, place.x_m), std::min(low.y_m, place.y_m)};
     high = {std::max(high.x_m, place.x_m), std::max(high.y_m, place.y_m)};
   }
-  // A far outlier must not blow up the raster.
+  // Limits the number of cells, which one distant place could make very large.
   constexpr double max_cells = 500.0;
   const double extent_m = std::max(high.x_m - low.x_m, high.y_m - low.y_m);
   const double cell_m = std::max(spacing_m, extent_m / max_cells);
@@ -97,8 +98,8 @@ viewer::MapPlot draw_field(const RecordedViews& places, const std::vector<HomeVe
       arrows.dots.push_back(place.position());
       continue;
     }
-    arrows.lines.push_back(
-        arrow({place.x_m, place.y_m, place.heading_rad + vectors[p].direction_rad()}, arrow_m));
+    arrows.lines.push_back(make_arrow_line(
+        {place.x_m, place.y_m, place.heading_rad + vectors[p].direction_rad()}, arrow_m));
   }
   const viewer::MapLayer home{.label = "home",
                               .colour = viewer::PlotColour::black,

@@ -9,27 +9,27 @@
 namespace panonav::command {
 
 std::string describe_direction(double direction_rad) {
-  const double off = std::abs(degrees(direction_rad));
-  if (off < 0.5) return "straight ahead";
-  if (off >= 179.5) return "straight behind";
-  return format_fixed(off, 0) + (format_fixed(off, 0) == "1" ? " degree" : " degrees") +
+  const double angle_deg = std::abs(degrees(direction_rad));
+  if (angle_deg < 0.5) return "straight ahead";
+  if (angle_deg >= 179.5) return "straight behind";
+  return format_fixed(angle_deg, 0) + (format_fixed(angle_deg, 0) == "1" ? " degree" : " degrees") +
          " to the " + (direction_rad > 0.0 ? "left" : "right");
 }
 
 std::string describe_rotation(double heading_rad) {
-  // heading_rad is the heading at home in the robot's present frame; the robot has rotated by its
-  // negative.
+  // heading_rad is the heading at home in the robot's current frame, so the robot has rotated by
+  // -heading_rad.
   const double turned = wrap_angle(-heading_rad);
   if (std::abs(degrees(turned)) < 0.5) return "same heading as at home";
   if (std::abs(degrees(turned)) >= 179.5) return "heading opposite to that at home";
   return "the robot has rotated by " + describe_direction(turned);
 }
 
-std::string explain_no_direction(const HomingResult& way) {
-  if (!way.known) return "the views are not more similar than random views";
-  // Above it more than half of the energy of either view is found in the other.
-  constexpr double alike = std::numbers::sqrt2 / 2.0;
-  if (way.vector.correlation >= alike) return "the robot is already at home";
+std::string explain_no_direction(const HomingResult& result) {
+  if (!result.known) return "the views are not more similar than random views";
+  // Correlation from which on each view explains more than half of the other's variance; chosen.
+  constexpr double min_home_correlation = std::numbers::sqrt2 / 2.0;
+  if (result.vector.correlation >= min_home_correlation) return "the robot is already at home";
   return "the views are too different";
 }
 

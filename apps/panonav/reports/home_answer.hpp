@@ -18,18 +18,18 @@ struct Goal {
   std::optional<Panorama> panorama;  ///< empty for views of a memory
 };
 
-/// One view and the way home from it.
+/// One view and the home vector that was computed for it.
 struct HomeAnswer {
   std::string file;
   std::optional<ReferencePose> pose;
-  HomingResult way;
+  HomingResult result;
 };
 
-/// "34 degrees to the left", "straight ahead".
+/// Returns a direction as text: "34 degrees to the left", "straight ahead".
 [[nodiscard]] std::string describe_direction(double direction_rad);
 /// Describes the robot's rotation relative to the home view.
 [[nodiscard]] std::string describe_rotation(double heading_rad);
-/// Why there is no direction.
-[[nodiscard]] std::string explain_no_direction(const HomingResult& way);
+/// Returns the reason why a result has no direction, as text.
+[[nodiscard]] std::string explain_no_direction(const HomingResult& result);
 
 }  // namespace panonav::command

@@ -15,8 +15,8 @@ namespace panonav::command {
 
 namespace {
 
-/// First, last and evenly between.
-std::set<std::size_t> choose_shown(std::size_t count) {
+/// Returns up to four indices: first, last, and others at equal intervals.
+std::set<std::size_t> choose_shown_answers(std::size_t count) {
   constexpr std::size_t max_shown = 4;
   std::set<std::size_t> shown;
   for (std::size_t i = 0; i < std::min(max_shown, count); ++i) {
@@ -26,13 +26,16 @@ std::set<std::size_t> choose_shown(std::size_t count) {
 }
 
 std::string make_caption(const HomeAnswer& answer) {
-  const HomingResult& way = answer.way;
-  if (!way.direction_rad) return answer.file + ": no direction home, " + explain_no_direction(way);
-  return answer.file + ": home is " + describe_direction(*way.direction_rad) + ", about " +
-         format_fixed(way.distance_r, 2) + " R away; " + describe_rotation(way.vector.heading_rad);
+  const HomingResult& result = answer.result;
+  if (!result.direction_rad)
+    return answer.file + ": no direction home, " + explain_no_direction(result);
+  return answer.file + ": home is " + describe_direction(*result.direction_rad) + ", about " +
+         format_fixed(result.distance_r, 2) + " R away; " +
+         describe_rotation(result.vector.heading_rad);
 }
 
-/// Arrows as long as the nearest views are apart.
+/// Returns a length for arrows of 0.8 times the spacing of the views, in metres; 1 if it is
+/// unknown.
 double arrow_length_m(const std::vector<HomeAnswer>& answers) {
   std::vector<Point2> places;
   for (const auto& answer : answers) {
@@ -41,45 +44,47 @@ double arrow_length_m(const std::vector<HomeAnswer>& answers) {
   return places.size() < 2 ? 1.0 : 0.8 * VoronoiCells(places).spacing_m();
 }
 
-/// Empty where nothing is known of positions.
+/// Draws the directions home from above; nullopt if no view has both a pose and a direction.
 std::optional<viewer::MapPlot> draw_field(const Goal& goal,
                                           const std::vector<HomeAnswer>& answers) {
   viewer::MapLayer arrows{.label = "path home", .colour = viewer::PlotColour::blue};
-  viewer::MapLayer silent{.label = "no direction", .colour = viewer::PlotColour::vermilion};
+  viewer::MapLayer without_direction{.label = "no direction",
+                                     .colour = viewer::PlotColour::vermilion};
   const double length_m = arrow_length_m(answers);
   for (const auto& answer : answers) {
     if (!answer.pose || !answer.pose->heading_rad) continue;
     const Point2 at = answer.pose->position();
-    if (!answer.way.direction_rad) {
-      silent.crosses.push_back(at);
+    if (!answer.result.direction_rad) {
+      without_direction.crosses.push_back(at);
       continue;
     }
-    const double towards = *answer.pose->heading_rad + *answer.way.direction_rad;
-    arrows.lines.push_back(arrow({at.x_m, at.y_m, towards}, length_m));
+    const double towards = *answer.pose->heading_rad + *answer.result.direction_rad;
+    arrows.lines.push_back(make_arrow_line({at.x_m, at.y_m, towards}, length_m));
   }
   if (arrows.lines.empty()) return std::nullopt;
   viewer::MapLayer home{.label = "home", .colour = viewer::PlotColour::black};
   if (goal.pose) home.squares.push_back(goal.pose->position());
-  return viewer::MapPlot{.title = "Home vectors from above", .layers = {arrows, silent, home}};
+  return viewer::MapPlot{.title = "Home vectors from above",
+                         .layers = {arrows, without_direction, home}};
 }
 
-/// The view at home, turned as if the robot there faced the same way as here, above the current
-/// one.
+/// Returns the view at home, rotated to the current heading, and the current view below it.
 std::vector<viewer::ReportView> make_report_views(const std::optional<Panorama>& home,
                                                   const Panorama& current,
                                                   const HomeAnswer& answer) {
-  const HomeVector& found = answer.way.vector;
+  const HomeVector& found = answer.result.vector;
   std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};
-  if (answer.way.direction_rad) {
+  if (answer.result.direction_rad) {
     const double towards = found.direction_rad();
-    marks.push_back(
-        {.azimuth_rad = towards, .colour = viewer::PlotColour::vermilion, .through = true});
+    marks.push_back({.azimuth_rad = towards,
+                     .colour = viewer::PlotColour::vermilion,
+                     .dashed_through_view = true});
     marks.push_back({.azimuth_rad = wrap_angle(towards + std::numbers::pi),
                      .colour = viewer::PlotColour::blue,
-                     .through = true});
+                     .dashed_through_view = true});
   }
   std::vector<viewer::ReportView> views;
-  if (home) {  // the robot at home turns to the current heading
+  if (home) {  // rotates the view to the current heading
     const double columns = -found.heading_rad / (2.0 * std::numbers::pi) * home->columns();
     views.push_back({rotate_columns(*home, static_cast<int>(std::lround(columns))), marks,
                      "View at home, rotated to the current heading"});
@@ -97,7 +102,7 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                           "panonav compared the view at home, " + goal.name +
                               ", with the current image. It computed the direction home without a "
                               "map and without knowing the robot's heading.");
-  const HomingResult& first = answers.front().way;
+  const HomingResult& first = answers.front().result;
   if (answers.size() == 1 && !first.known) {
     page.add_figures({{"no answer", explain_no_direction(first)}});
   } else if (answers.size() == 1) {
@@ -117,7 +122,7 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                 "The forward direction is in the middle (grey mark). Orange: the direction home; "
                 "objects in this direction become larger during the drive. Blue: the opposite "
                 "direction, where objects become smaller.");
-  for (const std::size_t i : choose_shown(answers.size())) {
+  for (const std::size_t i : choose_shown_answers(answers.size())) {
     page.add_views(make_report_views(goal.panorama, current(i), answers[i]));
   }
   if (const auto vectors = draw_field(goal, answers)) {
@@ -127,15 +132,15 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
   page.begin_section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const HomeAnswer& answer : answers) {
-    const HomingResult& way = answer.way;
+    const HomingResult& result = answer.result;
     const auto if_known = [&](double value, int digits) {
-      return way.known ? format_fixed(value, digits) : std::string("no answer");
+      return result.known ? format_fixed(value, digits) : std::string("no answer");
     };
     rows.push_back({answer.file,
-                    way.direction_rad ? describe_direction(*way.direction_rad) : "none",
-                    if_known(way.distance_r, 3), if_known(degrees(way.turn_rad), 1),
-                    format_fixed(way.vector.correlation, 3), format_fixed(way.vector.residual, 3),
-                    format_fixed(way.probability, 3)});
+                    result.direction_rad ? describe_direction(*result.direction_rad) : "none",
+                    if_known(result.distance_r, 3), if_known(degrees(result.turn_rad), 1),
+                    format_fixed(result.vector.correlation, 3),
+                    format_fixed(result.vector.residual, 3), format_fixed(result.probability, 3)});
   }
   page.add_table({"view", "direction home", "distance [R]", "rotation [degrees]", "correlation",
                   "residual", "probability"},

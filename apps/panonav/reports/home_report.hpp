@@ -8,9 +8,9 @@
 
 namespace panonav::command {
 
-/// Writes index.html and its pictures: both views turned into one frame with the way home, and
-/// where positions are known all home vectors from above. `current(i)` reads the panorama of answer
-/// i. Throws FileError.
+/// Writes index.html with up to four pairs of views, rotated to the same heading, and the direction
+/// home. If positions are known, a map shows all home vectors. `current(i)` reads the panorama of
+/// answer i. Throws FileError.
 void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                        const std::vector<HomeAnswer>& answers,
                        const std::function<Panorama(std::size_t)>& current);

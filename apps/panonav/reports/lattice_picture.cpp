@@ -12,7 +12,7 @@ namespace panonav::command {
 
 namespace {
 
-/// Springs that were not rejected, as lines between `positions`.
+/// Draws the springs that were not rejected as lines between `positions`.
 viewer::MapLayer draw_springs(const Lattice& lattice,
                               const std::vector<std::optional<Point2>>& positions) {
   viewer::MapLayer layer{.label = "springs", .colour = viewer::PlotColour::light_grey};

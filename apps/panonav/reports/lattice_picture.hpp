@@ -10,20 +10,21 @@
 
 namespace panonav::command {
 
-/// True if the memory knows enough positions of the largest component for a comparison.
+/// True if the memory has enough positions of views in the largest component for a comparison.
 [[nodiscard]] bool has_true_positions(const Lattice& lattice, const VisualMemory& memory);
 
-/// Places of the largest component's views, laid over the positions that the memory knows; empty
-/// for other views.
+/// Returns the positions of the largest component's views, aligned with those in the memory if
+/// there are enough; nullopt for other views.
 [[nodiscard]] std::vector<std::optional<Point2>> align_to_truth(const Lattice& lattice,
                                                                 const VisualMemory& memory);
 
-/// The largest component with its springs; where the memory knows positions, these stand before it.
+/// Draws the largest component with its springs. If the memory has positions, a plot of these comes
+/// first.
 [[nodiscard]] std::vector<viewer::MapPlot> draw_lattice(const Lattice& lattice,
                                                         const VisualMemory& memory);
 
-/// Draws the largest component with its springs; where the memory knows positions, the map is laid
-/// over them and they stand beside it. Throws what `write_plot` throws.
+/// Writes the largest component with its springs as a picture. If the memory has positions, the map
+/// is aligned with them, and they are shown next to it. Throws like `write_plot`.
 void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
                            const VisualMemory& memory);
 

@@ -42,9 +42,10 @@ std::string describe_answer(const LocalisedQuery& query) {
 }
 
 /// Makes the moment of an image for the page.
-recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t number, Panorama&& seen,
-                                  const MemoryFile& file) {
-  recordings::RunMoment moment{.stamp_s = static_cast<double>(number), .panorama = std::move(seen)};
+recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t number,
+                                  Panorama&& panorama, const MemoryFile& file) {
+  recordings::RunMoment moment{.stamp_s = static_cast<double>(number),
+                               .panorama = std::move(panorama)};
   moment.truth = query.pose;
   const auto& matches = query.place.matches;
   describe(moment, query.place);
@@ -104,7 +105,7 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
                  rows);
 }
 
-/// Counts known places and summarises the errors of answers with a known truth.
+/// Returns the number of known places and the median error of answers with a true pose, as texts.
 std::vector<std::pair<std::string, std::string>> summarise(
     const std::vector<LocalisedQuery>& queries, std::size_t readable) {
   std::vector<double> errors;
@@ -158,7 +159,7 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
                   std::to_string(readable.size()) + " images at equal intervals.");
   }
   viewer::RunPage run("", shown);
-  run.unordered();
+  run.set_unordered();
   bool thumbnails = true;
   for (std::size_t n = 0; n < shown; ++n) {
     const std::size_t i = readable[n * (readable.size() - 1) / std::max<std::size_t>(1, shown - 1)];

@@ -12,18 +12,18 @@
 
 namespace panonav::command {
 
-/// An image and the memory's answer to it.
+/// An image and the place that was found for it.
 struct LocalisedQuery {
   std::string file;
   double turned_rad = 0.0;  ///< rotation of the image before localisation
   Place place;
-  std::optional<ReferencePose> pose;  ///< as the data set gives it
-  std::string error;                  ///< why it could not be read; empty: it could
+  std::optional<ReferencePose> pose;  ///< true pose from the data set
+  std::string error;                  ///< why the image could not be read; empty: no error
 };
 
-/// Writes a page that shows each query above its best match, rotated to the same heading, a map,
-/// and the figures by which a person can judge the answer: for 200 evenly chosen queries, and a
-/// table of the first 500. `panorama` returns that of a query by its number. Throws FileError.
+/// Writes a page with a map and each query above its best match, rotated to the same heading. Shows
+/// 200 queries at equal intervals and a table of the first 500. `panorama(i)` returns the panorama
+/// of query i. Throws FileError.
 void write_localise_report(const std::filesystem::path& folder, const MemoryFile& file,
                            const PlaceRecogniser& recogniser,
                            const std::vector<LocalisedQuery>& queries,

@@ -16,21 +16,21 @@ namespace panonav::command {
 namespace {
 
 /// The nodes of the largest component with their estimated and true positions.
-struct Nodes {
+struct ComponentNodes {
   std::vector<Point2> map;
-  std::vector<Point2> truth;     // as many, or none where one is not known
-  std::vector<Point2> odometry;  // likewise
-  std::unordered_map<ViewId, std::size_t> number;
+  std::vector<Point2> truth;     // same size as map; empty if one is unknown
+  std::vector<Point2> odometry;  // same size as map; empty if one is unknown
+  std::unordered_map<ViewId, std::size_t> index_of_view;
 };
 
-Nodes collect_nodes(const Dataset& recording, const Mapper::Result& run) {
-  Nodes nodes;
+ComponentNodes collect_nodes(const Dataset& recording, const Mapper::Result& run) {
+  ComponentNodes nodes;
   const std::size_t component = find_largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     const TopologicalMap::Node& node = run.map.nodes[i];
     if (node.component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
-    nodes.number.emplace(node.view, nodes.map.size());
+    nodes.index_of_view.emplace(node.view, nodes.map.size());
     nodes.map.push_back(node.pose.position());
     if (entry.pose) nodes.truth.push_back(entry.pose->position());
     if (entry.odometry) nodes.odometry.push_back(entry.odometry->position());
@@ -56,18 +56,18 @@ void declare_map_files(Arguments& arguments, MapFileArguments& files) {
   arguments.option(
       "--picture FILE", files.picture,
       "Draw the map into this PNG or SVG file, next to the true positions if they are known");
-  arguments.writes({"--tum", "--graphml", "--picture"});
+  arguments.declare_outputs({"--tum", "--graphml", "--picture"});
 }
 
 std::optional<RecordedMapComparison> compare_with_ground_truth(const Dataset& recording,
                                                                const Mapper::Result& run) {
-  const Nodes nodes = collect_nodes(recording, run);
+  const ComponentNodes nodes = collect_nodes(recording, run);
   const auto positions = compare_positions(nodes.map, nodes.truth, !run.wheels);
   if (!positions) return std::nullopt;
   RecordedMapComparison comparison{.positions = *positions, .closures = {}};
   comparison.closures = count_closures(run.map, [&](ViewId view) -> std::optional<Point2> {
-    const auto found = nodes.number.find(view);
-    if (found == nodes.number.end()) return std::nullopt;
+    const auto found = nodes.index_of_view.find(view);
+    if (found == nodes.index_of_view.end()) return std::nullopt;
     return nodes.truth[found->second];
   });
   if (is_comparable(nodes.odometry, nodes.truth)) {
@@ -77,7 +77,7 @@ std::optional<RecordedMapComparison> compare_with_ground_truth(const Dataset& re
 }
 
 viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
-  const Nodes nodes = collect_nodes(recording, run);
+  const ComponentNodes nodes = collect_nodes(recording, run);
   viewer::MapPlot plot{.title = "map", .layers = {}};
   std::vector<Point2> map = nodes.map;
   if (is_comparable(nodes.map, nodes.truth)) {
@@ -94,9 +94,10 @@ viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
   }
   viewer::MapLayer closures{.label = "closures", .colour = viewer::PlotColour::green};
   for (const TopologicalMap::Edge& edge : run.map.edges) {
-    const auto a = nodes.number.find(edge.a);
-    const auto b = nodes.number.find(edge.b);
-    if (edge.kind != Link::Kind::closure || a == nodes.number.end() || b == nodes.number.end()) {
+    const auto a = nodes.index_of_view.find(edge.a);
+    const auto b = nodes.index_of_view.find(edge.b);
+    if (edge.kind != Link::Kind::closure || a == nodes.index_of_view.end() ||
+        b == nodes.index_of_view.end()) {
       continue;
     }
     closures.lines.push_back({map[a->second], map[b->second]});
@@ -114,7 +115,7 @@ void write_map_picture(const std::filesystem::path& path, const Dataset& recordi
 
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
                       const Dataset& recording, const Mapper::Result& run,
-                      const viewer::RunPage& played) {
+                      const viewer::RunPage& replay_page) {
   viewer::ReportPage page("Map of " + name,
                           "A robot took " + std::to_string(recording.entries.size()) +
                               " images on its path. panonav computed each step of the robot from "
@@ -148,7 +149,7 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
   page.add_text(
       "Grey dots are the places of the map, and lines connect them. The large dot is the position "
       "of the current image. Images between two places are not stored in the map.");
-  page.add_run(played);
+  page.add_run(replay_page);
   page.begin_section("The whole map");
   page.add_plots({{draw_map(recording, run),
                    comparison ? "The map, rotated and moved to fit the true path. The true path "

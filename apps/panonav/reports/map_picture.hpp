@@ -23,28 +23,29 @@ struct MapFileArguments {
 /// Adds --tum, --graphml and --picture.
 void declare_map_files(Arguments& arguments, MapFileArguments& files);
 
-/// The largest component of the map with its closures; where the recording knows positions, the map
-/// is laid over them, and so is the odometry of its wheels.
+/// Draws the largest component of the map with its closures. If the recording has true positions,
+/// map and wheel odometry are aligned with them.
 [[nodiscard]] viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run);
-/// Writes the map as a PNG or SVG file. Throws as `write_plot`.
+/// Writes the map as a PNG or SVG file. Throws like `write_plot`.
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const Mapper::Result& run);
 
-/// Comparison of a map with the positions that the recording knows.
+/// Comparison of a map with the true positions of the recording.
 struct RecordedMapComparison {
-  MapComparison positions;  ///< of the largest component; with a free scale unless wheels set it
+  MapComparison positions;  ///< largest component; free scale unless wheels give lengths
   MapComparison::Closures closures;
   /// Shape difference of odometry alone, over the same nodes; nullopt if the recording has none.
   std::optional<double> odometry_shape_difference;
 };
-/// nullopt where fewer than three nodes have a position, or all are at one place.
+/// Returns nullopt if there are fewer than three nodes, a node has no true position, or all are at
+/// one point.
 [[nodiscard]] std::optional<RecordedMapComparison> compare_with_ground_truth(
     const Dataset& recording, const Mapper::Result& run);
 
-/// Writes index.html: the drive, picture by picture on its map, and the map beside the truth where
+/// Writes index.html with a replay of the drive on its map, and with the map and the true path if
 /// it is known. Throws FileError.
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
                       const Dataset& recording, const Mapper::Result& run,
-                      const viewer::RunPage& played);
+                      const viewer::RunPage& replay_page);
 
 }  // namespace panonav::command

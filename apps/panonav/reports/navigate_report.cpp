@@ -10,7 +10,7 @@
 namespace panonav::command {
 
 void write_navigate_report(const std::filesystem::path& folder, const MissionReport& mission,
-                           const viewer::RunPage& played) {
+                           const viewer::RunPage& replay_page) {
   const simulation::MissionRun& run = mission.run;
   viewer::ReportPage page("Mission to " + mission.goal,
                           "A simulated robot was sent to a stored view. It uses only images. It "
@@ -33,7 +33,7 @@ void write_navigate_report(const std::filesystem::path& folder, const MissionRep
       "robot. The thick line is the planned path, and the ring is the goal. The robot is drawn at "
       "its true position. The list shows the robot's decisions; click a decision to see it on the "
       "map.");
-  page.add_run(played);
+  page.add_run(replay_page);
   page.begin_section("The whole mission");
   page.add_plots({{mission.plot, "Planned path, driven path and objects"}});
   page.write(folder, "index.html", "panonav navigate");

@@ -9,16 +9,16 @@
 
 namespace panonav::command {
 
-/// The content of a mission's page besides its run.
+/// Content of a mission's page, without the replay.
 struct MissionReport {
-  std::string goal;    ///< name of its view
-  std::string reason;  ///< why it ended, in words
+  std::string goal;    ///< name of the goal view
+  std::string reason;  ///< why the mission ended
   const simulation::MissionRun& run;
-  viewer::MapPlot plot;  ///< the whole of it from above
+  viewer::MapPlot plot;  ///< the whole mission from above
 };
 
-/// Writes index.html: the mission, decision by decision. Throws FileError.
+/// Writes index.html with a replay of the mission and its map. Throws FileError.
 void write_navigate_report(const std::filesystem::path& folder, const MissionReport& mission,
-                           const viewer::RunPage& played);
+                           const viewer::RunPage& replay_page);
 
 }  // namespace panonav::command

@@ -22,8 +22,9 @@ bool is_made_by(const std::filesystem::path& page, std::string_view generator) {
          std::string::npos;
 }
 
-/// True if the folder is empty, or holds only what a killed process left of the page.
-bool is_free(const std::filesystem::path& folder, const std::string& page) {
+/// True if the folder is empty or contains only temporary files of the page that a killed process
+/// has left.
+bool is_replaceable(const std::filesystem::path& folder, const std::string& page) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
@@ -40,17 +41,17 @@ void declare_report(Arguments& arguments, std::optional<std::string>& report,
                    "Write " + std::string(content) +
                        " into this folder; the folder must be new, empty or contain an earlier "
                        "report");
-  arguments.writes({"--report"});
+  arguments.declare_outputs({"--report"});
 }
 
 void prepare_report_folder(const std::filesystem::path& folder, std::string_view verb,
                            std::string_view page) {
   namespace fs = std::filesystem;
   std::error_code error;
-  const bool there = fs::exists(folder, error);
-  const bool ours = is_made_by(folder / page, "panonav " + std::string(verb));
-  if (there &&
-      (!fs::is_directory(folder, error) || (!ours && !is_free(folder, std::string(page))))) {
+  const bool exists = fs::exists(folder, error);
+  const bool is_earlier_report = is_made_by(folder / page, "panonav " + std::string(verb));
+  if (exists && (!fs::is_directory(folder, error) ||
+                 (!is_earlier_report && !is_replaceable(folder, std::string(page))))) {
     throw FileError(
         folder.string(),
         "exists and was not made by panonav " + std::string(verb) +
@@ -60,15 +61,15 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
   if (error) throw FileError(folder.string(), "cannot be created: " + error.message());
 }
 
-std::vector<Point2> arrow(const Pose2& from, double length_m) {
-  const auto at = [](const Point2& start, double towards_rad, double way_m) {
-    return Point2{start.x_m + way_m * std::cos(towards_rad),
-                  start.y_m + way_m * std::sin(towards_rad)};
+std::vector<Point2> make_arrow_line(const Pose2& from, double length_m) {
+  const auto move_along = [](const Point2& start, double towards_rad, double distance_m) {
+    return Point2{start.x_m + distance_m * std::cos(towards_rad),
+                  start.y_m + distance_m * std::sin(towards_rad)};
   };
-  constexpr double barb_rad = 0.85 * std::numbers::pi;  // from the direction of the arrow
-  const Point2 tip = at(from.position(), from.heading_rad, length_m);
-  return {from.position(), tip, at(tip, from.heading_rad + barb_rad, 0.3 * length_m), tip,
-          at(tip, from.heading_rad - barb_rad, 0.3 * length_m)};
+  constexpr double barb_rad = 0.85 * std::numbers::pi;  // angle between arrow and barb
+  const Point2 tip = move_along(from.position(), from.heading_rad, length_m);
+  return {from.position(), tip, move_along(tip, from.heading_rad + barb_rad, 0.3 * length_m), tip,
+          move_along(tip, from.heading_rad - barb_rad, 0.3 * length_m)};
 }
 
 void print_report_path(const std::filesystem::path& folder, Session& session) {

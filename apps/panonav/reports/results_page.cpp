@@ -19,7 +19,7 @@ void add_table(viewer::ReportPage& page, std::span<const lab::ResultRow> rows) {
   page.add_table({header.begin(), header.end()}, lines);
 }
 
-// Adds rows with a target before those without.
+// Adds a table of rows with a target, then one of rows without.
 void add_tables(viewer::ReportPage& page, std::vector<lab::ResultRow> rows) {
   const std::size_t judged = lab::move_targets_first(rows);
   const std::span<const lab::ResultRow> all(rows);

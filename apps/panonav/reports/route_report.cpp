@@ -17,8 +17,8 @@ namespace panonav::command {
 
 namespace {
 
-/// Columns of a line as a person sees them: clockwise, forward in the middle. `to` is the first of
-/// `columns` values.
+/// Copies a line with columns that run clockwise and the forward direction in the middle. `to` has
+/// space for `line.size()` values.
 void copy_line_clockwise(std::span<const float> line, float* to) {
   const std::size_t columns = line.size();
   for (std::size_t i = 0; i < columns; ++i) {
@@ -32,7 +32,7 @@ viewer::MapLayer draw_path_layer(std::span<const Pose2> path) {
   return layer;
 }
 
-/// Lines at equal steps of way from the bottom to the top.
+/// Draws the lines of the route at equal steps along the path, from the bottom to the top.
 viewer::PicturePlot draw_panorama(const RoutePanorama& route) {
   constexpr int max_rows = 400;
   const double length_m = route.length_m();
@@ -67,9 +67,9 @@ viewer::PicturePlot draw_panorama(const RoutePanorama& route) {
   return plot;
 }
 
-/// Pictures spread evenly over those on the route.
-std::vector<std::size_t> choose_evenly(const std::vector<FollowedImage>& images,
-                                       std::size_t max_count) {
+/// Returns the indices of up to `max_count` images on the route, at equal intervals.
+std::vector<std::size_t> choose_images_on_route(const std::vector<FollowedImage>& images,
+                                                std::size_t max_count) {
   std::vector<std::size_t> on_route;
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (images[i].fix) on_route.push_back(i);
@@ -87,9 +87,9 @@ viewer::PicturePlot draw_lines(const RouteLines& route, const std::vector<Follow
                                const std::vector<std::size_t>& chosen) {
   constexpr int band = 3;
   constexpr int gap = 1;
-  constexpr int rows_of_pair = 2 * band + gap;
+  constexpr int rows_per_pair = 2 * band + gap;
   const auto columns = static_cast<std::size_t>(route.columns());
-  const int rows = rows_of_pair * static_cast<int>(chosen.size());
+  const int rows = rows_per_pair * static_cast<int>(chosen.size());
   viewer::PicturePlot plot{
       .title = "Seen by the robot (upper band) and predicted from the route (lower band)",
       .x_label = "azimuth from straight ahead [degrees], left positive",
@@ -104,11 +104,11 @@ viewer::PicturePlot draw_lines(const RouteLines& route, const std::vector<Follow
                      std::numeric_limits<float>::quiet_NaN());
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const FollowedImage& image = images[chosen[k]];
-    const auto shown = route.synthesise(image.fix->pose);
+    const auto predicted = route.synthesise(image.fix->pose);
     for (int row = 0; row < 2 * band; ++row) {
-      const auto& line = row < band ? shown : image.line;
+      const auto& line = row < band ? predicted : image.line;
       copy_line_clockwise(
-          line, plot.values.data() + (k * rows_of_pair + static_cast<std::size_t>(row)) * columns);
+          line, plot.values.data() + (k * rows_per_pair + static_cast<std::size_t>(row)) * columns);
     }
   }
   return plot;
@@ -118,8 +118,8 @@ viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedIma
   viewer::MapLayer truth{.label = "ground truth", .colour = viewer::PlotColour::black};
   viewer::MapLayer fixes{.label = "computed positions", .colour = viewer::PlotColour::blue};
   viewer::MapLayer changed{.label = "changed scene", .colour = viewer::PlotColour::orange};
-  viewer::MapLayer off{.label = "true position while off the route",
-                       .colour = viewer::PlotColour::vermilion};
+  viewer::MapLayer off_route{.label = "true position while off the route",
+                             .colour = viewer::PlotColour::vermilion};
   std::vector<Point2> true_path;
   for (const FollowedImage& image : images) {
     if (image.truth) true_path.push_back(image.truth->position());
@@ -127,10 +127,11 @@ viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedIma
     if (image.fix && !image.changed.empty()) {
       changed.circles.push_back(image.fix->pose.position());
     }
-    if (!image.fix && image.truth) off.crosses.push_back(image.truth->position());
+    if (!image.fix && image.truth) off_route.crosses.push_back(image.truth->position());
   }
   if (true_path.size() > 1) truth.lines.push_back(std::move(true_path));
-  return {.title = "Map", .layers = {draw_path_layer(route.poses()), truth, changed, fixes, off}};
+  return {.title = "Map",
+          .layers = {draw_path_layer(route.poses()), truth, changed, fixes, off_route}};
 }
 
 viewer::LinePlot draw_errors(const std::vector<FollowedImage>& images) {
@@ -179,9 +180,9 @@ std::vector<viewer::RouteMark> make_marks(const std::vector<FollowedImage>& imag
   return marks;
 }
 
-void add_figure(std::vector<std::pair<std::string, std::string>>& figures,
-                const std::vector<double>& errors, double scale, int digits,
-                const std::string& unit, const std::string& meaning) {
+void add_median_figure(std::vector<std::pair<std::string, std::string>>& figures,
+                       const std::vector<double>& errors, double scale, int digits,
+                       const std::string& unit, const std::string& meaning) {
   if (errors.empty()) return;
   figures.emplace_back(format_fixed(scale * median(errors), digits) + unit, meaning);
 }
@@ -215,27 +216,28 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
 
 void write_follow_report(const std::filesystem::path& folder, const FollowedRoute& route,
                          const std::vector<FollowedImage>& images, const FollowSummary& summary,
-                         viewer::RunPage played) {
-  const auto chosen = choose_evenly(images, 8);
+                         viewer::RunPage replay_page) {
+  const auto chosen = choose_images_on_route(images, 8);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(summary.on_route) + " of " + std::to_string(summary.images),
        "images on the route"}};
-  add_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
-  add_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
-  add_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees", "median error of heading");
+  add_median_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
+  add_median_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
+  add_median_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees",
+                    "median error of heading");
   viewer::ReportPage page(
       "Following route '" + route.name + "'",
       "A robot drives the route again, or drives beside it. panonav searches for the pose at which "
       "the stored lines predict the robot's current image.");
   page.add_figures(figures);
-  played.route(draw_panorama(route.panorama), make_marks(images));
+  replay_page.route(draw_panorama(route.panorama), make_marks(images));
   page.begin_section("The run, image by image");
   page.add_text(
       "The map shows the stored route and the robot's position. The route panorama is below. Each "
       "row is the horizon at one place of the route, with the start at the bottom and the forward "
       "direction in the middle. The horizontal line marks the robot's row. Orange marks are "
       "directions in which the scene has changed.");
-  page.add_run(played);
+  page.add_run(replay_page);
   page.begin_section("Route");
   page.add_plots({{draw_path(route.lines, images),
                    "Stored route, computed positions, and the true path if it is known"}});

@@ -10,22 +10,22 @@
 
 namespace panonav::command {
 
-/// The route panorama [Y03 figures 3b and 5] and the path. Throws FileError.
+/// Writes a page with the route panorama [Y03 figures 3b and 5] and the path. Throws FileError.
 void write_record_report(const std::filesystem::path& folder, const std::string& name,
                          const RoutePanorama& route, double bytes_per_km);
 
-/// A route as the page of a run along it shows it.
+/// A route that a run followed, for the page of the run.
 struct FollowedRoute {
   std::string name;
   const RoutePanorama& panorama;
   const RouteLines& lines;
 };
 
-/// The run, played beside the route panorama; path, fixes and truth; what was seen beside what the
-/// route shows from there; correlations and errors along the run. `played` holds a moment for each
+/// Writes a page with a replay of the run above the route panorama, a map with fixes and true path,
+/// observed and predicted lines, correlations and errors. `replay_page` has a moment for each
 /// image. Throws FileError.
 void write_follow_report(const std::filesystem::path& folder, const FollowedRoute& route,
                          const std::vector<FollowedImage>& images, const FollowSummary& summary,
-                         viewer::RunPage played);
+                         viewer::RunPage replay_page);
 
 }  // namespace panonav::command

@@ -17,7 +17,8 @@ viewer::MapLayer draw_references(const VisualMemory& memory) {
   return layer;
 }
 
-/// One line for each stretch of images that hold a position and follow each other.
+/// Returns one line for each run of consecutive images with a position; lines end where the robot
+/// was kidnapped.
 Lines split_lines(const std::vector<std::optional<Point2>>& positions,
                   const std::optional<std::size_t>& kidnapped_after) {
   Lines lines;
@@ -58,8 +59,8 @@ viewer::MapLayer draw_estimated_path(const std::vector<TrackedImage>& images,
 viewer::MapPlot draw_track(const VisualMemory& memory, const std::vector<TrackedImage>& images,
                            const TrackBackground& background) {
   viewer::MapLayer localised{.label = "localised", .colour = viewer::PlotColour::blue};
-  viewer::MapLayer guessed{.label = "ambiguous: most likely position",
-                           .colour = viewer::PlotColour::orange};
+  viewer::MapLayer ambiguous{.label = "ambiguous: most likely position",
+                             .colour = viewer::PlotColour::orange};
   viewer::MapLayer lost{.label = "true position while lost",
                         .colour = viewer::PlotColour::vermilion};
   viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
@@ -74,7 +75,7 @@ viewer::MapPlot draw_track(const VisualMemory& memory, const std::vector<Tracked
     if (is_localised(image)) {
       localised.dots.push_back(pose->position());
     } else if (image.estimate.state == LocalisationState::ambiguous && pose) {
-      guessed.circles.push_back(pose->position());
+      ambiguous.circles.push_back(pose->position());
     } else if (image.truth) {
       lost.crosses.push_back(image.truth->position());
     }
@@ -82,7 +83,7 @@ viewer::MapPlot draw_track(const VisualMemory& memory, const std::vector<Tracked
   viewer::MapPlot plot{.title = "Map of the whole run", .layers = background.surroundings};
   for (viewer::MapLayer& layer : std::vector{
            draw_references(memory), draw_true_path(images, background),
-           draw_estimated_path(images, background), localised, guessed, lost, start, kidnapped}) {
+           draw_estimated_path(images, background), localised, ambiguous, lost, start, kidnapped}) {
     plot.layers.push_back(std::move(layer));
   }
   return plot;

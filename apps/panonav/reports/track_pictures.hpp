@@ -10,10 +10,10 @@
 
 namespace panonav::command {
 
-/// The background of a drawing of a tracked run.
+/// Events and areas that a drawing of a tracked run shows besides its images.
 struct TrackBackground {
   std::vector<viewer::MapLayer> surroundings;
-  /// The last image before the robot was kidnapped; empty: it was not.
+  /// Index of the last image before the robot was kidnapped; nullopt if it was not kidnapped.
   std::optional<std::size_t> kidnapped_after;
 };
 

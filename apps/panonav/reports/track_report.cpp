@@ -19,7 +19,7 @@ namespace {
 
 viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spacing_m) {
   viewer::Series localised{.label = "error, localised", .style = viewer::SeriesStyle::points};
-  viewer::Series guessed{.label = "error, ambiguous", .style = viewer::SeriesStyle::points};
+  viewer::Series ambiguous{.label = "error, ambiguous", .style = viewer::SeriesStyle::points};
   viewer::Series spread{.label = "spread of particles", .style = viewer::SeriesStyle::lines};
   viewer::Series lost{.label = "lost: no estimate", .style = viewer::SeriesStyle::points};
   viewer::Series spacing{.label = "spacing of views", .style = viewer::SeriesStyle::lines};
@@ -30,7 +30,7 @@ viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spa
     if (image.estimate.state == LocalisationState::lost) {
       lost.add(x, image.estimate.spread_m);
     } else if (const auto error = position_error_m(image)) {
-      viewer::Series& series = is_localised(image) ? localised : guessed;
+      viewer::Series& series = is_localised(image) ? localised : ambiguous;
       series.add(x, *error);
     }
   }
@@ -39,7 +39,7 @@ viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spa
   return viewer::LinePlot{.title = "Errors and uncertainty",
                           .x_label = "image",
                           .y_label = "metres",
-                          .series = {localised, guessed, spread, lost, spacing},
+                          .series = {localised, ambiguous, spread, lost, spacing},
                           .log_y = true};
 }
 
@@ -63,7 +63,7 @@ viewer::LinePlot draw_particles(const std::vector<TrackedImage>& images) {
                           .log_y = true};
 }
 
-/// Stretches of images with one state.
+/// Returns a table row for each run of consecutive images with the same state.
 std::vector<std::vector<std::string>> make_stretch_rows(const std::vector<TrackedImage>& images) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t begin = 0; begin < images.size();) {
@@ -115,13 +115,14 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
 std::size_t count_shown_particles(std::size_t images) {
   constexpr std::size_t max_particles = 300;
   constexpr std::size_t min_particles = 30;
-  constexpr std::size_t altogether = 300000;
-  return std::clamp(altogether / std::max<std::size_t>(1, images), min_particles, max_particles);
+  constexpr std::size_t max_particles_of_page = 300000;
+  return std::clamp(max_particles_of_page / std::max<std::size_t>(1, images), min_particles,
+                    max_particles);
 }
 
 void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
                         double spacing_m, const std::vector<TrackedImage>& images,
-                        const TrackSummary& summary, const viewer::RunPage& played) {
+                        const TrackSummary& summary, const viewer::RunPage& replay_page) {
   const bool truth_known =
       std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
   viewer::ReportPage page(
@@ -139,7 +140,7 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
       " cm apart. The large dot is the estimate: the mean of the group of particles with the "
       "highest probability. There is no large dot while the robot is lost." +
       std::string(truth_known ? " The ring is the true position." : ""));
-  page.add_run(played);
+  page.add_run(replay_page);
   page.begin_section("The whole run");
   page.add_plots(
       {{draw_track(memory, images, {}),

@@ -10,14 +10,14 @@
 
 namespace panonav::command {
 
-/// Particles of each image that a report on this many images shows; fewer for long runs, so that
-/// the page stays a few megabytes.
+/// Returns the number of particles per image in a report on this many images. It is smaller for
+/// long runs, so that the page has only a few megabytes.
 [[nodiscard]] std::size_t count_shown_particles(std::size_t images);
 
-/// Writes a page that plays the run, with the particles as in [M03] figures 7 to 9, and figures of
-/// the whole run. `images`: at least one. Throws FileError.
+/// Writes a page that replays the run with its particles, as in [M03] figures 7 to 9, and plots of
+/// the whole run. `images` must not be empty. Throws FileError.
 void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
                         double spacing_m, const std::vector<TrackedImage>& images,
-                        const TrackSummary& summary, const viewer::RunPage& played);
+                        const TrackSummary& summary, const viewer::RunPage& replay_page);
 
 }  // namespace panonav::command

@@ -13,7 +13,7 @@ namespace panonav::command {
 
 namespace {
 
-void describe(recordings::RunMoment& moment, const FollowedImage& image) {
+void fill_moment(recordings::RunMoment& moment, const FollowedImage& image) {
   moment.sure = image.fix.has_value();
   moment.state = moment.sure ? "on the route" : "not on this route";
   moment.truth.reset();  // a recording's poses may be in another frame than the route's
@@ -33,9 +33,9 @@ void describe(recordings::RunMoment& moment, const FollowedImage& image) {
 }  // namespace
 
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int every_nth, const PanoramaReader* recorded, Executor& executor,
+            int every_nth, const PanoramaReader* panorama_reader, Executor& executor,
             const std::function<void(FollowedImage&&)>& report) {
-  struct Seen {
+  struct EncodedImage {
     std::vector<float> line;
     std::optional<recordings::RunMoment> moment;
   };
@@ -45,23 +45,24 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                      StageClock clock;
                      const Observation observation = read_observation(run.entries[i * every]);
                      clock.stage("reading");
-                     Seen seen{follower.encode(observation), std::nullopt};
+                     EncodedImage encoded{follower.encode(observation), std::nullopt};
                      clock.stage("scanline");
-                     if (recorded == nullptr) return seen;
-                     seen.moment = recordings::make_moment(observation, i * every);
-                     seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
-                                                               observation.tilt.value_or(Tilt{}));
+                     if (panorama_reader == nullptr) return encoded;
+                     encoded.moment = recordings::make_moment(observation, i * every);
+                     encoded.moment->panorama = panorama_reader->convert(
+                         encoded.moment->picture->view(), observation.tilt.value_or(Tilt{}));
                      clock.stage("for viewers");
-                     clock.add_to(*seen.moment);
-                     return seen;
+                     clock.add_to(*encoded.moment);
+                     return encoded;
                    },
-                   [&](std::size_t i, Seen&& seen) {
+                   [&](std::size_t i, EncodedImage&& encoded) {
                      const std::size_t index = i * every;
                      const DatasetEntry& entry = run.entries[index];
                      StageClock clock;
-                     RouteFollower::Step step = follower.step(std::move(seen.line), entry.odometry);
+                     RouteFollower::Step step =
+                         follower.step(std::move(encoded.line), entry.odometry);
                      clock.stage("matching");
-                     if (seen.moment) clock.add_to(*seen.moment);
+                     if (encoded.moment) clock.add_to(*encoded.moment);
                      FollowedImage image{index,
                                          entry.file,
                                          entry.stamp_s,
@@ -70,14 +71,14 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                                          std::move(step.changed),
                                          std::nullopt,
                                          std::nullopt,
-                                         std::move(seen.moment)};
+                                         std::move(encoded.moment)};
                      const auto& route = follower.tracker().lines().poses();
                      if (!truth.empty()) {
                        image.truth = truth[index];
                        image.true_place = project_onto_route(route, truth[index].position());
                      }
                      if (image.moment) {
-                       describe(*image.moment, image);
+                       fill_moment(*image.moment, image);
                        if (i == 0) image.moment->plan.assign(route.begin(), route.end());
                      }
                      report(std::move(image));

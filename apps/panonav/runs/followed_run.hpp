@@ -18,26 +18,26 @@
 
 namespace panonav::command {
 
-/// One picture of a run beside a route.
+/// One image of a run, matched to a route.
 struct FollowedImage {
   std::size_t index = 0;  ///< in the data set, from 0
   std::string file;
   std::optional<double> stamp_s;
-  std::vector<float> line;                          ///< what was seen
+  std::vector<float> line;                          ///< scanline of the image
   std::optional<RouteFix> fix;                      ///< empty: not on this route
-  std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene is not as remembered
-  std::optional<Pose2> truth;                       ///< in the route's frame, where it is known
+  std::vector<RouteChanges::AzimuthRange> changed;  ///< azimuths at which the scene has changed
+  std::optional<Pose2> truth;                       ///< true pose in the route's frame, if known
   std::optional<RoutePosition> true_place;
   std::optional<recordings::RunMoment>
-      moment;  ///< what a record holds of it; nullopt: nothing is recorded
+      moment;  ///< for the record of the run; nullopt: not recorded
 };
 
 /// Follows every N-th image of a run along a route. Lines are computed on all threads, the follower
-/// runs in order; results do not depend on the number of threads. `truth`: poses of all entries, or
-/// empty. `recorded`: makes panoramas for moments, or null. `report` is called after each image, in
-/// order. Throws FileError on an image that cannot be read.
+/// runs in order; results do not depend on the number of threads. `truth` has the true poses of all
+/// entries or is empty. `panorama_reader` unwraps images for the record; null: nothing is recorded.
+/// `report` is called after each image, in order. Throws FileError on an image that cannot be read.
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int every_nth, const PanoramaReader* recorded, Executor& executor,
+            int every_nth, const PanoramaReader* panorama_reader, Executor& executor,
             const std::function<void(FollowedImage&&)>& report);
 
 struct FollowSummary {
@@ -46,7 +46,7 @@ struct FollowSummary {
   std::size_t predicted = 0;
   std::size_t recovered = 0;
   std::size_t searched = 0;
-  // Absolute errors where the truth is known.
+  // Absolute errors of the images whose true pose is known.
   std::vector<double> position_m;
   std::vector<double> along_m;
   std::vector<double> lateral_m;
@@ -55,7 +55,8 @@ struct FollowSummary {
 [[nodiscard]] FollowSummary summarise_follow(const std::vector<FollowedImage>& images,
                                              bool headings_known);
 
-/// Stretches of way along which something is changed: from, to, in metres.
+/// Returns the stretches of the route on which the scene has changed: begin and end along the
+/// route, in metres.
 [[nodiscard]] std::vector<std::pair<double, double>> changed_stretches(
     const std::vector<FollowedImage>& images);
 

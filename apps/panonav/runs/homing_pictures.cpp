@@ -8,7 +8,7 @@ namespace panonav::command {
 
 namespace {
 
-const std::vector<std::string> rise{"--vertical-motion", "--tilt"};
+const std::vector<std::string> rise_flags{"--vertical-motion", "--tilt"};
 
 }  // namespace
 
@@ -30,7 +30,7 @@ void declare_homing(Arguments& arguments, HomingArguments& values) {
       [&values] { return values.homing.turn == FourierHomingOptions::TurnEstimate::global; },
       "with --turn sequential");
   arguments.reject_options_unless(
-      rise, [&values] { return !values.views.horizon; }, "with --horizon");
+      rise_flags, [&values] { return !values.views.horizon; }, "with --horizon");
 }
 
 FourierHomingOptions make_homing_options(const Arguments& declared,
@@ -55,13 +55,13 @@ FourierHomingOptions make_homing_options(const Arguments& declared,
   return options;
 }
 
-void reject_unused_rise(const Arguments& arguments, const HomingView& view,
-                        const std::string& name) {
+void reject_unused_rise_flags(const Arguments& arguments, const HomingView& view,
+                              const std::string& name) {
   if (view.elevations() && view.rows() >= 3) return;
   const std::string why = view.elevations()
                               ? " has fewer than three rows"
                               : " does not give the elevations of its rows (elevation_deg)";
-  arguments.reject_options(rise, "where " + name + why);
+  arguments.reject_options(rise_flags, "where " + name + why);
 }
 
 }  // namespace panonav::command

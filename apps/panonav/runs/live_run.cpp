@@ -18,66 +18,66 @@ namespace panonav::command {
 
 namespace {
 
-/// Prints lines on a thread of its own, so that a slow reader does not delay the robot: beyond
-/// `max_waiting` lines the oldest are dropped and counted.
+/// Prints lines on a separate thread. Without `wait`, a slow reader of the output does not delay
+/// the robot: if more than `max_queued_lines` wait, the oldest are dropped and counted.
 class LinePrinter {
  public:
   LinePrinter(Session& session, bool wait)
-      : session_(session), wait_(wait), thread_([this] { print_lines(); }) {}
+      : session_(session), waits_for_reader_(wait), thread_([this] { print_lines(); }) {}
   ~LinePrinter() { drain_and_join(); }
   LinePrinter(const LinePrinter&) = delete;
   LinePrinter& operator=(const LinePrinter&) = delete;
 
   void print(std::string line) {
     std::unique_lock lock(mutex_);
-    if (wait_) printed_.wait(lock, [this] { return lines_.size() < max_waiting; });
-    if (lines_.size() == max_waiting) {
+    if (waits_for_reader_) printed_.wait(lock, [this] { return lines_.size() < max_queued_lines; });
+    if (lines_.size() == max_queued_lines) {
       lines_.pop_front();
-      ++left_out_;
+      ++dropped_lines_;
     }
     lines_.push_back(std::move(line));
-    came_.notify_one();
+    line_added_.notify_one();
   }
   void drain_and_join() {
     if (!thread_.joinable()) return;
     {
       const std::lock_guard lock(mutex_);
-      over_ = true;
+      is_closing_ = true;
     }
-    came_.notify_one();
+    line_added_.notify_one();
     thread_.join();
   }
-  [[nodiscard]] std::size_t left_out() const noexcept { return left_out_; }
+  [[nodiscard]] std::size_t dropped_lines() const noexcept { return dropped_lines_; }
 
  private:
   void print_lines() {
     std::unique_lock lock(mutex_);
     while (true) {
-      came_.wait(lock, [this] { return over_ || !lines_.empty(); });
+      line_added_.wait(lock, [this] { return is_closing_ || !lines_.empty(); });
       if (lines_.empty()) return;
       const std::string line = std::move(lines_.front());
       lines_.pop_front();
       lock.unlock();
       session_.print(line);
-      if (!wait_) session_.flush();
+      if (!waits_for_reader_) session_.flush();
       lock.lock();
       printed_.notify_one();
     }
   }
 
-  static constexpr std::size_t max_waiting = 256;
+  static constexpr std::size_t max_queued_lines = 256;
   Session& session_;
-  bool wait_;
+  bool waits_for_reader_;
   std::mutex mutex_;
-  std::condition_variable came_;
+  std::condition_variable line_added_;
   std::condition_variable printed_;
   std::deque<std::string> lines_;
-  std::size_t left_out_ = 0;
-  bool over_ = false;
+  std::size_t dropped_lines_ = 0;
+  bool is_closing_ = false;
   std::thread thread_;
 };
 
-/// Says why pictures are skipped: of the first at once, of those after it at most a line a second.
+/// Prints why images are skipped: at once for the first, then at most one line per second.
 class SkipNotes {
  public:
   explicit SkipNotes(Session& session) : session_(session) {}
@@ -98,14 +98,14 @@ class SkipNotes {
   std::chrono::steady_clock::time_point next_;
 };
 
-/// Chooses pictures as `select_pictures` does, but one by one.
+/// Selects images one by one, as `select_pictures` does for a data set.
 class LiveSelection {
  public:
   explicit LiveSelection(const Dataset::Selection& selection) : selection_(selection) {}
   [[nodiscard]] bool should_take(double stamp_s) {
     if (!first_s_) first_s_ = stamp_s;
     if (selection_.from_s && stamp_s - *first_s_ < *selection_.from_s) return false;
-    if (number_++ % static_cast<std::size_t>(selection_.every) != 0) return false;
+    if (image_count_++ % static_cast<std::size_t>(selection_.every) != 0) return false;
     const bool near = last_kept_s_ && stamp_s >= *last_kept_s_ && selection_.every_s &&
                       stamp_s - *last_kept_s_ < *selection_.every_s;
     if (!near) last_kept_s_ = stamp_s;
@@ -119,7 +119,7 @@ class LiveSelection {
   Dataset::Selection selection_;
   std::optional<double> first_s_;
   std::optional<double> last_kept_s_;
-  std::size_t number_ = 0;
+  std::size_t image_count_ = 0;
 };
 
 double to_milliseconds(std::chrono::steady_clock::duration duration) {
@@ -146,7 +146,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
   if (live.camera_width.has_value() != live.camera_height.has_value()) {
     throw UsageError("--camera-width and --camera-height must be used together");
   }
-  const auto stated = picture_source(pictures);
+  const auto stated = make_picture_source(pictures);
   if (!stated && !remembered) {
     throw UsageError("set --kind to the type of the images of " + input);
   }
@@ -190,36 +190,37 @@ struct LiveRun::Implementation {
         count(arguments.count),
         session(its_session),
         printer(session, live == nullptr) {
-    // A note would flush the lines first, and so wait for a reader that has stalled.
-    if (live != nullptr) tied = std::cerr.tie(nullptr);
+    // Unties standard error from standard output: otherwise each note would flush the output first
+    // and wait for a stalled reader.
+    if (live != nullptr) previously_tied = std::cerr.tie(nullptr);
   }
   ~Implementation() {
-    if (live != nullptr) std::cerr.tie(tied);
+    if (live != nullptr) std::cerr.tie(previously_tied);
   }
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
 
-  void add_delay() {
-    constexpr std::size_t max_kept = 100'000;
-    if (counts.delays_ms.size() < max_kept) {
+  void store_delay() {
+    constexpr std::size_t max_stored_delays = 100'000;
+    if (counts.delays_ms.size() < max_stored_delays) {
       counts.delays_ms.push_back(0.0);
       counts.decoding_ms.push_back(0.0);
     }
-    const std::size_t at = delays++ % max_kept;
+    const std::size_t at = delay_count++ % max_stored_delays;
     const recordings::LiveObservations::Timing timing = live->timing();
     counts.delays_ms[at] = to_milliseconds(std::chrono::steady_clock::now() - timing.arrived);
     counts.decoding_ms[at] = to_milliseconds(timing.decoding);
   }
 
   ObservationSource& source;
-  recordings::LiveObservations* live;  // null: no live source
+  recordings::LiveObservations* live;  // null: the source is not live
   LiveSelection selection;
   std::optional<int> count;
   Session& session;
   LiveCounts counts;
-  std::size_t delays = 0;
+  std::size_t delay_count = 0;
   LinePrinter printer;
-  std::ostream* tied = nullptr;  // what the stream of notes flushed before
+  std::ostream* previously_tied = nullptr;  // stream to which std::cerr was tied
 };
 
 LiveRun::LiveRun(ObservationSource& source, const PartArguments& part, const LiveArguments& live,
@@ -256,11 +257,11 @@ void LiveRun::run(const std::function<std::string(const Observation&)>& answer,
       if (!line.empty()) self.printer.print(std::move(line));
       continue;
     }
-    if (self.live != nullptr) self.add_delay();
+    if (self.live != nullptr) self.store_delay();
     if (!line.empty()) self.printer.print(std::move(line));
     keep(std::move(*observation));
   }
-  if (self.live != nullptr) self.live->live().stop();  // what comes from now on is not dropped
+  if (self.live != nullptr) self.live->live().stop();  // later images do not count as dropped
 }
 
 std::optional<double> LiveRun::decoding_ms() const {
@@ -271,7 +272,7 @@ std::optional<double> LiveRun::decoding_ms() const {
 const LiveCounts& LiveRun::finish() {
   auto& self = *implementation_;
   self.printer.drain_and_join();
-  self.counts.lines_left_out = self.printer.left_out();
+  self.counts.lines_left_out = self.printer.dropped_lines();
   if (self.live != nullptr) self.counts.source = self.live->live().counts();
   return self.counts;
 }

@@ -34,7 +34,7 @@ namespace {
 /// Source of the poses of a route's lines.
 enum class RoutePoses { known, odometry, images };
 
-/// Records a route beside the views that are added, once there is a memory.
+/// Records a route while views are added; begins when the memory has its first views.
 class RunRouteRecorder {
  public:
   RunRouteRecorder(std::string memory, PictureSource source, std::string name, RoutePoses poses)
@@ -81,7 +81,8 @@ RoutePoses choose_route_poses(const Dataset& recording) {
                                                                            : RoutePoses::images;
 }
 
-/// Motion that is read from images begins again each time, and so does the frame of its poses.
+/// Throws UsageError if an existing route would be continued with motion from images: each run has
+/// a new frame of poses then.
 void reject_route_continuation(const LocaliseArguments& arguments, RoutePoses poses) {
   if (poses != RoutePoses::images || !memory_exists(arguments.memory)) return;
   if (!MemoryFile::open(arguments.memory, Access::read_only).route(*arguments.route)) return;
@@ -112,7 +113,7 @@ class RunMoments {
 
   recordings::RunMoment make(const Observation& observation, const LiveMemory::Answer& answer,
                              const RunRecord& record, StageClock& stages) {
-    recordings::RunMoment moment = record.make_moment(observation, number_++);
+    recordings::RunMoment moment = record.make_moment(observation, moment_count_++);
     stages.add_to(moment);
     const PlaceRecogniser* const recogniser = memory_.recogniser();
     if (record.needs_images()) moment.panorama = memory_.panorama();
@@ -124,9 +125,11 @@ class RunMoments {
     StageClock clock;
     if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
     if (record.needs_images()) moment.best_match = load_best_match(*answer.place, *file_);
-    // Rarely: the cloud is that of all views. A memory that was read again has other ids.
-    if (memory_.views() > references_ + references_ / 8 || recogniser != shown_recogniser_) {
-      references_ = memory_.views();
+    // Adds all views to the record again only after one eighth more were added, as this costs time,
+    // or if the memory was read again and has new ids.
+    if (memory_.views() > recorded_views_ + recorded_views_ / 8 ||
+        recogniser != shown_recogniser_) {
+      recorded_views_ = memory_.views();
       shown_recogniser_ = recogniser;
       shown_.emplace(recogniser->memory());
       shown_->add_to(moment);
@@ -142,15 +145,16 @@ class RunMoments {
  private:
   const LiveMemory& memory_;
   std::string path_;
-  std::optional<MemoryFile> file_;  // none before a new memory's first views
-  std::size_t number_ = 0;
-  std::size_t references_ = 0;  // that are in the record
+  std::optional<MemoryFile> file_;  // nullopt before the first views of a new memory
+  std::size_t moment_count_ = 0;
+  std::size_t recorded_views_ = 0;  // number of views in the record
   std::optional<ShownReferences> shown_;
   const PlaceRecogniser* shown_recogniser_ = nullptr;
 };
 
-/// Returns the layout of the memory's images; nullopt without a memory. Throws FileError when there
-/// is none and nothing is added; UsageError on options that it was not made with.
+/// Returns the layout of the memory's images; nullopt if there is no memory yet and --add creates
+/// it. Throws FileError if there is no memory otherwise, an error on options that differ from those
+/// of the memory.
 std::optional<PictureSource> find_remembered_source(const Arguments& declared,
                                                     const LocaliseArguments& arguments) {
   if (!memory_exists(arguments.memory)) {
@@ -164,8 +168,8 @@ std::optional<PictureSource> find_remembered_source(const Arguments& declared,
   return memory.header().source;
 }
 
-LiveMemoryOptions memory_options(const LocaliseArguments& arguments, const PictureSource& source,
-                                 bool is_live) {
+LiveMemoryOptions make_memory_options(const LocaliseArguments& arguments,
+                                      const PictureSource& source, bool is_live) {
   LiveMemoryOptions options{.add = arguments.add,
                             .update = arguments.update,
                             .update_options = arguments.update_options,
@@ -186,8 +190,8 @@ class LocalisedRun {
   LocalisedRun(const Arguments& declared, const LocaliseArguments& arguments, Session& session)
       : arguments_(arguments), session_(session), live_(recordings::is_live(input())) {
     open_source(declared);
-    memory_.emplace(arguments.memory, memory_options(arguments, pictures_, live_));
-    if (recording_) read_missing_motion();
+    memory_.emplace(arguments.memory, make_memory_options(arguments, pictures_, live_));
+    if (recording_) estimate_missing_odometry();
     if (arguments.route) open_route();
     if (recording_) {
       if (arguments.report) recording_copy_ = recording_;
@@ -197,9 +201,10 @@ class LocalisedRun {
   }
 
   ExitCode run() {
-    std::vector<std::string> read = arguments_.inputs;
-    read.push_back(arguments_.memory);
-    RunRecord record(arguments_.record, read, live_, session_, {.memory = arguments_.memory});
+    std::vector<std::string> input_paths = arguments_.inputs;
+    input_paths.push_back(arguments_.memory);
+    RunRecord record(arguments_.record, input_paths, live_, session_,
+                     {.memory = arguments_.memory});
     RunMoments moments(*memory_, arguments_.memory);
     LiveRun loop(*source_, arguments_.pictures.part, arguments_.live, session_);
     StageClock stages;
@@ -219,16 +224,16 @@ class LocalisedRun {
         [&](const Observation* observation, const Error& error) {
           return live_ ? "" : skip_image(observation, error);
         });
-    if (next_ > 0 && skipped_ == next_) std::rethrow_exception(first_failure_);
-    // An update may drop views that the page shows; added views have thumbnails once they are
-    // stored.
+    if (next_image_ > 0 && skipped_count_ == next_image_) std::rethrow_exception(first_failure_);
+    // Writes the report before an update, which may drop views that the report shows, but after
+    // added views are stored, as they have thumbnails only then.
     if (arguments_.report && !arguments_.add) write_report();
     const std::string changes = finish();
     record.close();
     const LiveCounts& counts = loop.finish();
     if (arguments_.report && arguments_.add) write_report();
     if (has_report_) print_report_path(*arguments_.report, session_);
-    session_.note(std::to_string(counts.pictures) + " images, " + std::to_string(known_) +
+    session_.note(std::to_string(counts.pictures) + " images, " + std::to_string(known_count_) +
                   " of places of " + arguments_.memory + changes +
                   describe_events(counts, record.left_out()) +
                   (live_ ? ", unwrapping " +
@@ -238,7 +243,8 @@ class LocalisedRun {
                                " ms"
                          : ""));
     if (has_changed_) session_.suggest({"panonav", "undo", arguments_.memory}, "To revert this:");
-    return (arguments_.add ? counts.pictures : known_) > 0 ? ExitCode::done : ExitCode::no_answer;
+    return (arguments_.add ? counts.pictures : known_count_) > 0 ? ExitCode::done
+                                                                 : ExitCode::no_answer;
   }
 
  private:
@@ -259,11 +265,11 @@ class LocalisedRun {
   }
 
   /// Estimates missing odometry from the images; --update needs it.
-  void read_missing_motion() {
-    const bool moves = std::ranges::all_of(
+  void estimate_missing_odometry() {
+    const bool has_odometry = std::ranges::all_of(
         recording_->entries, [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
     const PlaceRecogniser* const recogniser = memory_->recogniser();
-    if (!arguments_.update || moves || recogniser == nullptr) return;
+    if (!arguments_.update || has_odometry || recogniser == nullptr) return;
     session_.note("motion is computed from the images, because some have no odometry: " +
                   add_visual_odometry(*recording_, recogniser->memory(), recogniser->encoder(),
                                       session_.executor()));
@@ -279,27 +285,27 @@ class LocalisedRun {
     }
   }
 
-  /// Keeps an image of a recording that cannot be read or answered as a row; returns the line that
-  /// is printed.
+  /// Adds a row to table and report for an image that cannot be read or answered; returns the line
+  /// to print.
   std::string skip_image(const Observation* observation, const Error& error) {
     if (!first_failure_) first_failure_ = std::current_exception();
-    ++skipped_;
-    const std::string file = observation != nullptr ? observation->name : files_.at(next_++);
+    ++skipped_count_;
+    const std::string file = observation != nullptr ? observation->name : files_.at(next_image_++);
     const LocalisedQuery unreadable{file, 0.0, {}, {}, error.what()};
     if (arguments_.out) table_ += csv_row(unreadable);
     if (arguments_.report) queries_.push_back(unreadable);
     return session_.json() ? json_line(command::to_json(unreadable, arguments_.areas)) : "";
   }
 
-  /// Returns the line that is printed.
+  /// Localises the observation and returns the line to print.
   std::string answer_observation(const Observation& observation, StageClock& stages) {
-    ++next_;
+    ++next_image_;
     answer_ = memory_->answer(observation);
     stages.part("unwarping", answer_.unwrapping);
     stages.stage("signature, search, ranking");
     unwrapping_ += answer_.unwrapping;
     query_ = {observation.name, 0.0, answer_.place.value_or(Place{}), observation.pose, ""};
-    if (query_.place.known) ++known_;
+    if (query_.place.known) ++known_count_;
     std::optional<RouteFollower::Step> step;
     if (follower_) {
       step = follower_->step(observation);
@@ -316,7 +322,8 @@ class LocalisedRun {
     return json_line(json);
   }
 
-  /// Stores waiting views before the summary is printed, as a reader that stalls would block here.
+  /// Stores pending changes and returns their summary. Called before all lines are printed, as a
+  /// stalled reader of the output would block then.
   std::string finish() {
     std::string text;
     const auto changes = memory_->finish("update from " + mask_credentials(input()));
@@ -351,20 +358,20 @@ class LocalisedRun {
   bool live_;
   PictureSource pictures_;
   RoutePoses poses_ = RoutePoses::images;
-  std::optional<Dataset> recording_;       // until it becomes the source
+  std::optional<Dataset> recording_;       // nullopt for a live source; moved into source_
   std::optional<Dataset> recording_copy_;  // for a report
-  std::vector<std::string> files_;         // of its images
+  std::vector<std::string> files_;         // files of the recording's images
   std::unique_ptr<ObservationSource> source_;
   std::optional<LiveMemory> memory_;
   std::optional<RouteFollower> follower_;
   std::optional<RunRouteRecorder> route_;
-  LiveMemory::Answer answer_;  // to the image of now
-  LocalisedQuery query_;       // the same for people and tables
+  LiveMemory::Answer answer_;  // to the current image
+  LocalisedQuery query_;       // the same answer for lines and tables
   std::vector<LocalisedQuery> queries_;
   std::string table_{csv_header};
-  std::size_t known_ = 0;
-  std::size_t next_ = 0;     // image of the recording
-  std::size_t skipped_ = 0;  // images of the recording
+  std::size_t known_count_ = 0;
+  std::size_t next_image_ = 0;     // index of the next image of the recording
+  std::size_t skipped_count_ = 0;  // unanswered images of the recording
   std::exception_ptr first_failure_;
   bool has_report_ = false;
   bool has_changed_ = false;
@@ -376,8 +383,8 @@ class LocalisedRun {
 void require_components(const Arguments& declared, const LocaliseArguments& arguments,
                         const MemoryHeader& header) {
   const int components = arguments.localiser.components;
-  const bool zero = components == 0 && declared.is_set("localiser", "components");
-  if (zero || components > header.shape.components) {
+  const bool is_set_to_zero = components == 0 && declared.is_set("localiser", "components");
+  if (is_set_to_zero || components > header.shape.components) {
     throw ContractError("components", components,
                         "1 to " + std::to_string(header.shape.components) + ", the memory's");
   }
@@ -403,7 +410,7 @@ Dataset open_queries(const LocaliseArguments& arguments,
     }
     if (!queries && std::filesystem::exists(input, ignored)) queries = open(input);
   }
-  if (!queries) queries = open(arguments.inputs.front());  // says that it is missing
+  if (!queries) queries = open(arguments.inputs.front());  // throws, as the file is missing
   queries->entries.clear();
   for (const std::string& input : arguments.inputs) {
     DatasetEntry entry;

@@ -27,8 +27,8 @@ struct LocaliseArguments {
   bool areas = false;
   std::optional<std::string> out;
   std::optional<std::string> report;
-  bool add = false;     ///< views of places that the memory does not know
-  bool update = false;  ///< views of places that it knows
+  bool add = false;     ///< add views of places that are not in the memory
+  bool update = false;  ///< update views of places that are in the memory
   std::optional<double> add_interval_s;
   std::optional<std::string> route;
   SignatureOptions signature;
@@ -38,17 +38,17 @@ struct LocaliseArguments {
   LiveArguments live;
 };
 
-/// Throws ContractError on more components than the memory has.
+/// Throws ContractError if more components are requested than the memory has, or explicitly 0.
 void require_components(const Arguments& declared, const LocaliseArguments& arguments,
                         const MemoryHeader& header);
 
-/// Opens a recording, or several images, of which some may be missing.
+/// Opens a recording, or several single images; some of these may be missing.
 [[nodiscard]] Dataset open_queries(const LocaliseArguments& arguments,
                                    const std::optional<PictureSource>& remembered,
                                    Session& session);
 
-/// Answers images one by one, in order: those of a live source, and those that are recorded, shown,
-/// added, or followed along a route.
+/// Localises images one after the other. Used for live sources and for runs that are recorded,
+/// shown, added to the memory or followed along a route.
 ExitCode localise_in_order(const Arguments& declared, const LocaliseArguments& arguments,
                            Session& session);
 

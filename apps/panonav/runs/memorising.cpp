@@ -5,9 +5,9 @@ namespace panonav::command {
 void require_stored_options(const Arguments& declared, const SignatureOptions& signature,
                             const PreprocessingOptions& preprocessing, const MemoryFile& memory) {
   const MemoryHeader& header = memory.header();
-  const std::string as =
+  const std::string message_end =
       ", as " + memory.path().string() + " was made with; leave it out or start a new memory";
-  // 0 stands for the usual size, or for the pictures' own.
+  // Replaces 0 by the default size of such images, or by the size of the memory's images.
   const PanoramaShape default_shape = choose_panorama_shape(header.source, {});
   const PanoramaShape image_shape =
       header.picture_shape.value_or(PanoramaShape{header.shape.rows, header.panorama_columns});
@@ -18,8 +18,9 @@ void require_stored_options(const Arguments& declared, const SignatureOptions& s
     arguments.columns = default_shape.columns > 0 ? default_shape.columns : image_shape.columns;
   declared.require_same(
       "signature", arguments,
-      SignatureOptions{header.shape.rows, header.panorama_columns, header.shape.components}, as);
-  declared.require_same("preprocessing", preprocessing, header.preprocessing, as);
+      SignatureOptions{header.shape.rows, header.panorama_columns, header.shape.components},
+      message_end);
+  declared.require_same("preprocessing", preprocessing, header.preprocessing, message_end);
 }
 
 }  // namespace panonav::command

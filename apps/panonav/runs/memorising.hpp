@@ -6,8 +6,8 @@
 
 namespace panonav::command {
 
-/// A memory keeps the options that it was made with: throws ContractError on other values of
-/// [signature] and, where the verb has them, of [preprocessing] that the user gave.
+/// Throws ContractError if the user set an option of [signature] or [preprocessing] to another
+/// value than that with which the memory was made, as these cannot change.
 void require_stored_options(const Arguments& arguments, const SignatureOptions& signature,
                             const PreprocessingOptions& preprocessing, const MemoryFile& memory);
 

@@ -30,7 +30,7 @@ void MissionMoments::set_image(const Image& image, const Panorama& panorama) {
 recordings::RunMoment MissionMoments::make(const NavigationDecision& decision, const Pose2& pose,
                                            const simulation::Scene& scene) {
   clock_.stage("signature, decision");
-  recordings::RunMoment moment{.stamp_s = static_cast<double>(number_++), .pose = pose};
+  recordings::RunMoment moment{.stamp_s = static_cast<double>(moment_count_++), .pose = pose};
   if (decision.homing && panorama_) moment.homing = homing();
   moment.picture = std::exchange(image_, std::nullopt);
   moment.panorama = std::exchange(panorama_, std::nullopt);
@@ -46,12 +46,12 @@ recordings::RunMoment MissionMoments::make(const NavigationDecision& decision, c
     moment.values.emplace_back("nearest", robot_.info(*decision.nearest).name);
     moment.best_match =
         robot_.memory().thumbnail(*decision.nearest).value_or(std::vector<std::uint8_t>{});
-    auto path = planned_path(*decision.nearest);
+    auto path = make_planned_path(*decision.nearest);
     if (path != plan_) moment.plan = plan_ = std::move(path);
   }
-  if (number_ == 1) moment.walls = viewer::scene_outlines(scene);
+  if (moment_count_ == 1) moment.walls = viewer::scene_outlines(scene);
   if (shown_goal_ != robot_.goal()) {
-    add_field(moment);
+    add_direction_field(moment);
     shown_goal_ = robot_.goal();
   }
   clock_.stage("for viewers");
@@ -59,8 +59,8 @@ recordings::RunMoment MissionMoments::make(const NavigationDecision& decision, c
   return moment;
 }
 
-/// Returns the known poses of the planned path, each heading for the next.
-std::vector<Pose2> MissionMoments::planned_path(ViewId from) const {
+/// Returns the known positions of the planned path, each with the heading to the next one.
+std::vector<Pose2> MissionMoments::make_planned_path(ViewId from) const {
   std::vector<Pose2> path;
   const auto node = robot_.graph().node_of(from);
   if (!node) return path;
@@ -83,8 +83,8 @@ recordings::RunHoming MissionMoments::homing() const {
   return {home.direction_rad(), home.confidence};
 }
 
-/// Adds the views with their areas, the direction in which each sends the robot, and the goal.
-void MissionMoments::add_field(recordings::RunMoment& moment) const {
+/// Adds the views with their areas, the direction to the goal at each view, and the goal.
+void MissionMoments::add_direction_field(recordings::RunMoment& moment) const {
   const auto guides = direction_field(remembered_.graph, robot_.goal(), field_);
   std::vector<std::size_t> areas;
   for (std::size_t i = 0; i < guides.size(); ++i) {
@@ -109,15 +109,15 @@ void MissionMoments::add_field(recordings::RunMoment& moment) const {
 std::optional<ViewId> set_goal_of_viewer(RobotNavigator& robot,
                                          const simulation::RememberedPlace& remembered,
                                          RunRecord& record, Session& session) {
-  const auto wish = record.take_viewer_input();
-  if (!wish) return std::nullopt;
+  const auto clicked = record.take_viewer_input();
+  if (!clicked) return std::nullopt;
   std::optional<std::size_t> nearest;
   double min_m = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < remembered.truth.size(); ++i) {
-    const double away_m = distance(remembered.truth[i].position(), wish->position());
-    if (robot.graph().exits(i).empty() || !(away_m < min_m)) continue;
+    const double distance_m = distance(remembered.truth[i].position(), clicked->position());
+    if (robot.graph().exits(i).empty() || !(distance_m < min_m)) continue;
     nearest = i;
-    min_m = away_m;
+    min_m = distance_m;
   }
   if (!nearest) return std::nullopt;
   const ViewId view = robot.graph().view(*nearest);

@@ -20,8 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Replaces names of library options by the flags of the command where the two differ; `name_flags`
-/// handles the others.
+/// Replaces names of library options by flags whose names differ; `replace_options_by_flags`
+/// handles the other options.
 std::string replace_option_names(std::string text) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 4> flags{{
       {"'source' (a PictureSource)", "--kind"},
@@ -38,7 +38,7 @@ std::string replace_option_names(std::string text) {
 }
 
 std::optional<ElevationBand> parse_elevation_band(const PictureArguments& pictures) {
-  constexpr double min_band_deg = 5.0;  // pictures are higher; radians are mostly less
+  constexpr double min_band_deg = 5.0;  // images cover more; values in radians cover less
   if (!pictures.elevation_deg) return std::nullopt;
   const auto [low, high] = *pictures.elevation_deg;
   if (low < -90.0 || high > 90.0 || high - low < min_band_deg) {
@@ -162,7 +162,7 @@ Dataset::Selection to_selection(const PartArguments& part) {
   return selection;
 }
 
-std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
+std::optional<PictureSource> make_picture_source(const PictureArguments& pictures) {
   const bool nothing = !pictures.kind && !pictures.camera && !pictures.columns &&
                        !pictures.forward_column && !pictures.elevation_deg;
   if (nothing) return std::nullopt;
@@ -195,7 +195,7 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
 
 Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, Session& session) {
-  const InputOptions options{.source = picture_source(pictures),
+  const InputOptions options{.source = make_picture_source(pictures),
                              .default_source = remembered,
                              .topics = pictures.topics,
                              .selection = to_selection(pictures.part),
@@ -244,7 +244,7 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset read_run(const std::string& input, const InputOptions::Topics& topics,
+Dataset open_run(const std::string& input, const InputOptions::Topics& topics,
                  const PartArguments& part, const MemoryFile& memory, Session& session) {
   PictureArguments pictures;
   pictures.topics = topics;
@@ -297,7 +297,7 @@ Dataset read_dataset_with_columns(const std::string& folder, const PictureArgume
                                   const std::optional<PictureSource>& remembered,
                                   const std::string& columns, const std::string& values,
                                   Session& session) {
-  if (can_have_table(folder) && !has_dataset_file(folder) && !picture_source(pictures)) {
+  if (can_have_table(folder) && !has_dataset_file(folder) && !make_picture_source(pictures)) {
     throw FileError(folder, "has no dataset.toml, so the positions of its images are unknown" +
                                 explain_columns(folder, columns, values));
   }

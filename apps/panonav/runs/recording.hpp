@@ -15,11 +15,11 @@
 
 namespace panonav::command {
 
-/// Which pictures of a recording a user wants.
+/// Selects a part of the images of a recording.
 struct PartArguments {
   std::optional<double> from_s;
   std::optional<double> to_s;
-  std::optional<std::string> every;  ///< "5": each fifth picture; "0.5s": one in half a second
+  std::optional<std::string> every;  ///< "5": each fifth image; "0.5s": one per half second
 };
 
 /// The arguments for images without a dataset.toml.
@@ -29,8 +29,8 @@ struct PictureArguments {
   std::optional<std::string> columns;
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
-  bool recursive = false;       ///< a folder of pictures: those of the folders within, too
-  InputOptions::Topics topics;  ///< of a recording of topics
+  bool recursive = false;       ///< also reads images in the subfolders of a folder
+  InputOptions::Topics topics;  ///< for a recording with topics
   PartArguments part;
 };
 
@@ -38,50 +38,50 @@ struct PictureArguments {
 void declare_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics);
-/// Adds --from and --to, and --every unless the verb has one of its own.
+/// Adds --from and --to, with `every` also --every.
 void declare_part(Arguments& arguments, PartArguments& part, bool every);
-/// All three.
+/// Adds the flags of `declare_layout`, `declare_topics` and `declare_part`.
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
-/// Returns the flags of the last two, for verbs that also take single images.
+/// Returns the flags of `declare_topics` and `declare_part`, which verbs reject for single images.
 [[nodiscard]] std::vector<std::string> recording_flags();
-/// True if the input is neither a folder nor a recording, a video or a live source.
+/// True if the input is not a folder, recording, video or live source.
 [[nodiscard]] bool is_one_picture(const std::string& input);
 
-/// Returns the source of images that the flags describe; nullopt if none of them was given. Throws
-/// UsageError on flags that do not fit together, FileError on the camera file.
-[[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);
+/// Returns the image layout that the flags describe; nullopt if none of them is set. Throws
+/// UsageError on flags that exclude each other, FileError on an invalid camera file.
+[[nodiscard]] std::optional<PictureSource> make_picture_source(const PictureArguments& pictures);
 
-/// Checks and converts the part. Throws UsageError on values out of range.
+/// Converts the arguments to a selection of images. Throws UsageError on values out of range.
 [[nodiscard]] Dataset::Selection to_selection(const PartArguments& part);
 
-/// Opens the input as `open_input` with the options of the flags, and prints its warnings.
-/// `remembered`: image layout of the memory, used for images without a description of their own.
-/// Throws UsageError on flags that do not fit the input and on live sources except standard input,
-/// which is read to its end; FileError.
+/// Opens the input with `open_input` and the options of the flags, and prints its warnings.
+/// `remembered` is the image layout of the memory, used for images without a description of their
+/// own. Standard input is read to its end. Throws UsageError on flags that do not apply to the
+/// input and on other live sources; FileError.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
-/// Throws UsageError on a band (--elevation-deg) that is not that of the memory's views.
+/// Throws UsageError if --elevation-deg differs from the elevation band of the memory's views.
 void require_stored_band(const PictureArguments& pictures, const MemoryFile& memory);
-/// Opens images for a memory: their layout is that of its header. Throws UsageError if
-/// --elevation-deg differs from the memory's band.
+/// Opens images for a memory. Images without a description have the layout of the memory's header.
+/// Throws UsageError if --elevation-deg differs from the memory's band.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const MemoryFile& memory, Session& session);
 
-/// The recording of a run: a data set, or a folder or recording of pictures that lie as those of
-/// the memory.
-[[nodiscard]] Dataset read_run(const std::string& input, const InputOptions::Topics& topics,
+/// Opens the recording of a run: a data set, folder or recording. Images without a description have
+/// the layout of the memory's images.
+[[nodiscard]] Dataset open_run(const std::string& input, const InputOptions::Topics& topics,
                                const PartArguments& part, const MemoryFile& memory,
                                Session& session);
 
-/// Throws FileError unless the image's stamp is later than that of the image before it, as a
-/// trajectory in the TUM format needs.
+/// Throws FileError unless the stamp is later than `previous_s`, the stamp of the image before, as
+/// the TUM format requires.
 void require_later_stamp(const std::string& dataset, const std::string& file, double stamp_s,
                          double previous_s);
 
-/// Returns the stamp of each entry for the trajectory file of a verb; the entries' numbers where
-/// there are no stamps, which is noted. Throws FileError on stamps that do not grow.
+/// Returns the stamp of each entry in seconds for a trajectory file. Entries without stamps get
+/// their index, and the session prints a note. Throws FileError if stamps do not increase.
 [[nodiscard]] std::vector<double> trajectory_stamps(const Dataset& run, const std::string& verb,
                                                     const std::string& dataset,
                                                     const std::string& tum, Session& session);
@@ -94,8 +94,8 @@ void require_later_stamp(const std::string& dataset, const std::string& file, do
 /// example of a line.
 [[nodiscard]] std::string explain_columns(const std::string& folder, const std::string& columns,
                                           const std::string& values);
-/// Opens a data set as `open_recording`. Throws FileError on a folder without a table and says
-/// which columns to add.
+/// Opens a data set with `open_recording`. Throws FileError on a folder without dataset.toml; the
+/// message explains which columns to add.
 [[nodiscard]] Dataset read_dataset_with_columns(const std::string& folder,
                                                 const PictureArguments& pictures,
                                                 const std::optional<PictureSource>& remembered,

@@ -18,9 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* results_file = "results.json";
-constexpr const char* run_file = "run.json";
-// More than any run writes.
+constexpr const char* results_file_name = "results.json";
+constexpr const char* run_file_name = "run.json";
+// Larger than any file that a run writes.
 constexpr std::size_t max_file_bytes = 64 << 20;
 
 std::string read_text(const fs::path& path) {
@@ -28,9 +28,9 @@ std::string read_text(const fs::path& path) {
   return {bytes.begin(), bytes.end()};
 }
 
-// Everything that the results depend on.
+// Returns version and options on which the results depend.
 ordered_json make_run_record(const ReproduceArguments& arguments) {
-  const fs::path data = data_folder(arguments);
+  const fs::path data = find_data_folder(arguments);
   ordered_json record;
   record["version"] = PANONAV_VERSION;
   record["quick"] = arguments.quick;
@@ -45,11 +45,11 @@ ordered_json make_run_record(const ReproduceArguments& arguments) {
 }
 
 void require_same_run(const fs::path& out, const ordered_json& record) {
-  const std::string file = (out / run_file).string();
-  if (!fs::exists(out / run_file)) {
+  const std::string file = (out / run_file_name).string();
+  if (!fs::exists(out / run_file_name)) {
     throw FileError(file, "does not exist: there is no run to continue; leave out --continue");
   }
-  const auto earlier = ordered_json::parse(read_text(out / run_file), nullptr, false);
+  const auto earlier = ordered_json::parse(read_text(out / run_file_name), nullptr, false);
   if (!earlier.is_object()) throw FileError(file, "is not a complete JSON object");
   for (const auto& [field, value] : record.items()) {
     if (!earlier.contains(field)) throw FileError(file, field + " is missing");
@@ -62,7 +62,7 @@ void require_same_run(const fs::path& out, const ordered_json& record) {
 }
 
 // Returns the command line without paths of this machine.
-std::string command_line(const ReproduceArguments& arguments) {
+std::string format_command_line(const ReproduceArguments& arguments) {
   std::string line = "panonav reproduce all";
   if (arguments.quick) line += " --quick";
   const auto add = [&](const std::string& flag, const auto& value) {
@@ -73,7 +73,7 @@ std::string command_line(const ReproduceArguments& arguments) {
   add("--queries", arguments.queries);
   add("--runs", arguments.runs);
   add("--rows", arguments.rows);
-  if (!data_folder(arguments).empty()) line += " --data DATA";
+  if (!find_data_folder(arguments).empty()) line += " --data DATA";
   return line;
 }
 
@@ -104,8 +104,8 @@ lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceA
     if (percent > shown_percent) progress.advance(percent - shown_percent);
     shown_percent = std::max(shown_percent, percent);
   };
-  remove_file(out / results_file);
-  const lab::ReproductionOptions options = reproduction_options(paper, arguments, out);
+  remove_file(out / results_file_name);
+  const lab::ReproductionOptions options = make_reproduction_options(paper, arguments, out);
   lab::Reproduction result = lab::reproduce(paper.name, options, session.executor(), report);
   progress.clear();
   const std::string name(paper.name);
@@ -114,13 +114,13 @@ lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceA
                                .command = "panonav reproduce " + name,
                                .papers = {{name, std::string(paper.title), result.rows}}}));
   write_paper_page(out, paper, paper.lead(options), result);
-  write_file(out / results_file, to_json(result.rows));
+  write_file(out / results_file_name, to_json(result.rows));
   return result;
 }
 
 ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
   if (arguments.only) throw OptionError("--only cannot be used with all");
-  check_scenes(arguments);  // before anything of an earlier run is removed
+  require_enough_scenes(arguments);  // before files of an earlier run are removed
   const fs::path out(arguments.out.value_or("reproduction"));
   const ordered_json record = make_run_record(arguments);
   const auto papers = reproduced_papers();
@@ -130,23 +130,24 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
     std::error_code error;
     fs::create_directories(out, error);
     if (error) throw FileError(out.string(), "cannot be created: " + error.message());
-    // Removes files of an earlier run, so that none is taken for a part of this one.
-    for (const ReproducedPaper& paper : papers) remove_file(out / paper.name / results_file);
-    write_file(out / run_file, record.dump(1) + "\n");
+    // Removes results of an earlier run, so that --continue does not take them for results of this
+    // run.
+    for (const ReproducedPaper& paper : papers) remove_file(out / paper.name / results_file_name);
+    write_file(out / run_file_name, record.dump(1) + "\n");
   }
-  remove_file(out / results_file);
+  remove_file(out / results_file_name);
 
   const auto report = [&](const ReproducedPaper& paper, const std::vector<lab::ResultRow>& rows,
-                          std::string_view how) {
+                          std::string_view note) {
     if (session.json()) return;
     const lab::TargetCount count = lab::count_targets(rows);
     session.print("  " + session.bold(paper.name) + ": " + std::to_string(count.held) + " of " +
-                  std::to_string(count.judged) + " targets met" + std::string(how));
+                  std::to_string(count.judged) + " targets met" + std::string(note));
   };
   lab::ResultsDocument document{
-      .version = PANONAV_VERSION, .command = command_line(arguments), .papers = {}};
+      .version = PANONAV_VERSION, .command = format_command_line(arguments), .papers = {}};
   for (const ReproducedPaper& paper : papers) {
-    const fs::path file = out / paper.name / results_file;
+    const fs::path file = out / paper.name / results_file_name;
     const bool is_done = fs::exists(file);
     if (!is_done) {
       static_cast<void>(reproduce_paper(paper, make_paper_arguments(paper, arguments),
@@ -160,7 +161,7 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
   const std::string json = to_json(document);
   write_file(out / "results.md", lab::to_markdown(document));
   write_results_page(out, document);
-  write_file(out / results_file, json);
+  write_file(out / results_file_name, json);
   if (session.json()) {
     session.print(json.substr(0, json.size() - 1));
     return ExitCode::done;

@@ -94,7 +94,7 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .rows = true,
      .data = true,
      .only = true,
-     .single_scene = true,
+     .allows_single_scene = true,
      .lead = introduce_m03},
     {.name = "m04",
      .title = "Image-based memory: the experiments of [M04]",
@@ -127,7 +127,7 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .runs = true,
      .rows = true,
      .data = true,
-     .single_scene = true,
+     .allows_single_scene = true,
      .lead = introduce_elsewhere},
 }};
 
@@ -137,14 +137,14 @@ std::span<const ReproducedPaper> reproduced_papers() {
   return papers;
 }
 
-lab::ReproductionOptions reproduction_options(const ReproducedPaper& paper,
-                                              const ReproduceArguments& arguments,
-                                              const std::filesystem::path& out) {
+lab::ReproductionOptions make_reproduction_options(const ReproducedPaper& paper,
+                                                   const ReproduceArguments& arguments,
+                                                   const std::filesystem::path& out) {
   lab::ReproductionOptions options = lab::default_options(paper.name, arguments.quick);
   options.out = out;
-  if (paper.data) options.data = data_folder(arguments);
+  if (paper.data) options.data = find_data_folder(arguments);
   options.seed = arguments.seed.value_or(options.seed);
-  if (!paper.single_scene) check_scenes(arguments);
+  if (!paper.allows_single_scene) require_enough_scenes(arguments);
   options.scenes = arguments.scenes.value_or(options.scenes);
   options.runs = arguments.runs.value_or(options.runs);
   options.queries = arguments.queries.value_or(options.queries);
@@ -156,7 +156,7 @@ lab::ReproductionOptions reproduction_options(const ReproducedPaper& paper,
   return options;
 }
 
-std::filesystem::path data_folder(const ReproduceArguments& arguments) {
+std::filesystem::path find_data_folder(const ReproduceArguments& arguments) {
   if (arguments.data) {
     if (!std::filesystem::is_directory(*arguments.data)) {
       throw FileError(*arguments.data, "there is no such folder");
@@ -167,7 +167,7 @@ std::filesystem::path data_folder(const ReproduceArguments& arguments) {
   return folder == nullptr ? "" : folder;
 }
 
-void check_scenes(const ReproduceArguments& arguments) {
+void require_enough_scenes(const ReproduceArguments& arguments) {
   if (arguments.scenes && *arguments.scenes < 2) {
     throw OptionError("--scenes is '" + std::to_string(*arguments.scenes) + "'; allowed for " +
                       arguments.paper + ": from 2");

@@ -26,38 +26,39 @@ struct ReproduceArguments {
   std::optional<std::string> only;
 };
 
-/// The experiments of a paper, and which options mean something to them.
+/// The experiments of a paper, and the options that they use.
 struct ReproducedPaper {
   std::string_view name;
   std::string_view title;
-  std::string_view subject;  ///< in a few words
+  std::string_view subject;  ///< short description
   bool queries = false;
   bool runs = false;
   bool rows = false;
   bool data = false;
   bool only = false;
-  bool single_scene = false;  ///< a single scene will do; else intervals need two
-  /// Returns the first paragraph of the report: how much was run.
+  bool allows_single_scene =
+      false;  ///< one scene is enough; otherwise two are needed for intervals
+  /// Returns the first paragraph of the report, with the number of scenes and runs.
   std::string (*lead)(const lab::ReproductionOptions& options) = nullptr;
 };
 
-/// All, in the order in which `all` runs them.
+/// Returns all papers, in the order in which `reproduce all` runs them.
 [[nodiscard]] std::span<const ReproducedPaper> reproduced_papers();
 
 /// Returns the options of the paper's experiments: its defaults, then what the caller set. Throws
 /// OptionError, FileError.
-[[nodiscard]] lab::ReproductionOptions reproduction_options(const ReproducedPaper& paper,
-                                                            const ReproduceArguments& arguments,
-                                                            const std::filesystem::path& out);
+[[nodiscard]] lab::ReproductionOptions make_reproduction_options(
+    const ReproducedPaper& paper, const ReproduceArguments& arguments,
+    const std::filesystem::path& out);
 
-/// The folder with recordings and worlds: as asked for, else where the environment says; empty:
-/// none. Throws FileError when there is no such folder.
-[[nodiscard]] std::filesystem::path data_folder(const ReproduceArguments& arguments);
+/// Returns the folder with recordings and worlds: that of --data, or else PANONAV_DATA; empty if
+/// neither is set. Throws FileError if --data is no folder.
+[[nodiscard]] std::filesystem::path find_data_folder(const ReproduceArguments& arguments);
 
-/// Throws OptionError when there are too few variants for `arguments.paper`: intervals need two.
-void check_scenes(const ReproduceArguments& arguments);
+/// Throws OptionError if --scenes is below 2, the minimum for confidence intervals.
+void require_enough_scenes(const ReproduceArguments& arguments);
 
-/// Throws OptionError when an option is given that means nothing to the paper.
+/// Throws OptionError if an option is set that the paper's experiments do not use.
 void reject_meaningless_options(const ReproducedPaper& paper, const ReproduceArguments& arguments);
 
 }  // namespace panonav::command

@@ -25,8 +25,9 @@ ExitCode Ros2Robot::run(const simulation::SimulatedWorld& world, Session& sessio
   const simulation::Scene& scene = world.scene();
   Pose2 start = world.free_space().random_pose(random);
   if (scene.tour.size() > 1 && world.free_space().is_free(scene.tour.front())) {
-    const Point2 way{scene.tour[1].x_m - scene.tour[0].x_m, scene.tour[1].y_m - scene.tour[0].y_m};
-    start = {scene.tour[0].x_m, scene.tour[0].y_m, std::atan2(way.y_m, way.x_m)};
+    const Point2 direction{scene.tour[1].x_m - scene.tour[0].x_m,
+                           scene.tour[1].y_m - scene.tour[0].y_m};
+    start = {scene.tour[0].x_m, scene.tour[0].y_m, std::atan2(direction.y_m, direction.x_m)};
   }
   ros2::SimulatedRobot robot(
       {.node = "panonav_simulation"}, options_->robot,

@@ -9,11 +9,12 @@
 
 namespace panonav::command {
 
-/// The robot of `simulate --ros2`, which obeys ROS 2. A build without Cyclone DDS has none.
+/// The simulated robot of `simulate --ros2`, controlled by ROS 2 messages. In a build without
+/// Cyclone DDS `run` throws.
 class Ros2Robot {
  public:
   Ros2Robot();
-  /// Declares the options of the robot, which count only where `is_used`.
+  /// Declares the options of the robot; they are rejected if `is_used` returns false.
   void declare(Arguments& arguments, const std::function<bool()>& is_used);
   /// Lets the robot drive in the world until Ctrl-C. Throws Error in a build without Cyclone DDS.
   ExitCode run(const simulation::SimulatedWorld& world, Session& session) const;

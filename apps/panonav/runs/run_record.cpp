@@ -14,7 +14,8 @@ namespace panonav::command {
 
 namespace {
 
-/// The thumbnails of a memory that may not be there yet, for one thread.
+/// Returns a function that reads thumbnails of a memory by view name; empty while the memory does
+/// not exist. Call it from one thread only.
 std::function<std::vector<std::uint8_t>(const std::string&)> make_thumbnail_reader(
     std::string memory) {
   return [memory = std::move(memory), file = std::shared_ptr<MemoryFile>()](
@@ -27,7 +28,7 @@ std::function<std::vector<std::uint8_t>(const std::string&)> make_thumbnail_read
       const auto picture = view ? file->thumbnail(*view) : std::nullopt;
       return picture.value_or(std::vector<std::uint8_t>{});
     } catch (const FileError&) {
-      return {};  // the viewer is told that there is none
+      return {};  // the page shows no thumbnail then
     }
   };
 }
@@ -37,7 +38,7 @@ std::function<std::vector<std::uint8_t>(const std::string&)> make_thumbnail_read
 void declare_record(Arguments& arguments, RunRecordArguments& record) {
   arguments.option("--record FILE", record.file,
                    "Record images and answers in an MCAP file for Rerun, Foxglove and Lichtblick");
-  arguments.writes({"--record"});
+  arguments.declare_outputs({"--record"});
 }
 
 void declare_view(Arguments& arguments, RunRecordArguments& record) {
@@ -47,20 +48,21 @@ void declare_view(Arguments& arguments, RunRecordArguments& record) {
 }
 
 RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read,
-                     bool live, Session& session, const Offers& offers)
+                     bool live, Session& session, const ViewerOptions& viewer_options)
     : session_(session), live_(live) {
   if (arguments.file) {
     recorder_.emplace(*arguments.file, recordings::RunRecorderOptions{.wait = !live});
   }
   if (arguments.view) {
-    const ListeningPlace place = parse_listening_address("--view", *arguments.view);
+    const ListeningAddress place = parse_listening_address("--view", *arguments.view);
     viewer::ViewServerOptions options;
     options.address = place.address;
     options.port = place.port;
     options.title = "panonav: " + (read.empty() ? std::string() : mask_credentials(read.front()));
     options.replay = !live;
-    options.takes = offers.takes;
-    if (!offers.memory.empty()) options.thumbnail = make_thumbnail_reader(offers.memory);
+    options.takes = viewer_options.takes;
+    if (!viewer_options.memory.empty())
+      options.thumbnail = make_thumbnail_reader(viewer_options.memory);
     viewer_.emplace(options);
     if (!place.is_local()) {
       session_.note(

@@ -11,33 +11,33 @@
 
 namespace panonav::command {
 
-/// The nodes and edges of one connected component, as components have no common frame. `names`: of
-/// the nodes.
+/// Adds the nodes and edges of one connected component to the moment; components have no common
+/// frame. `names` are the names of all nodes of the map.
 void add_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
                    const std::vector<std::string>& names);
 
 /// Shows a map while it grows: the connected component of the newest node.
 class GrowingMap {
  public:
-  /// Adds the map after this observation to the moment; `is_node`: the observation became a node.
-  /// Nodes and edges are sent after a loop closure or when a twentieth of the nodes is new. The
-  /// truth is moved into the frame of the map by the first node of the component; without a heading
-  /// there is no truth.
+  /// Adds the map after this observation to the moment. `is_node` is true if the observation became
+  /// a node. Nodes and edges are added after a loop closure or if 5 % of the nodes are new. The
+  /// true pose is transformed to the map's frame with the first node of the component, or removed
+  /// if a heading is unknown.
   void add_to(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
               const std::string& name);
-  /// The finished map: its largest component.
+  /// Adds the largest component of the finished map to the moment.
   void finish(recordings::RunMoment& moment, const TopologicalMap& map) const;
 
  private:
   void transform_to_component(recordings::RunMoment& moment, const TopologicalMap& map,
                               std::size_t component) const;
 
-  std::vector<std::string> names_;                    // of the nodes
-  std::vector<std::optional<ReferencePose>> truths_;  // of the nodes
-  std::optional<ReferencePose> truth_;                // of the last observation
+  std::vector<std::string> names_;                    // one per node
+  std::vector<std::optional<ReferencePose>> truths_;  // true poses, one per node
+  std::optional<ReferencePose> truth_;                // true pose of the last observation
   bool last_is_node_ = false;
-  std::size_t shown_nodes_ = 0;
-  std::size_t shown_closures_ = 0;
+  std::size_t node_count_shown_ = 0;
+  std::size_t closure_count_shown_ = 0;
 };
 
 }  // namespace panonav::command

@@ -11,7 +11,7 @@ ShownReferences::ShownReferences(const VisualMemory& memory) {
   for (const ViewId view : memory.views()) {
     const ReferenceInfo& info = memory.info(view);
     if (!info.pose) continue;
-    place_of_.emplace(view, positions_.size());
+    position_index_.emplace(view, positions_.size());
     positions_.push_back(info.pose->position());
     views_.push_back({info.name, info.pose->heading_rad});
   }
@@ -29,8 +29,8 @@ void ShownReferences::compare(recordings::RunMoment& moment, const VisualMemory&
   const auto top = static_cast<int>(std::min(memory.size(), max_compared));
   if (top == 0) return;
   for (const Match& match : memory.search(view, {.top = top}).matches) {
-    const auto found = place_of_.find(match.view);
-    if (found == place_of_.end()) continue;
+    const auto found = position_index_.find(match.view);
+    if (found == position_index_.end()) continue;
     moment.comparisons.push_back({found->second, match.dissimilarity});
   }
 }

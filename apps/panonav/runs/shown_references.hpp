@@ -12,44 +12,47 @@
 
 namespace panonav::command {
 
-/// The views of a memory whose positions are known, as a run shows them.
+/// The views of a memory with known positions, prepared for the display of a run.
 class ShownReferences {
  public:
   explicit ShownReferences(const VisualMemory& memory);
 
-  /// Positions, names and Voronoi cells: of the first moment, and when there are others.
+  /// Adds positions, names and Voronoi cells of all views to the moment. Needed for the first
+  /// moment and whenever the views have changed.
   void add_to(recordings::RunMoment& moment) const;
-  /// Adds the similarities of the view to its 1000 most similar references. Cost: a search that
-  /// sorts them.
+  /// Adds the dissimilarities between `view` and its 1000 most similar references. Cost: one search
+  /// of the memory.
   void compare(recordings::RunMoment& moment, const VisualMemory& memory,
                const PackedSignature& view) const;
 
  private:
   std::vector<Point2> positions_;
   std::vector<recordings::RunReference> views_;
-  std::unordered_map<ViewId, std::size_t> place_of_;
+  std::unordered_map<ViewId, std::size_t> position_index_;
 };
 
-/// The cells of positions, all of one area or of those given by position. Empty where there are
-/// more than anybody sees apart, 5000, or fewer than two.
+/// Returns the Voronoi cells of the positions with the area of each position; without `areas` all
+/// are in area 0. Empty for more than 5000 positions, which nobody could tell apart, and for fewer
+/// than two.
 [[nodiscard]] std::vector<recordings::RunRegion> voronoi_regions(
     const std::vector<Point2>& positions, const std::vector<std::size_t>& areas = {});
 
-/// Notes how long the stages of a moment take.
+/// Measures the durations of the stages of a moment.
 class StageClock {
  public:
-  /// The stage since the one before ends here.
+  /// Ends the current stage, which began when the stage before it ended, and stores its duration.
   void stage(const char* name) { part(name, std::chrono::steady_clock::now() - since_); }
-  /// Counts this part of the current stage as another stage.
+  /// Stores this part of the current stage as a separate stage and excludes it from the current
+  /// one.
   void part(const char* name, std::chrono::steady_clock::duration duration) {
     add(name, std::chrono::duration<double, std::milli>(duration).count());
     since_ += duration;
   }
-  /// Measured elsewhere, before.
+  /// Adds a stage whose duration was measured elsewhere.
   void add(const char* name, double ms) { stages_.emplace_back(name, ms); }
   /// Discards the time since the last stage.
   void restart() { since_ = std::chrono::steady_clock::now(); }
-  /// Appends them to the moment's.
+  /// Moves the measured stages to the end of the moment's stages.
   void add_to(recordings::RunMoment& moment) {
     for (auto& one : stages_) moment.stages_ms.push_back(std::move(one));
     stages_.clear();

@@ -11,7 +11,7 @@ void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions&
   arguments.options("sensor", values.sensor);
   arguments.options("free_space", values.free_space);
   arguments.options("odometry", values.odometry, "odometry");
-  require_effects(arguments, values);
+  reject_ineffective_options(arguments, values);
   const auto& simulation = values.simulation;
   arguments.reject_options_unless(
       {"--rows", "--columns", "--elevation-low-deg", "--elevation-high-deg"},
@@ -23,7 +23,8 @@ void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions&
       "without --kind dual-fisheye");
 }
 
-void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptions& values) {
+void reject_ineffective_options(Arguments& arguments,
+                                const simulation::SimulatedWorldOptions& values) {
   const auto& sensor = values.sensor;
   arguments.reject_options_unless(
       {"--moved-seed"}, [&values] { return values.simulation.scene.moved_objects > 0.0; },

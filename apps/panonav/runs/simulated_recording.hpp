@@ -6,10 +6,11 @@
 namespace panonav::command {
 
 void declare_simulation(Arguments& declared, simulation::SimulatedWorldOptions& arguments);
-/// Declares which options of scene and sensor depend on each other, for verbs that have both.
-void require_effects(Arguments& declared, const simulation::SimulatedWorldOptions& arguments);
+/// Rejects options of scene and sensor that have no effect without another option.
+void reject_ineffective_options(Arguments& declared,
+                                const simulation::SimulatedWorldOptions& arguments);
 
-/// The options that the user typed.
+/// Returns a function that returns the flag of an option if the user has set it.
 [[nodiscard]] simulation::FindSetOption make_option_lookup(const Arguments& declared);
 
 }  // namespace panonav::command

@@ -57,15 +57,17 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
   StageClock clock;
   image.estimate = tracker.observe(view);
   clock.stage("filter");
-  image.particles =
-      recordings::resample_systematically(tracker.localiser().particles(), settings.particles_kept);
+  image.particles = recordings::resample_systematically(tracker.localiser().particles(),
+                                                        settings.particles_per_image);
   if (moment) {
     describe(*moment, image.estimate);
     moment->particles = recordings::resample_systematically(tracker.localiser().particles(), 500);
     if (moment->panorama) {
-      if (settings.shown != nullptr) settings.shown->compare(*moment, tracker.memory(), view);
+      if (settings.shown_references != nullptr)
+        settings.shown_references->compare(*moment, tracker.memory(), view);
       const ViewId best = tracker.memory().search(view, {.top = 1}).matches.front().view;
-      moment->best_match = settings.recorded->thumbnail(best).value_or(std::vector<std::uint8_t>{});
+      moment->best_match =
+          settings.thumbnail_file->thumbnail(best).value_or(std::vector<std::uint8_t>{});
       const auto& reference = tracker.memory().info(best).pose;
       if (moment->pose && reference && reference->heading_rad) {
         moment->best_match_turn_rad =
@@ -86,7 +88,7 @@ void note_viewer_pose(recordings::RunMoment& moment) {
 void add(viewer::RunPage& page, const TrackedImage& image) {
   recordings::RunMoment moment = *image.moment;
   moment.particles = image.particles;
-  constexpr std::size_t max_compared = 50;  // else they would be most of a page of many pictures
+  constexpr std::size_t max_compared = 50;  // limits the size of the page
   if (moment.comparisons.size() > max_compared) moment.comparisons.resize(max_compared);
   moment.values.insert(moment.values.begin(), {"image", image.file});
   page.add(moment);
@@ -97,9 +99,9 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
   const auto& entries = run.entries;
   const auto every = static_cast<std::size_t>(settings.every);
   const std::size_t image_count = (entries.size() + every - 1) / every;
-  constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < image_count; begin += batch) {
-    const std::size_t count = std::min(batch, image_count - begin);
+  constexpr std::size_t batch_size = 32;
+  for (std::size_t begin = 0; begin < image_count; begin += batch_size) {
+    const std::size_t count = std::min(batch_size, image_count - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
     std::vector<std::optional<recordings::RunMoment>> moments(count);
     parallel_for(executor, count, [&](std::size_t i) {
@@ -107,7 +109,7 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
       StageClock clock;
       Observation observation = read_observation(entries[index]);
       clock.stage("reading");
-      if (settings.recorded == nullptr) {
+      if (settings.thumbnail_file == nullptr) {
         signatures[i] = tracker.encoder().packed(observation);
         return;
       }
@@ -119,7 +121,8 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
       signatures[i] = tracker.encoder().packed(*moment.panorama);
       clock.stage("signature");
       clock.add_to(moment);
-      if (index == 0 && settings.shown != nullptr) settings.shown->add_to(moment);
+      if (index == 0 && settings.shown_references != nullptr)
+        settings.shown_references->add_to(moment);
     });
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t index = (begin + i) * every;

@@ -27,14 +27,14 @@ struct TrackedImage {
   std::optional<double> stamp_s;
   std::optional<ReferencePose> truth;
   MonteCarloEstimate estimate;
-  std::vector<Pose2> particles;  ///< an even sample of them, of the requested size
+  std::vector<Pose2> particles;  ///< systematic sample of the particles
   std::optional<recordings::RunMoment>
-      moment;  ///< what a record holds of it; nullopt: nothing is recorded
+      moment;  ///< for the record of the run; nullopt: not recorded
 };
 
 /// True if the robot was localised at the image.
 [[nodiscard]] bool is_localised(const TrackedImage& image);
-/// Error of the estimated pose; nullopt if it or the true pose is not known.
+/// Returns the distance between estimated and true position; nullopt if one is unknown.
 [[nodiscard]] std::optional<double> position_error_m(const TrackedImage& image);
 [[nodiscard]] std::optional<double> heading_error_rad(const TrackedImage& image);
 
@@ -42,41 +42,43 @@ struct TrackSummary {
   std::size_t localised = 0;
   std::size_t ambiguous = 0;
   std::size_t lost = 0;
-  std::optional<std::size_t> first_localised;  ///< images until then, that one included
-  std::vector<double> errors_m;                ///< of localised images with a true position
+  std::optional<std::size_t>
+      first_localised;           ///< number of images up to and including the first localised one
+  std::vector<double> errors_m;  ///< position errors of localised images
   std::vector<double> heading_errors_rad;
 };
-/// Counts the next image, too.
+/// Adds the next image to the summary.
 void add(TrackSummary& summary, const TrackedImage& image);
 [[nodiscard]] TrackSummary summarise_track(const std::vector<TrackedImage>& images);
 
 struct TrackSettings {
-  int every = 1;                   ///< pictures between those that are looked at, plus one
-  std::size_t particles_kept = 0;  ///< of each image, for pictures and its page
-  /// The memory's file, for the thumbnails of best matches: moments are filled. Null: they are not.
-  const MemoryFile* recorded = nullptr;
-  /// Which references the views are compared with, for moments; null: with none.
-  const ShownReferences* shown = nullptr;
-  /// Called before each image: returns true if a viewer has set the robot's pose. Empty: no viewer
-  /// can.
+  int every = 1;                        ///< the filter uses every n-th image
+  std::size_t particles_per_image = 0;  ///< particles stored per image, for pictures and the page
+  /// The memory's file, from which thumbnails of the best matches are read for moments. Null: no
+  /// moments are made.
+  const MemoryFile* thumbnail_file = nullptr;
+  /// References with which moments compare the views; null: none.
+  const ShownReferences* shown_references = nullptr;
+  /// Called before each image; returns true if a viewer has set the robot's pose. Empty: viewers
+  /// cannot set it.
   std::function<bool()> has_viewer_input;
 };
 
-/// Updates the filter with a view; completes the moment, if there is one.
+/// Updates the filter with a view and completes the moment, if there is one.
 [[nodiscard]] TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
                                        const TrackSettings& settings,
                                        std::optional<recordings::RunMoment> moment);
 
-/// Notes in the moment that a viewer has set the robot's pose.
+/// Adds the event to the moment that a viewer has set the robot's pose.
 void note_viewer_pose(recordings::RunMoment& moment);
 
-/// Adds the image to the page that plays the run. Its moment must be there.
+/// Adds the image to the page that replays the run. `image.moment` must be set.
 void add(viewer::RunPage& page, const TrackedImage& image);
 
-/// Runs the filter over a recording whose entries all have odometry: it moves with every entry and
-/// looks at every `settings.every`-th picture, the first one included. Signatures are computed on
-/// all threads, the filter runs in order; the same on any number of threads. `report` is called
-/// after each image, in order. Throws FileError on a picture that cannot be read.
+/// Runs the filter over a recording whose entries all have odometry. Every entry is a motion step;
+/// every `settings.every`-th image, from the first on, is an observation. Signatures are computed
+/// on all threads; results do not depend on their number. `report` is called after each image, in
+/// order. Throws FileError on an image that cannot be read.
 void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
            const std::function<void(TrackedImage&&)>& report);
 

@@ -13,7 +13,7 @@ namespace panonav::command {
 
 namespace {
 
-/// x, y and the distance from there.
+/// Parses "X,Y,METRES" into x, y and radius in metres. Throws UsageError.
 std::array<double, 3> parse_circle(const std::string& text) {
   std::array<double, 3> circle{};
   std::size_t begin = 0;

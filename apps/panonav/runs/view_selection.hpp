@@ -9,7 +9,7 @@
 
 namespace panonav::command {
 
-/// Which views of a memory a user wants to see; all unless something is said.
+/// Selects views of a memory by name or position; unset members select all.
 struct ViewSelection {
   std::optional<std::string> name;
   std::optional<std::string> near;
@@ -18,7 +18,7 @@ struct ViewSelection {
 /// Adds --name and --near.
 void declare_selection(Arguments& arguments, ViewSelection& selection);
 
-/// Throws UsageError on values that are not understood.
+/// Returns the selected views. Throws UsageError on an invalid circle.
 [[nodiscard]] std::vector<ViewRecord> select_views(std::vector<ViewRecord> views,
                                                    const ViewSelection& selection);
 

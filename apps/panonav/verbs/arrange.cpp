@@ -22,7 +22,7 @@ namespace {
 struct ArrangeArguments {
   std::string memory;
   std::optional<std::string> odometry;
-  PictureArguments pictures;  // of a recording of topics, whose pictures are not read
+  PictureArguments pictures;  // topics of the recording; images are not read
   MapFileArguments files;
   std::optional<std::string> report;
   bool no_save = false;
@@ -30,7 +30,7 @@ struct ArrangeArguments {
   CoarseMotionOptions motion;
 };
 
-/// Motion between consecutive pictures of the data set that the memory knows by name.
+/// Returns the odometry between consecutive images of the data set whose names are in the memory.
 std::vector<CoarseMotion> read_motions(const ArrangeArguments& arguments,
                                        const PictureSource& source, const VisualMemory& memory,
                                        Session& session) {
@@ -138,10 +138,11 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
   session.detail(std::to_string(memory.size()) + " views loaded");
   if (arguments.report) prepare_report_folder(*arguments.report, "arrange");
   LatticeSteps steps;
-  const LatticeStepCallback watch = arguments.report ? steps.watch() : LatticeStepCallback();
+  const LatticeStepCallback step_callback =
+      arguments.report ? steps.step_callback() : LatticeStepCallback();
   const Lattice lattice = arrange(memory, arguments.lattice,
                                   read_motions(arguments, file.header().source, memory, session),
-                                  session.executor(), watch);
+                                  session.executor(), step_callback);
   session.detail("views arranged");
   if (!arguments.no_save) store_lattice(lattice, memory, file);
   if (arguments.files.tum) write_trajectory(*arguments.files.tum, make_trajectory(lattice, memory));

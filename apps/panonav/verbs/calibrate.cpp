@@ -14,7 +14,8 @@ namespace panonav::command {
 
 namespace {
 
-/// Properties of a mirror that images do not show: its profile and the robot's forward direction.
+/// Properties of a mirror that cannot be found from images: its profile and the robot's forward
+/// direction.
 struct MirrorOptions {
   int profile = 0;
   double inner_elevation_deg = -60.0;
@@ -78,7 +79,7 @@ void visit_options(LensesOptions& options, OptionVisitor& visitor) {
 
 struct CalibrateArguments {
   std::vector<std::string> inputs;
-  PictureArguments pictures;  // which ones
+  PictureArguments pictures;  // topics and part of a recording
   std::string out;
   std::optional<std::string> overlay;
   std::optional<double> inner_radius_px;
@@ -87,8 +88,8 @@ struct CalibrateArguments {
   LensesOptions lenses;
 };
 
-/// The pictures of one input; their layout is determined. Of a long recording some, evenly
-/// spread: as many as needed to find the mirror's circle.
+/// Returns the images of one input. Of more than 64 images it returns 64 at equal intervals, which
+/// are enough to find the mirror's circle.
 std::vector<DatasetEntry> choose_entries(const std::string& input,
                                          const CalibrateArguments& arguments, Session& session) {
   if (is_one_picture(input)) {
@@ -98,23 +99,24 @@ std::vector<DatasetEntry> choose_entries(const std::string& input,
     return {entry};
   }
   constexpr std::size_t max_pictures = 64;
-  std::optional<PictureSource> any;
+  std::optional<PictureSource> default_source;
   std::error_code ignored;
   if (!std::filesystem::exists(std::filesystem::path(input) / "dataset.toml", ignored)) {
-    any.emplace();
+    default_source.emplace();
   }
-  std::vector<DatasetEntry> all = open_recording(input, arguments.pictures, any, session).entries;
+  std::vector<DatasetEntry> all =
+      open_recording(input, arguments.pictures, default_source, session).entries;
   if (all.size() <= max_pictures) return all;
   session.note("of the " + std::to_string(all.size()) + " images of " + to_readable_line(input) +
                " " + std::to_string(max_pictures) + " are used, at equal intervals");
-  std::vector<DatasetEntry> some;
+  std::vector<DatasetEntry> selected;
   for (std::size_t i = 0; i < max_pictures; ++i) {
-    some.push_back(all[i * (all.size() - 1) / (max_pictures - 1)]);
+    selected.push_back(all[i * (all.size() - 1) / (max_pictures - 1)]);
   }
-  return some;
+  return selected;
 }
 
-/// Sets `names`, too.
+/// Reads all images and appends their names to `names`. Throws FileError if sizes differ.
 std::vector<Image> read_images(const CalibrateArguments& arguments, std::vector<std::string>& names,
                                Session& session) {
   std::vector<DatasetEntry> entries;
@@ -210,7 +212,7 @@ void print_text(const Arguments& declared, const CalibrateArguments& arguments, 
                   arguments.overlay ? "Next: look at " + *arguments.overlay + ", then" : "Next:");
 }
 
-/// The two circles, as draw_mirror draws one.
+/// Draws the circles of both lenses over the image, in the style of draw_mirror.
 Image draw_lenses(ImageView picture, const Camera& camera) {
   const auto draw = [&camera](ImageView on, int lens) {
     const ImageCircle circle = image_circle(camera, lens);
@@ -247,7 +249,8 @@ ordered_json to_json(const DualFisheyeCalibration& found, std::size_t images,
 ExitCode calibrate_lenses(const CalibrateArguments& arguments,
                           const std::vector<std::string>& names, const std::vector<ImageView>& all,
                           Session& session) {
-  // Uses evenly spread images of a long video: more cost time and memory and add little.
+  // Uses at most 12 images at equal intervals, as more cost time and memory but hardly improve the
+  // result.
   constexpr std::size_t max_pictures = 12;
   const std::size_t count = std::min(all.size(), max_pictures);
   std::vector<ImageView> views;
@@ -354,20 +357,21 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.options("mirror_search", values->search);
   arguments.show_in_help({"--profile", "--inner-elevation-deg", "--rim-elevation-deg",
                           "--direction", "--forward-angle-deg"});
-  const auto shaped = [values](int profile) {
+  const auto has_profile = [values](int profile) {
     return [values, profile] { return values->mirror.profile == profile; };
   };
-  arguments.reject_options_unless({"--inner-elevation-deg"}, shaped(0),
+  arguments.reject_options_unless({"--inner-elevation-deg"}, has_profile(0),
                                   "without --profile equiangular");
-  arguments.reject_options_unless({"--mirror-a-mm", "--mirror-b-mm"}, shaped(1),
+  arguments.reject_options_unless({"--mirror-a-mm", "--mirror-b-mm"}, has_profile(1),
                                   "without --profile hyperboloidal");
-  arguments.reject_options_unless({"--xi"}, shaped(2), "without --profile unified");
-  arguments.reject_options_unless({"[lenses]"}, shaped(dual_fisheye_profile),
+  arguments.reject_options_unless({"--xi"}, has_profile(2), "without --profile unified");
+  arguments.reject_options_unless({"[lenses]"}, has_profile(dual_fisheye_profile),
                                   "without --profile dual-fisheye");
   arguments.reject_options_unless(
       {"--rim-elevation-deg", "--forward-angle-deg", "--inner-radius-px", "[mirror_search]"},
-      [shaped] { return !shaped(dual_fisheye_profile)(); }, "with --profile dual-fisheye");
-  arguments.writes({"--out", "--overlay"});
+      [has_profile] { return !has_profile(dual_fisheye_profile)(); },
+      "with --profile dual-fisheye");
+  arguments.declare_outputs({"--out", "--overlay"});
   return [values, &arguments](Session& session) { return calibrate(arguments, *values, session); };
 }
 

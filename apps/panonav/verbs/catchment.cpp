@@ -33,8 +33,8 @@ struct CatchmentArguments {
   std::optional<std::string> report;
 };
 
-/// Shows each work that it hears of.
-WorkProgress show_progress(Session& session) {
+/// Returns a callback that shows a progress bar for each reported work.
+WorkProgress make_progress_callback(Session& session) {
   return [&session, bar = std::shared_ptr<Progress>(), shown = std::string()](
              const std::string& work, std::size_t steps, std::size_t total) mutable {
     if (work != shown) {
@@ -96,7 +96,7 @@ void print_text(const CatchmentArguments& arguments, const CatchmentResult& resu
                 format_fixed(result.typical_distance_m, 2) + " m");
   session.print("  distance [m]  pairs     homeward  heading error [degrees]");
   for (const CatchmentResult::Bin& bin : result.bins) {
-    // Rounding of a distance must not take its bin away.
+    // Tolerates rounding of the distance, so that the last bin is printed.
     if (arguments.settings.up_to_m && bin.homeward.distance_m > 1.001 * *arguments.settings.up_to_m)
       break;
     const auto padded = [](std::string text, std::size_t width) {
@@ -119,8 +119,8 @@ void print_text(const CatchmentArguments& arguments, const CatchmentResult& resu
 }
 
 /// Homes from each view to the one `ahead` images later.
-ExitCode compare_ahead(const CatchmentArguments& arguments, const RecordedViews& views,
-                       const FourierHomingOptions& options, Session& session) {
+ExitCode measure_travel_direction(const CatchmentArguments& arguments, const RecordedViews& views,
+                                  const FourierHomingOptions& options, Session& session) {
   const auto ahead = static_cast<std::size_t>(*arguments.ahead);
   if (views.files.size() <= ahead) {
     throw FileError(arguments.dataset, "has " + std::to_string(views.files.size()) +
@@ -128,13 +128,13 @@ ExitCode compare_ahead(const CatchmentArguments& arguments, const RecordedViews&
                                            std::to_string(views.files.size() - 1));
   }
   std::vector<double> directions;
-  std::size_t sideways = 0;
+  std::size_t backward = 0;
   for (std::size_t i = 0; i + ahead < views.files.size(); ++i) {
     const HomeVector found = home_vector(views.views[i + ahead], views.views[i], options);
     if (!(found.length() > 0.0)) continue;
     // Undoes the robot's random rotation.
     directions.push_back(wrap_angle(found.direction_rad() + views.rotation_rad[i]));
-    sideways += std::abs(directions.back()) > radians(90.0) ? 1 : 0;
+    backward += std::abs(directions.back()) > radians(90.0) ? 1 : 0;
   }
   const auto mean = circular_mean(directions);
   if (session.json()) {
@@ -144,7 +144,7 @@ ExitCode compare_ahead(const CatchmentArguments& arguments, const RecordedViews&
                      {"pairs", directions.size()},
                      {"direction_rad", mean ? ordered_json(mean->direction_rad) : ordered_json()},
                      {"resultant_length", mean ? mean->resultant_length : 0.0},
-                     {"backward", sideways}}));
+                     {"backward", backward}}));
   } else if (mean) {
     const double degrees_left = degrees(mean->direction_rad);
     session.print("From each of " + std::to_string(directions.size()) + " views to the one " +
@@ -155,14 +155,14 @@ ExitCode compare_ahead(const CatchmentArguments& arguments, const RecordedViews&
     session.print("  resultant length " + format_fixed(mean->resultant_length, 3) +
                   " (1: all directions equal), spread " +
                   format_fixed(degrees(circular_standard_deviation(*mean)), 1) + " degrees, " +
-                  std::to_string(sideways) + " point backwards");
+                  std::to_string(backward) + " point backwards");
   } else {
     session.print(session.red("no common direction"));
   }
   return mean ? ExitCode::done : ExitCode::no_answer;
 }
 
-void check_posed(const RecordedViews& views, const std::string& name) {
+void require_poses(const RecordedViews& views, const std::string& name) {
   for (std::size_t i = 0; i < views.files.size(); ++i) {
     if (views.poses[i] && views.poses[i]->heading_rad) continue;
     throw FileError(
@@ -200,8 +200,8 @@ std::size_t choose_goal(const CatchmentArguments& arguments, const RecordedViews
   return best;
 }
 
-/// Numbers between commas.
-std::vector<int> read_stages(const std::string& text, int max_frequency) {
+/// Parses numbers separated by commas. Throws UsageError.
+std::vector<int> parse_stages(const std::string& text, int max_frequency) {
   std::vector<int> stages;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
@@ -230,7 +230,7 @@ CatchmentSettings check_settings(const Arguments& declared, const CatchmentArgum
   CatchmentSettings settings = arguments.settings;
   settings.homing = make_homing_options(declared, arguments.homing, components);
   if (arguments.stages) {
-    settings.stages = read_stages(*arguments.stages, std::min(62, components - 2));
+    settings.stages = parse_stages(*arguments.stages, std::min(62, components - 2));
   }
   settings.has_typical_distance = declared.is_set("run", "typical_distance_m");
   settings.has_longest_step = declared.is_set("run", "max_step_m");
@@ -252,26 +252,27 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
 
   if (arguments.ahead) {
     const auto views = read_views(recording, arguments.homing.views, arguments.turn_seed,
-                                  session.executor(), show_progress(session));
-    reject_unused_rise(declared, views.views.front(), arguments.dataset);
-    return compare_ahead(arguments, views, settings.homing, session);
+                                  session.executor(), make_progress_callback(session));
+    reject_unused_rise_flags(declared, views.views.front(), arguments.dataset);
+    return measure_travel_direction(arguments, views, settings.homing, session);
   }
   const auto goals = read_views(recording, arguments.homing.views, std::nullopt, session.executor(),
-                                show_progress(session));
-  check_posed(goals, arguments.dataset);
-  reject_unused_rise(declared, goals.views.front(), arguments.dataset);
+                                make_progress_callback(session));
+  require_poses(goals, arguments.dataset);
+  reject_unused_rise_flags(declared, goals.views.front(), arguments.dataset);
   const std::size_t goal = choose_goal(arguments, goals);
-  const auto places = read_views(second ? *second : recording, arguments.homing.views,
-                                 arguments.turn_seed, session.executor(), show_progress(session));
+  const auto places =
+      read_views(second ? *second : recording, arguments.homing.views, arguments.turn_seed,
+                 session.executor(), make_progress_callback(session));
   const std::string& places_name = arguments.current ? *arguments.current : arguments.dataset;
-  check_posed(places, places_name);
+  require_poses(places, places_name);
   if (goals.views.front().rows() != places.views.front().rows()) {
     throw FileError(places_name, "rows is " + std::to_string(places.views.front().rows()) +
                                      "; allowed: " + std::to_string(goals.views.front().rows()) +
                                      ", as in " + arguments.dataset);
   }
   const auto result = survey_catchment(goals, places, settings, places_name, session.executor(),
-                                       show_progress(session));
+                                       make_progress_callback(session));
   if (session.json()) {
     session.print(json_line(to_json(arguments, goals, result)));
   } else {

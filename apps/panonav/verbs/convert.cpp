@@ -17,7 +17,7 @@ struct ConvertArguments {
   PictureArguments pictures;
 };
 
-/// Lists the fields that the data set has for all images.
+/// Returns the fields that the data set has for all images, as a text.
 std::string describe_fields(const Dataset::Fields& done) {
   std::string text;
   for (const auto& [has, what] : {std::pair{done.odometry, "odometry"},
@@ -31,24 +31,25 @@ std::string describe_fields(const Dataset::Fields& done) {
 
 ExitCode convert(const ConvertArguments& arguments, Session& session) {
   std::error_code ignored;
-  const bool records = fs::path(arguments.output).extension() == ".mcap";
-  if (!records && (fs::exists(fs::path(arguments.input) / "dataset.toml", ignored) ||
-                   (fs::is_directory(arguments.input, ignored) &&
-                    !recordings::is_recording(arguments.input)))) {
+  const bool is_to_recording = fs::path(arguments.output).extension() == ".mcap";
+  if (!is_to_recording && (fs::exists(fs::path(arguments.input) / "dataset.toml", ignored) ||
+                           (fs::is_directory(arguments.input, ignored) &&
+                            !recordings::is_recording(arguments.input)))) {
     throw UsageError(arguments.output +
                      " does not end in .mcap; a folder is converted to a recording, and a "
                      "recording to a folder");
   }
   // A recording does not state the layout of its images.
-  PictureSource any{.kind = PictureKind::equirectangular};
-  any.layout.elevations = ElevationBand{-1.0, 1.0};
-  const Dataset dataset = open_recording(arguments.input, arguments.pictures,
-                                         records ? std::optional(any) : std::nullopt, session);
+  PictureSource default_source{.kind = PictureKind::equirectangular};
+  default_source.layout.elevations = ElevationBand{-1.0, 1.0};
+  const Dataset dataset =
+      open_recording(arguments.input, arguments.pictures,
+                     is_to_recording ? std::optional(default_source) : std::nullopt, session);
   Progress progress(session, "converting", dataset.entries.size());
   const auto advance = [&] { progress.advance(); };
   const Dataset::Fields done =
-      records ? recordings::convert_to_recording(dataset, arguments.output, advance)
-              : recordings::convert_to_dataset(dataset, arguments.output, advance);
+      is_to_recording ? recordings::convert_to_recording(dataset, arguments.output, advance)
+                      : recordings::convert_to_dataset(dataset, arguments.output, advance);
   progress.clear();
   if (session.json()) {
     session.print(json_line(ordered_json{{"input", arguments.input},
@@ -63,7 +64,7 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
   }
   session.print(session.bold(std::to_string(dataset.entries.size())) + " images of " +
                 arguments.input + " in " + arguments.output + describe_fields(done));
-  if (records && !done.stamps) {
+  if (is_to_recording && !done.stamps) {
     session.print(
         "Some images have no stamp. The images are stored with an interval of one second.");
   }
@@ -77,7 +78,7 @@ Run declare_convert(Arguments& arguments) {
   arguments.positional("OUTPUT", values->output,
                        "New recording (FILE.mcap), or a new folder for a data set");
   declare_pictures(arguments, values->pictures);
-  arguments.writes({"OUTPUT"});
+  arguments.declare_outputs({"OUTPUT"});
   return [values](Session& session) { return convert(*values, session); };
 }
 

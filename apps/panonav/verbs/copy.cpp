@@ -33,7 +33,7 @@ Run declare_copy(Arguments& arguments) {
   auto values = std::make_shared<CopyArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file, or address of a memory on a server");
   arguments.positional("COPY", values->copy, "Name of the copy: a new file, or an address");
-  arguments.writes({"COPY"});
+  arguments.declare_outputs({"COPY"});
   return [values](Session& session) { return copy(*values, session); };
 }
 

@@ -10,7 +10,7 @@ struct ExportArguments {
   std::string out;
 };
 
-std::string lost_columns(const MemoryExport& done) {
+std::string list_missing_values(const MemoryExport& done) {
   std::string lost;
   for (const auto& [is_there, what] : {std::pair{done.positions, "positions"},
                                        {done.headings, "headings"},
@@ -51,7 +51,7 @@ void print_export(const MemoryExport& done, const MemoryFile& memory, const std:
                   " images have other names than their views, because file names cannot contain "
                   "the names of these views; views.csv lists both names.");
   }
-  const std::string lost = lost_columns(done);
+  const std::string lost = list_missing_values(done);
   if (!lost.empty()) {
     session.print(
         "The data set does not contain these values, because some views do not have them: " + lost +
@@ -88,7 +88,7 @@ Run declare_export(Arguments& arguments) {
   auto values = std::make_shared<ExportArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.required_option("-o,--out FOLDER", values->out, "New or empty folder");
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   return [values](Session& session) { return export_all(*values, session); };
 }
 

@@ -18,7 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* page_name = "gallery.html";
-/// A page with more pictures than these is slow to open; --name and --near choose others.
+/// Maximum number of views on the page, as larger pages open slowly; --name and --near select other
+/// views.
 constexpr std::size_t max_views = 2000;
 
 struct GalleryArguments {
@@ -27,15 +28,15 @@ struct GalleryArguments {
   ViewSelection selection;
 };
 
-/// Views that are shown under one title.
+/// Titles, each with the views that are shown under it.
 using Groups = std::vector<std::pair<std::string, std::vector<ViewRecord>>>;
 
-std::string format_span(double index, double side_m) {
+std::string format_interval(double index, double side_m) {
   return format_number(index * side_m) + " to " + format_number((index + 1.0) * side_m) + " m";
 }
 
-/// Groups views by squares of the plane with eight views or more on average, row by row from the
-/// upper left.
+/// Groups views by squares of the ground plane, row by row from the upper left. The squares are
+/// large enough for eight or more views on average.
 Groups group_by_squares(const std::vector<ViewRecord>& views, const std::string& prefix) {
   std::map<std::pair<double, double>, std::vector<ViewRecord>> squares;
   double side_m = 0.0;
@@ -50,9 +51,9 @@ Groups group_by_squares(const std::vector<ViewRecord>& views, const std::string&
     if (views.size() >= 8 * squares.size() || squares.size() == 1) break;
   }
   Groups groups;
-  for (auto& [place, members] : squares) {
-    groups.emplace_back(prefix + "x " + format_span(place.second, side_m) + ", y " +
-                            format_span(-place.first, side_m),
+  for (auto& [square, members] : squares) {
+    groups.emplace_back(prefix + "x " + format_interval(square.second, side_m) + ", y " +
+                            format_interval(-square.first, side_m),
                         std::move(members));
   }
   return groups;
@@ -61,11 +62,13 @@ Groups group_by_squares(const std::vector<ViewRecord>& views, const std::string&
 /// Groups views by the folder in their names, then by the component of the map, then by position.
 Groups group_views(const std::vector<ViewRecord>& views) {
   std::map<std::string, std::pair<std::vector<ViewRecord>, std::vector<ViewRecord>>> areas;
-  const bool parts = std::ranges::any_of(views, [](const auto& v) { return v.component > 0U; });
+  const bool has_components =
+      std::ranges::any_of(views, [](const auto& v) { return v.component > 0U; });
   for (const ViewRecord& view : views) {
     const std::size_t slash = view.info.name.rfind('/');
     std::string title = slash == std::string::npos ? "" : view.info.name.substr(0, slash) + ": ";
-    if (parts && view.component) title += "component " + std::to_string(*view.component) + ": ";
+    if (has_components && view.component)
+      title += "component " + std::to_string(*view.component) + ": ";
     auto& [placed, others] = areas[title];
     (view.info.pose ? placed : others).push_back(view);
   }
@@ -81,14 +84,14 @@ Groups group_views(const std::vector<ViewRecord>& views) {
   return groups;
 }
 
-/// Returns the thumbnail as a data URL, decoded and encoded again, so that a browser gets nothing
-/// else of the file; empty without a thumbnail.
+/// Returns the thumbnail as a data URL; empty if there is none. Decodes and encodes it again, so
+/// that only pixels of the memory file reach a browser.
 std::string thumbnail_url(const MemoryFile& memory, const ViewRecord& view) {
   const auto bytes = view.thumbnail ? memory.thumbnail(view.view) : std::nullopt;
   if (!bytes) return "";
   try {
     const Image picture = decode_image(*bytes, "thumbnail", {.side_px = 4096});
-    return viewer::data_url("image/png", encode_png(picture.view()));
+    return viewer::make_data_url("image/png", encode_png(picture.view()));
   } catch (const FileError&) {
     return "";
   }
@@ -171,7 +174,7 @@ Run declare_gallery(Arguments& arguments) {
       "-o,--out FOLDER", values->out,
       "Folder for the page; it must be new, empty or contain an earlier gallery");
   declare_selection(arguments, values->selection);
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   return [values](Session& session) { return gallery(*values, session); };
 }
 

@@ -29,16 +29,16 @@ struct HomeArguments {
 };
 
 ordered_json to_json(const HomeAnswer& answer, const std::string& goal) {
-  const HomingResult& way = answer.way;
-  const HomeVector& found = way.vector;
+  const HomingResult& result = answer.result;
+  const HomeVector& found = result.vector;
   const auto if_known = [&](double value) {
-    return way.known ? ordered_json(value) : ordered_json();
+    return result.known ? ordered_json(value) : ordered_json();
   };
   return {{"goal", goal},
           {"current", answer.file},
-          {"known", way.known},
-          {"probability", way.probability},
-          {"direction_rad", to_json_or_null(way.direction_rad)},
+          {"known", result.known},
+          {"probability", result.probability},
+          {"direction_rad", to_json_or_null(result.direction_rad)},
           {"length", if_known(found.length())},
           {"xi", if_known(found.xi)},
           {"eta", if_known(found.eta)},
@@ -50,21 +50,21 @@ ordered_json to_json(const HomeAnswer& answer, const std::string& goal) {
 }
 
 std::string format_line(const HomeAnswer& answer, Session& session) {
-  const HomingResult& way = answer.way;
-  if (!way.known)
-    return answer.file + "  " + session.red("no answer") + ": " + explain_no_direction(way);
-  const std::string sure = "; probability " + format_fixed(way.probability, 2);
-  if (way.direction_rad) {
-    return answer.file + "  home is " + session.green(describe_direction(*way.direction_rad)) +
-           ", about " + format_fixed(way.distance_r, 2) + " R away; " +
-           describe_rotation(way.vector.heading_rad) + sure;
+  const HomingResult& result = answer.result;
+  if (!result.known)
+    return answer.file + "  " + session.red("no answer") + ": " + explain_no_direction(result);
+  const std::string sure = "; probability " + format_fixed(result.probability, 2);
+  if (result.direction_rad) {
+    return answer.file + "  home is " + session.green(describe_direction(*result.direction_rad)) +
+           ", about " + format_fixed(result.distance_r, 2) + " R away; " +
+           describe_rotation(result.vector.heading_rad) + sure;
   }
-  return answer.file + "  " + session.red("no direction home") + ": " + explain_no_direction(way) +
-         sure;
+  return answer.file + "  " + session.red("no direction home") + ": " +
+         explain_no_direction(result) + sure;
 }
 
-/// The layout of an image beside a dataset.toml is stated there.
-std::optional<PictureSource> source_of_folder(const std::string& picture) {
+/// Returns the layout in the dataset.toml next to the image; nullopt if there is no such file.
+std::optional<PictureSource> find_folder_source(const std::string& picture) {
   const fs::path folder = fs::path(picture).parent_path();
   std::error_code ignored;
   if (!fs::is_regular_file(picture, ignored) || !fs::exists(folder / "dataset.toml", ignored)) {
@@ -77,7 +77,7 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
                     const Dataset& recording, Session& session) {
   const std::size_t total = recording.entries.size();
   std::vector<HomeAnswer> answers;
-  std::size_t pointing = 0;
+  std::size_t answers_with_direction = 0;
   Progress progress(session, "homing", total);
   process_in_order(
       total, session.executor(),
@@ -87,7 +87,7 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
       },
       [&](std::size_t, HomeAnswer&& answer) {
         progress.clear();
-        pointing += answer.way.direction_rad ? 1 : 0;
+        answers_with_direction += answer.result.direction_rad ? 1 : 0;
         session.print(session.json() ? json_line(to_json(answer, goal.name))
                                      : format_line(answer, session));
         answers.push_back(std::move(answer));
@@ -95,8 +95,9 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
       });
   progress.clear();
   if (!session.json() && total > 1) {
-    session.print(session.bold(std::to_string(pointing) + " of " + std::to_string(total)) +
-                  " views give the direction to " + goal.name);
+    session.print(
+        session.bold(std::to_string(answers_with_direction) + " of " + std::to_string(total)) +
+        " views give the direction to " + goal.name);
   }
   if (arguments.report) {
     write_home_report(*arguments.report, goal, answers, [&](std::size_t i) {
@@ -104,16 +105,16 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
     });
     print_report_path(*arguments.report, session);
   }
-  return pointing > 0 ? ExitCode::done : ExitCode::no_answer;
+  return answers_with_direction > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
 ExitCode home_from_memory(const Arguments& declared, const HomeArguments& arguments,
                           Session& session) {
   const auto file = MemoryFile::open(*arguments.memory, Access::read_only);
   const auto& header = file.header();
-  SignatureOptions kept = arguments.homing.views.signature;
-  kept.components = header.shape.components;  // fewer of them may be compared
-  require_stored_options(declared, kept, arguments.homing.views.preprocessing, file);
+  SignatureOptions stored = arguments.homing.views.signature;
+  stored.components = header.shape.components;  // the user may compare fewer components
+  require_stored_options(declared, stored, arguments.homing.views.preprocessing, file);
   int components = header.shape.components;
   if (declared.is_set("signature", "components")) {
     components = arguments.homing.views.signature.components;
@@ -123,7 +124,7 @@ ExitCode home_from_memory(const Arguments& declared, const HomeArguments& argume
   const HomingGuide guide(file, arguments.goal, recording.source,
                           make_homing_options(declared, arguments.homing, components), components,
                           arguments.homing.views.horizon);
-  reject_unused_rise(declared, guide.goal(), *arguments.memory);
+  reject_unused_rise_flags(declared, guide.goal(), *arguments.memory);
   const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
                   arguments.report ? panorama_from_thumbnail(file, view) : std::nullopt};
   return answer_all(arguments, guide, goal, recording, session);
@@ -138,19 +139,19 @@ ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session
   if (fs::is_directory(arguments.goal, ignored)) {
     throw FileError(arguments.goal, "is a folder; allowed: one image, or a view of --memory");
   }
-  // The folder of either image may state the layout of both.
-  std::optional<PictureSource> known = source_of_folder(arguments.current);
-  if (!known) known = source_of_folder(arguments.goal);
+  // A dataset.toml in the folder of one image is used for both images.
+  std::optional<PictureSource> known = find_folder_source(arguments.current);
+  if (!known) known = find_folder_source(arguments.goal);
   const auto recording = open_recording(arguments.current, arguments.pictures, known, session);
-  std::optional<PictureSource> goal_source = source_of_folder(arguments.goal);
+  std::optional<PictureSource> goal_source = find_folder_source(arguments.goal);
   if (!goal_source) goal_source = recording.source;
-  PictureArguments of_goal = arguments.pictures;
-  of_goal.part = {};
-  const auto goals = open_recording(arguments.goal, of_goal, goal_source, session);
+  PictureArguments goal_pictures = arguments.pictures;
+  goal_pictures.part = {};
+  const auto goals = open_recording(arguments.goal, goal_pictures, goal_source, session);
   const HomingEncoder encoder(goals.source, views);
   const Panorama picture = encoder.panorama(read_observation(goals.entries.front()));
   const Goal goal{arguments.goal, std::nullopt, encoder.view(picture), picture};
-  reject_unused_rise(declared, goal.view, goal.name);
+  reject_unused_rise_flags(declared, goal.view, goal.name);
   const HomingGuide guide(HomingEncoder(recording.source, views), goal.name, goal.view, options);
   return answer_all(arguments, guide, goal, recording, session);
 }

@@ -26,11 +26,12 @@ ordered_json to_json(const ViewRecord& record) {
           {"thumbnail", thumbnail}};
 }
 
-/// A column's title and its text for a view; empty: nothing.
+/// A column with its title and a function that returns its text for a view, empty if there is no
+/// value.
 struct Column {
   std::string title;
   std::string (*cell)(const ViewRecord&);
-  bool text = false;  // stands at the left
+  bool text = false;  // left-aligned
 };
 
 std::size_t display_width(const std::string& text) {
@@ -38,7 +39,7 @@ std::size_t display_width(const std::string& text) {
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
-/// Columns in which no view has anything are left out.
+/// Returns the lines of the table, the header first. Columns without any value are left out.
 std::vector<std::string> format_table(const std::vector<ViewRecord>& views) {
   const std::vector<Column> columns{
       {"id", [](const ViewRecord& v) { return std::to_string(v.view.value); }},

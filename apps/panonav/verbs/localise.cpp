@@ -21,7 +21,8 @@ namespace panonav::command {
 
 namespace {
 
-/// Turns the robot as --turn-randomly says, and returns by how much.
+/// Rotates the image by a random number of columns, with --turn-randomly, and returns the rotation
+/// in radians, counter-clockwise positive; otherwise 0.
 double turn_randomly(Observation& observation, const PlaceRecogniser& recogniser,
                      const LocaliseArguments& arguments, std::size_t index) {
   if (!arguments.turn_seed) return 0.0;
@@ -43,14 +44,14 @@ void print_answer(const LocalisedQuery& query, const LocaliseArguments& argument
   }
 }
 
-/// Answers all images on all threads and prints the answers in order. Images that cannot be read
-/// are named; throws if none can.
+/// Localises all images on all threads and prints the answers in order. Reports images that cannot
+/// be read; throws FileError if none can be read.
 std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const LocaliseArguments& arguments, const Dataset& recording,
                                        Session& session) {
   struct Answer {
     LocalisedQuery query;
-    std::exception_ptr failure = {};  ///< why there is none
+    std::exception_ptr failure = {};  ///< why the image could not be read
   };
   Progress progress(session, "localising", recording.entries.size());
   std::vector<LocalisedQuery> answers;
@@ -67,7 +68,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
           return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
         }
         const double turned_rad = turn_randomly(*observation, recogniser, arguments, i);
-        // Several images are named as they were typed.
+        // The entries of several typed images contain paths; the memory has file names.
         const std::string name =
             arguments.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
         Place place = recogniser.localise(*observation,
@@ -78,7 +79,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
         answers.push_back(std::move(made.query));
         if (made.failure && !failure) failure = made.failure;
         progress.advance();
-        if (printed == 0 && made.failure) return;  // it may be all that there is to say
+        if (printed == 0 && made.failure) return;  // throws later if no image can be read
         progress.clear();
         for (; printed < answers.size(); ++printed) {
           print_answer(answers[printed], arguments, session);
@@ -88,7 +89,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
   return answers;
 }
 
-/// Writes the CSV table and prints how many places are known; returns that number.
+/// Writes the CSV table and prints how many images show known places; returns this number.
 std::size_t write_table_and_count(const LocaliseArguments& arguments,
                                   const std::vector<LocalisedQuery>& answers, Session& session) {
   std::string table(csv_header);
@@ -123,7 +124,7 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   const Dataset recording = open_queries(arguments, file.header().source, session);
   PlaceRecogniserOptions options{.localiser = arguments.localiser, .source = recording.source};
   if (arguments.areas) options.areas = arguments.accuracy;
-  // A report shows all views of the memory, so the memory is loaded whatever its size.
+  // Loads the whole memory for a report, which shows all its views.
   if (arguments.report) options.max_held_views = std::numeric_limits<std::size_t>::max();
   const PlaceRecogniser recogniser(arguments.memory, options);
   const auto answers = answer_all(recogniser, arguments, recording, session);
@@ -192,7 +193,7 @@ Run declare_localise(Arguments& arguments) {
   declare_changes(arguments, values);
   arguments.reject_options_unless(
       {"[accuracy]"}, [values] { return values->areas; }, "without --areas");
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   return [values, &arguments](Session& session) { return localise(arguments, *values, session); };
 }
 

@@ -48,7 +48,7 @@ Run declare_man(Arguments& arguments) {
                                  verb_names());
   arguments.option("-o,--out FOLDER", values->out,
                    "Write the pages of all verbs as files into this folder");
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   return [values](Session& session) { return man(*values, session); };
 }
 

@@ -38,8 +38,8 @@ struct MapArguments {
   bool no_thumbnails = false;
 };
 
-/// Poses of the largest component over time. The stamp is the number of the picture where the
-/// recording has none.
+/// Returns the stamped poses of the largest component. Images without a stamp get their index as
+/// stamp.
 std::vector<StampedPose> make_trajectory(const Dataset& recording, const Mapper::Result& run,
                                          const std::string& dataset) {
   std::vector<StampedPose> trajectory;
@@ -162,19 +162,19 @@ Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& 
   return mapper.map(recording, session.executor(), [&] { progress.advance(); });
 }
 
-/// Maps the recording as `map_recording` while viewers watch the map grow.
-Mapper::Result map_in_view(const MapArguments& arguments, const Dataset& recording, Mapper& mapper,
-                           Session& session) {
+/// Maps the recording like `map_recording` and shows the growing map to viewers.
+Mapper::Result map_with_viewers(const MapArguments& arguments, const Dataset& recording,
+                                Mapper& mapper, Session& session) {
   RunRecord record({.file = std::nullopt, .view = arguments.record.view},
                    std::array{arguments.dataset, arguments.memory}, false, session,
                    {.memory = arguments.memory});
-  struct Seen {
+  struct EncodedImage {
     Mapper::EncodedView view;
     recordings::RunMoment moment;
     std::string name;
   };
   GrowingMap shown;
-  std::optional<recordings::RunMoment> last;  // waits for what comes of it
+  std::optional<recordings::RunMoment> pending;  // sent with the next image or the finished map
   Progress progress(session, "mapping", recording.entries.size());
   process_in_order(
       recording.entries.size(), session.executor(),
@@ -182,41 +182,41 @@ Mapper::Result map_in_view(const MapArguments& arguments, const Dataset& recordi
         StageClock clock;
         const Observation observation = read_observation(recording.entries[i]);
         clock.stage("reading");
-        Seen seen{mapper.encode(observation), recordings::make_moment(observation, i),
-                  observation.name};
+        EncodedImage encoded{mapper.encode(observation), recordings::make_moment(observation, i),
+                             observation.name};
         clock.stage("unwarping, signature");
-        seen.moment.panorama = mapper.encoder().panorama(observation);
+        encoded.moment.panorama = mapper.encoder().panorama(observation);
         clock.stage("for viewers");
-        clock.add_to(seen.moment);
-        return seen;
+        clock.add_to(encoded.moment);
+        return encoded;
       },
-      [&](std::size_t, Seen&& seen) {
-        if (last) record.add(std::move(*last));
+      [&](std::size_t, EncodedImage&& encoded) {
+        if (pending) record.add(std::move(*pending));
         StageClock clock;
-        const bool is_node = mapper.add(std::move(seen.view));
+        const bool is_node = mapper.add(std::move(encoded.view));
         clock.stage("mapping");
-        clock.add_to(seen.moment);
-        shown.add_to(seen.moment, mapper.current_map(), is_node, seen.name);
-        last = std::move(seen.moment);
+        clock.add_to(encoded.moment);
+        shown.add_to(encoded.moment, mapper.current_map(), is_node, encoded.name);
+        pending = std::move(encoded.moment);
         progress.advance();
       });
   Mapper::Result run = mapper.finish();
-  if (last) {
-    shown.finish(*last, run.map);
-    record.add(std::move(*last));
+  if (pending) {
+    shown.finish(*pending, run.map);
+    record.add(std::move(*pending));
   }
   record.close();
   return run;
 }
 
-/// Writes the finished map, then each picture with the pose that it got: of the largest connected
-/// component, as components have no common frame.
+/// Records the finished map and then each image with its pose. Only the largest connected component
+/// has poses, as components have no common frame.
 void record_map(const MapArguments& arguments, const Dataset& recording, const Mapper::Result& run,
-                const ViewEncoder& encoder, viewer::RunPage& played, Session& session) {
+                const ViewEncoder& encoder, viewer::RunPage& replay_page, Session& session) {
   RunRecord record({.file = arguments.record.file, .view = std::nullopt},
                    std::array{arguments.dataset, arguments.memory}, false, session, {});
   const std::size_t component = find_largest_component(run.map);
-  std::map<std::size_t, std::size_t> nodes;  // by observation
+  std::map<std::size_t, std::size_t> nodes;  // index of the node by index of its image
   std::vector<std::string> names;
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     nodes[run.observations[i]] = i;
@@ -241,8 +241,8 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
         if (i == 0) add_component(moment, run.map, component, names);
         if (arguments.report) {
           recordings::RunMoment shown = moment;
-          shown.truth.reset();  // in another frame than the map's
-          played.add(shown);
+          shown.truth.reset();  // its frame differs from the map's
+          replay_page.add(shown);
         }
         record.add(std::move(moment));
         progress.advance();
@@ -250,8 +250,8 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
   record.close();
 }
 
-/// Rejects typed options that have no effect on this recording, and a camera height, also of a
-/// file, if lengths cannot be read from the ground.
+/// Rejects typed options that have no effect on this recording. Also rejects a camera height, typed
+/// or from a config file, if lengths cannot be measured on the ground or odometry gives them.
 void reject_options_without_effect(const Arguments& declared, const MapArguments& arguments,
                                    const Dataset& recording, const MemoryHeader& header) {
   const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
@@ -282,9 +282,9 @@ void reject_options_without_effect(const Arguments& declared, const MapArguments
 
 ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& session) {
   if (arguments.report) prepare_report_folder(*arguments.report, "map");
-  const bool there = memory_exists(arguments.memory);
+  const bool memory_existed = memory_exists(arguments.memory);
   std::optional<MemoryFile> memory;
-  if (there) memory = MemoryFile::open(arguments.memory, Access::read_write);
+  if (memory_existed) memory = MemoryFile::open(arguments.memory, Access::read_write);
   const Dataset recording =
       memory ? open_recording(arguments.dataset, arguments.pictures, *memory, session)
              : open_recording(arguments.dataset, arguments.pictures, std::nullopt, session);
@@ -300,9 +300,10 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
   MapperOptions options = arguments.mapper;
   options.thumbnails = !arguments.no_thumbnails;
   Mapper mapper(std::move(*memory), recording.source, options);
-  if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), session.executor());
+  if (memory_existed)
+    check_known_views(recording, mapper.memory(), mapper.encoder(), session.executor());
   const Mapper::Result run = arguments.record.view
-                                 ? map_in_view(arguments, recording, mapper, session)
+                                 ? map_with_viewers(arguments, recording, mapper, session)
                                  : map_recording(recording, mapper, session);
   if (arguments.files.tum)
     write_trajectory(*arguments.files.tum, make_trajectory(recording, run, arguments.dataset));
@@ -314,14 +315,14 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
       return recording.entries[run.observations[number]].file;
     });
   }
-  viewer::RunPage played("", recording.entries.size());
+  viewer::RunPage replay_page("", recording.entries.size());
   if (arguments.record.file || arguments.report) {
-    record_map(arguments, recording, run, mapper.encoder(), played, session);
+    record_map(arguments, recording, run, mapper.encoder(), replay_page, session);
   }
   if (arguments.files.picture) write_map_picture(*arguments.files.picture, recording, run);
   if (arguments.report) {
     write_map_report(*arguments.report, fs::path(arguments.memory).filename().string(), recording,
-                     run, played);
+                     run, replay_page);
   }
   print_result(arguments, recording, run, session);
   if (arguments.report) print_report_path(*arguments.report, session);

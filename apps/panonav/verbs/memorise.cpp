@@ -40,8 +40,8 @@ void note_skipped(const std::string& file, const Error& error, std::vector<Skipp
   skipped.push_back({file, error.what()});
 }
 
-/// Appends missing images and notes the recording's name once there is a file. Images that cannot
-/// be read are added to `skipped`; with `strict` the first of them ends the run.
+/// Memorises the missing images and stores the name of the recording as soon as the memory file
+/// exists. Images that cannot be read are added to `skipped`; with `strict` the first one throws.
 void memorise_missing(const Dataset& missing, const Dataset& recording, bool strict,
                       Memoriser& memoriser, std::vector<Skipped>& skipped, Session& session) {
   bool noted = false;
@@ -63,7 +63,7 @@ void memorise_missing(const Dataset& missing, const Dataset& recording, bool str
         batch.push_back(source.next().value());
       } catch (const FileError& error) {
         if (strict) {
-          failure = std::current_exception();  // what comes before it is memorised
+          failure = std::current_exception();  // images before it are memorised first
           break;
         }
         progress.clear();
@@ -150,11 +150,11 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
 }
 
 ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments, Session& session) {
-  const bool resumes = memory_exists(arguments.memory);
+  const bool memory_existed = memory_exists(arguments.memory);
   const bool live = recordings::is_live(arguments.input);
   if (!live) reject_live_options(declared, arguments.input, true);
   std::optional<PictureSource> remembered;
-  if (resumes) {
+  if (memory_existed) {
     const auto memory = MemoryFile::open(arguments.memory, Access::read_write);
     require_stored_options(declared, arguments.signature, arguments.preprocessing, memory);
     require_stored_band(arguments.pictures, memory);
@@ -167,7 +167,7 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
   Memoriser memoriser(arguments.memory,
                       make_options(arguments, recording.source, skipped, session));
   Dataset missing = recording;
-  if (resumes) {
+  if (memory_existed) {
     Progress comparing(session, "comparing", recording.entries.size());
     check_known_views(recording, *memoriser.file(), *memoriser.encoder(), session.executor(),
                       [&](std::size_t compared) { comparing.advance(compared); });

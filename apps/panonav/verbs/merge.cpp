@@ -84,7 +84,7 @@ Run declare_merge(Arguments& arguments) {
   arguments.required_option("-o,--out MEMORY", values->memory, "New memory file");
   arguments.options("merge", values->alignment);
   arguments.show_in_help({"--min-places"});
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   return [values](Session& session) { return merge(*values, session); };
 }
 

@@ -36,7 +36,7 @@ struct NavigateArguments {
   KnownRouteOptions known_route;
 };
 
-/// "X,Y,HEADING_DEG".
+/// Parses "X,Y,HEADING_DEG". Throws UsageError.
 Pose2 parse_pose(const std::string& flag, const std::string& text) {
   const std::size_t first = text.find(',');
   const std::size_t second = first == std::string::npos ? first : text.find(',', first + 1);
@@ -62,7 +62,7 @@ Pose2 parse_free_pose(const std::string& flag, const std::string& text,
   return pose;
 }
 
-/// null where nobody knows.
+/// Returns the name of the view as JSON; null if there is no view.
 ordered_json view_name_or_null(const std::optional<ViewId>& view, const RobotNavigator& robot) {
   return view ? ordered_json(robot.info(*view).name) : ordered_json();
 }
@@ -184,11 +184,11 @@ void print_summary(const simulation::MissionRun& run, Session& session) {
     session.print("distance from the goal's view: " +
                   session.bold(format_fixed(run.end_distance_m, 3) + " m"));
   }
-  std::string way = "driven " + format_fixed(run.travelled_m, 2) + " m";
+  std::string distances = "driven " + format_fixed(run.travelled_m, 2) + " m";
   if (std::isfinite(run.shortest_m)) {
-    way += "; the shortest path is " + format_fixed(run.shortest_m, 2) + " m long";
+    distances += "; the shortest path is " + format_fixed(run.shortest_m, 2) + " m long";
   }
-  session.print(way);
+  session.print(distances);
   const auto sure = std::ranges::count_if(run.decisions, [](const NavigationDecision& decision) {
     return decision.probability >= 0.5;
   });
@@ -222,7 +222,7 @@ simulation::Mission make_mission(const NavigateArguments& arguments, ViewId goal
 void write_results(const NavigateArguments& arguments, const simulation::MissionPlace& place,
                    const simulation::RememberedPlace& remembered, ViewId goal,
                    const std::string& goal_file, const simulation::MissionRun& run,
-                   const viewer::RunPage& played) {
+                   const viewer::RunPage& replay_page) {
   if (arguments.log) write_log(*arguments.log, run);
   if (arguments.picture) {
     viewer::write_mission_picture(
@@ -234,8 +234,8 @@ void write_results(const NavigateArguments& arguments, const simulation::Mission
     write_navigate_report(
         *arguments.report,
         {goal_file, std::string(explain_end(run.end)), run,
-         viewer::mission_plot("", place, remembered, arguments.mission.planner, goal, run)},
-        played);
+         viewer::make_mission_plot("", place, remembered, arguments.mission.planner, goal, run)},
+        replay_page);
   }
 }
 
@@ -247,8 +247,8 @@ void print_graph(const RobotNavigator& robot, Session& session) {
                      : "the memory's " + std::string(name_of(robot.origin()))));
 }
 
-/// Refuses goals without a known position: the robot is kidnapped in the middle of its path, so
-/// the path must be known.
+/// Throws FileError if the goal's position is unknown. --kidnap needs it to find the middle of the
+/// path.
 void require_known_goal(const NavigateArguments& arguments, const RobotNavigator& robot,
                         const simulation::RememberedPlace& remembered) {
   if (!std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
@@ -277,10 +277,10 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
   const simulation::RememberedPlace remembered = simulation::make_remembered_place(robot);
   if (arguments.kidnap) require_known_goal(arguments, robot, remembered);
   if (arguments.report) prepare_report_folder(*arguments.report, "navigate");
-  viewer::RunPage played("", 100);
+  viewer::RunPage replay_page("", 100);
   RunRecord record(arguments.record, std::span(&arguments.memory, 1), false, session,
                    {.memory = arguments.memory, .takes = viewer::ViewerInput::goal});
-  if (arguments.report) record.copy_to(played);
+  if (arguments.report) record.copy_to(replay_page);
   MissionMoments moments(robot, remembered, arguments.mission.planner.field);
   simulation::ImageReport report;
   if (record.is_active()) {
@@ -312,8 +312,9 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
       },
       [&] { return set_goal_of_viewer(robot, remembered, record, session); });
   record.close();
-  const std::string goal_file = robot.info(robot.goal()).name;  // a viewer may have changed it
-  write_results(arguments, place, remembered, robot.goal(), goal_file, run, played);
+  const std::string goal_file =
+      robot.info(robot.goal()).name;  // a viewer may have changed the goal
+  write_results(arguments, place, remembered, robot.goal(), goal_file, run, replay_page);
   if (session.json()) {
     session.print(json_line(summary_json(arguments, robot, goal_file, mission.start, run)));
   } else {
@@ -357,7 +358,7 @@ Run declare_navigate(Arguments& arguments) {
   arguments.options("sensor", values->simulation.sensor);
   arguments.options("free_space", values->simulation.free_space);
   arguments.show_in_help({"--seed", "--light"});
-  require_effects(arguments, values->simulation);
+  reject_ineffective_options(arguments, values->simulation);
   arguments.reject_options_unless(
       {"[known_route]"}, [values] { return values->route.has_value(); }, "without --route");
   arguments.reject_options_unless(
@@ -372,7 +373,7 @@ Run declare_navigate(Arguments& arguments) {
       {"--fine"},
       [&homing] { return homing.strategy == HomingPursuitOptions::Strategy::coarse_to_fine; },
       "without --strategy coarse_to_fine");
-  arguments.writes({"--log", "--picture"});
+  arguments.declare_outputs({"--log", "--picture"});
   return [values, &arguments](Session& session) { return navigate(arguments, *values, session); };
 }
 

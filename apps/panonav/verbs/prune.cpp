@@ -24,7 +24,7 @@ ordered_json to_json(const std::optional<SparseSelection::Loss::Positions>& posi
           {"p95_after_m", positions->p95_after_m}};
 }
 
-/// Throws FileError when another program has changed the file since the selection.
+/// Throws FileError if another program has changed views or links since the memory was loaded.
 void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
   const auto views = memory.views();
   if (!std::ranges::equal(file.views(), views) || file.links().size() != memory.links().size()) {
@@ -33,21 +33,23 @@ void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
   }
 }
 
-/// Places are near each other by their positions, or by links where those are not known.
+/// Rejects options for positions if no view has one, and options for links if all views have
+/// positions.
 void reject_options_without_effect(const Arguments& arguments, const std::string& file,
                                    const VisualMemory& memory) {
-  const auto posed = std::ranges::count_if(
+  const auto with_position = std::ranges::count_if(
       memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
-  if (posed == 0) {
+  if (with_position == 0) {
     arguments.reject_options({"--reach-m", "--outdated-within-m"},
                              "as " + file + " contains no positions");
-  } else if (posed == std::ssize(memory.views())) {
+  } else if (with_position == std::ssize(memory.views())) {
     arguments.reject_options({"--reach-links"},
                              "as " + file + " contains the positions of all views");
   }
 }
 
-/// Prints how many views were kept and what the pruning costs.
+/// Prints how many views were kept and how much the distance or difference to the nearest view
+/// grows.
 void print_loss(const PruneArguments& arguments, const SparseSelection::Loss& loss,
                 std::size_t before, std::size_t kept, double factor, std::size_t outdated,
                 const std::vector<std::string>& names, Session& session) {

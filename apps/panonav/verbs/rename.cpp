@@ -22,13 +22,13 @@ ExitCode rename(const RenameArguments& arguments, Session& session) {
     former = memory.load({&view, 1}).info(view).name;
     return view;
   };
-  if (!arguments.route) (void)find();  // its name stands in what can be undone
+  if (!arguments.route) (void)find();  // finds the old name for the history
   memory.change(
       [&] {
         if (arguments.route) {
           memory.rename_route(arguments.name, arguments.new_name);
         } else {
-          // A recording that knows the view by its former name is compared again.
+          // Makes recordings that contain the old name be compared again.
           forget_recordings(memory);
           memory.rename(find(), arguments.new_name);
         }

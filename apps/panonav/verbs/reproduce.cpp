@@ -61,9 +61,9 @@ std::string format_defaults(const auto& option) {
 
 /// Formats the meaning of an option for each paper that has it, with its default.
 std::string format_meanings(int lab::ReproductionOptions::*option,
-                            std::initializer_list<std::pair<std::string, std::string>> of_papers) {
+                            std::initializer_list<std::pair<std::string, std::string>> meanings) {
   std::string text;
-  for (const auto& [papers, meaning] : of_papers) {
+  for (const auto& [papers, meaning] : meanings) {
     const std::string last = papers.substr(papers.find_last_of(' ') + 1);
     text += (text.empty() ? "" : "; ") + papers + ": " + meaning +
             " (default: " + std::to_string(lab::default_options(last).*option) + ")";
@@ -113,7 +113,7 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
                    "m03: run only this part of the experiments (default: all parts)");
   arguments.hide_from_help({"--queries", "--rows", "--only"});
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   return [values](Session& session) { return reproduce(*values, session); };
 }
 

@@ -28,31 +28,32 @@ std::string parameter_name(const ArgumentInfo& info) {
   return name;
 }
 
-/// The word behind a flag, or the flag's initial value.
+/// Returns the word after a flag, or the default value of the flag.
 std::string find_value_or_initial(std::span<const std::string> words,
                                   std::span<const ArgumentInfo> infos, const std::string& flag) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (words[i] == flag && i + 1 < words.size()) return words[i + 1];
     if (words[i].starts_with(flag + "=")) return words[i].substr(flag.size() + 1);
   }
-  return std::ranges::find(infos, flag, &ArgumentInfo::name)->initial;
+  return std::ranges::find(infos, flag, &ArgumentInfo::name)->default_value;
 }
 
-/// Converts the arguments of `ros2 run` and launch files: parameters become options.
+/// Converts the arguments of `ros2 run` and launch files to those of the command line: parameters
+/// become options.
 std::vector<std::string> translate_ros_arguments(std::span<const std::string> typed,
                                                  std::span<const ArgumentInfo> infos) {
-  const auto read =
+  const auto ros_arguments =
       ros2::read_ros_arguments(typed, find_value_or_initial(typed, infos, "--node-name"),
                                find_value_or_initial(typed, infos, "--namespace"));
-  std::vector<std::string> words = read.words;
+  std::vector<std::string> words = ros_arguments.words;
   const auto is_typed = [&](const std::string& flag) {
-    return std::ranges::any_of(read.words, [&](const std::string& word) {
+    return std::ranges::any_of(ros_arguments.words, [&](const std::string& word) {
       return word == flag || word.starts_with(flag + "=");
     });
   };
   std::vector<std::string> names;
   for (const auto& info : infos) names.push_back(parameter_name(info));
-  for (const auto& [name, values, where] : read.parameters) {
+  for (const auto& [name, values, where] : ros_arguments.parameters) {
     const auto found = std::ranges::find(names, name);
     if (found == names.end()) {
       const std::vector<std::string_view> known(names.begin(), names.end());
@@ -62,7 +63,7 @@ std::vector<std::string> translate_ros_arguments(std::span<const std::string> ty
     const auto& info = infos[static_cast<std::size_t>(found - names.begin())];
     if (info.name == "MEMORY") {
       const bool has_memory = std::ranges::any_of(
-          read.words, [](const std::string& word) { return word.ends_with(".panonav"); });
+          ros_arguments.words, [](const std::string& word) { return word.ends_with(".panonav"); });
       if (!has_memory) words.insert(words.begin(), values.begin(), values.end());
     } else if (info.positional()) {
       words.insert(words.end(), values.begin(), values.end());
@@ -79,7 +80,7 @@ std::vector<std::string> translate_ros_arguments(std::span<const std::string> ty
       words.insert(words.end(), values.begin(), values.end());
     }
   }
-  for (const auto& [from, to] : read.remappings) {
+  for (const auto& [from, to] : ros_arguments.remappings) {
     if (from == "__node" || from == "__ns") {
       const std::string flag = from == "__node" ? "--node-name" : "--namespace";
       if (is_typed(flag)) throw UsageError(flag + " and " + from + " cannot be combined");
@@ -99,7 +100,7 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
     arguments.setup.participant.remappings.insert_or_assign(from, to);
   }
   if (arguments.teach) {
-    const auto pictures = picture_source(arguments.pictures);
+    const auto pictures = make_picture_source(arguments.pictures);
     if (!pictures) throw UsageError("set --kind to the type of the images");
     arguments.setup.teacher = arguments.teacher;
     arguments.setup.teacher->pictures = *pictures;

@@ -124,7 +124,7 @@ void write_fixes(const std::string& path, const std::vector<FollowedImage>& imag
 ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments, Session& session) {
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   const Dataset run =
-      read_run(arguments.dataset, arguments.topics, arguments.part, memory, session);
+      open_run(arguments.dataset, arguments.topics, arguments.part, memory, session);
   if (odometry_poses(run).empty()) {
     declared.reject_options({"--recovery-m", "--surprise-m"},
                             "as " + arguments.dataset + " has no odometry");
@@ -134,7 +134,7 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
                           .tracker = arguments.tracker,
                           .fit = arguments.fit,
                           .use_odometry = !arguments.no_odometry && !odometry_poses(run).empty()});
-  // A route in its odometry's frame has nothing that a data set's poses could be compared with.
+  // The poses of a data set are no ground truth for a route in the frame of its odometry.
   const auto truth = follower.source().from_odometry ? std::vector<Pose2>{} : dataset_poses(run);
   const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
   std::vector<double> seconds;
@@ -145,19 +145,19 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   Progress progress(session, "following", (run.entries.size() - 1) / arguments.every + 1);
   RunRecord record(arguments.record, std::array{arguments.dataset, arguments.memory}, false,
                    session, {});
-  std::optional<PanoramaReader> recorded;
-  if (record.is_active() || arguments.report) recorded.emplace(run.source, PanoramaShape{});
-  viewer::RunPage played("",
-                         (run.entries.size() - 1) / static_cast<std::size_t>(arguments.every) + 1);
-  follow(follower, run, truth, arguments.every, recorded ? &*recorded : nullptr, session.executor(),
-         [&](FollowedImage&& image) {
+  std::optional<PanoramaReader> panorama_reader;
+  if (record.is_active() || arguments.report) panorama_reader.emplace(run.source, PanoramaShape{});
+  viewer::RunPage replay_page(
+      "", (run.entries.size() - 1) / static_cast<std::size_t>(arguments.every) + 1);
+  follow(follower, run, truth, arguments.every, panorama_reader ? &*panorama_reader : nullptr,
+         session.executor(), [&](FollowedImage&& image) {
            progress.clear();
            session.print(session.json() ? json_line(to_json(image, headings_known))
                                         : format_line(image, session));
            if (arguments.report) {
              recordings::RunMoment moment = *image.moment;
              moment.values.insert(moment.values.begin(), {"image", image.file});
-             played.add(moment);
+             replay_page.add(moment);
            }
            if (image.moment) record.add(std::move(*image.moment));
            image.moment.reset();
@@ -173,7 +173,7 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   if (arguments.report) {
     const auto panorama = memory.route(follower.name());
     write_follow_report(*arguments.report, {follower.name(), *panorama, follower.tracker().lines()},
-                        images, summary, std::move(played));
+                        images, summary, std::move(replay_page));
     print_report_path(*arguments.report, session);
   }
   return summary.on_route > 0 ? ExitCode::done : ExitCode::no_answer;
@@ -207,7 +207,7 @@ Run declare_route_follow(Arguments& arguments) {
       "with --no-odometry");
   arguments.reject_options_unless(
       {"--coarse-deg"}, [values] { return values->fit.levels > 1; }, "with --levels 1");
-  arguments.writes({"--tum"});
+  arguments.declare_outputs({"--tum"});
   return [values, &arguments](Session& session) { return follow_run(arguments, *values, session); };
 }
 

@@ -34,7 +34,7 @@ struct RecordArguments {
   HorizonScanlineOptions line;
 };
 
-/// "17-20".
+/// Parses rows such as "17-20". Throws UsageError.
 std::pair<int, int> parse_rows(const std::string& text) {
   const auto dash = text.find('-');
   const auto number = [&](const std::string& part) {
@@ -50,7 +50,8 @@ std::pair<int, int> parse_rows(const std::string& text) {
                    "'; allowed: FIRST-LAST, rows from 0 at the top, such as 17-20");
 }
 
-/// The poses to remember and the frame that they are in.
+/// Returns the poses of the data set, or of its odometry, and sets `from_odometry`. Throws
+/// FileError if there are none.
 std::vector<Pose2> choose_poses(const RecordArguments& arguments, const Dataset& dataset,
                                 bool& from_odometry, Session& session) {
   from_odometry = false;
@@ -86,7 +87,8 @@ std::string format_rows(const std::optional<std::pair<int, int>>& rows) {
   return rows ? std::to_string(rows->first) + "-" + std::to_string(rows->second) : "none";
 }
 
-/// Sets the options of the route's lines; an existing route keeps its own.
+/// Sets the options of the route's lines. Throws ContractError if they differ from those of an
+/// existing route.
 void set_line_options(const Arguments& declared, const RecordArguments& arguments,
                       const PictureSource& pictures, const std::optional<MemoryFile>& memory,
                       RouteRecorderOptions& options) {
@@ -100,13 +102,13 @@ void set_line_options(const Arguments& declared, const RecordArguments& argument
     options.line = arguments.line;
     return;
   }
-  const RouteSource before = read_route_source(*memory, arguments.name, route->columns());
-  const std::string as = ", as the route '" + arguments.name + "' in " + arguments.memory +
-                         " was recorded; leave it out or choose another --name";
-  declared.require_same("line", arguments.line, before.line, as);
-  if (options.horizon_rows && options.horizon_rows != before.horizon_rows) {
+  const RouteSource stored = read_route_source(*memory, arguments.name, route->columns());
+  const std::string message_end = ", as the route '" + arguments.name + "' in " + arguments.memory +
+                                  " was recorded; leave it out or choose another --name";
+  declared.require_same("line", arguments.line, stored.line, message_end);
+  if (options.horizon_rows && options.horizon_rows != stored.horizon_rows) {
     throw ContractError("--horizon-rows", *arguments.horizon_rows,
-                        format_rows(before.horizon_rows) + as);
+                        format_rows(stored.horizon_rows) + message_end);
   }
 }
 
@@ -125,7 +127,7 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   set_line_options(declared, arguments, dataset.source, memory, options);
   const auto poses = choose_poses(arguments, dataset, options.odometry, session);
   if (arguments.report) prepare_report_folder(*arguments.report, "route record");
-  // Views can be memorised into a new file later; what they need of the pictures is known now.
+  // Sets the image layout of a new file now, so that views can be memorised into it later.
   RouteRecorder recorder(
       memory ? std::move(*memory)
              : MemoryFile::create(arguments.memory,

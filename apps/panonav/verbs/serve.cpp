@@ -24,7 +24,7 @@ struct ServeArguments {
   LocaliserOptions localiser;
 };
 
-/// Parses "office=/data/monday.panonav", or a file whose name becomes the memory's.
+/// Parses "office=/data/monday.panonav". Without a name, the memory gets the name of its file.
 server::ServedMemory parse_served_memory(const std::string& text) {
   const std::size_t equals = text.find('=');
   const bool named = equals != std::string::npos && text.find('/') > equals;
@@ -32,7 +32,7 @@ server::ServedMemory parse_served_memory(const std::string& text) {
   return {std::filesystem::path(memory_name(text)).stem().string(), text};
 }
 
-/// The first line of the file.
+/// Returns the first line of the file. Throws FileError unless it is a valid token.
 std::string read_token(const std::string& path) {
   std::ifstream file(path);
   if (!file) throw FileError(path, "no such file, or it cannot be opened");
@@ -60,10 +60,10 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
     stopped = true;
     stop_requested.notify_all();
   });
-  const ListeningPlace place = parse_listening_address("--listen", arguments.listen);
+  const ListeningAddress listening = parse_listening_address("--listen", arguments.listen);
   server::LocalisationServerOptions options;
-  options.address = place.address;
-  options.port = place.port;
+  options.address = listening.address;
+  options.port = listening.port;
   options.threads = session.executor().threads();
   options.max_waiting = static_cast<std::size_t>(arguments.max_waiting);
   options.max_held_views = static_cast<std::size_t>(arguments.max_held_views);
@@ -79,12 +79,12 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
   if (std::ranges::none_of(memories, is_server_address, &server::ServedMemory::path)) {
     declared.reject_options({"--max-held-views"}, "if all memories are files");
   }
-  if (!place.is_local() && options.token.empty()) {
-    session.note("warning: everybody who can reach " + place.address +
+  if (!listening.is_local() && options.token.empty()) {
+    session.note("warning: everybody who can reach " + listening.address +
                  " gets answers and can see thumbnails; with --token-file FILE only clients with a "
                  "token get answers");
   }
-  set_reply_timeout(std::chrono::seconds(5));  // clients wait
+  set_reply_timeout(std::chrono::seconds(5));  // the default is too long, as clients wait
   const server::LocalisationServer server(memories, options);
   std::unique_lock lock(mutex);
   if (session.json()) {

@@ -11,7 +11,7 @@ namespace panonav::command {
 
 namespace {
 
-constexpr int nearest = 5;
+constexpr int max_listed_views = 5;
 
 struct ShowArguments {
   std::string memory;
@@ -19,8 +19,9 @@ struct ShowArguments {
   std::optional<std::string> thumbnail;
 };
 
-/// Another view as seen from the one that is shown.
-ordered_json describe_neighbour(const VisualMemory& memory, ViewId view, ViewId other) {
+/// Returns id, name and distance of another view as JSON; the distance is null if a position is
+/// unknown.
+ordered_json neighbour_json(const VisualMemory& memory, ViewId view, ViewId other) {
   const auto& here = memory.info(view).pose;
   const auto& there = memory.info(other).pose;
   ordered_json json{
@@ -34,24 +35,24 @@ ordered_json list_links(const VisualMemory& memory, ViewId view) {
   auto links = ordered_json::array();
   for (const Link& link : memory.links()) {
     if (link.a != view && link.b != view) continue;
-    links.push_back(describe_neighbour(memory, view, link.a == view ? link.b : link.a));
+    links.push_back(neighbour_json(memory, view, link.a == view ? link.b : link.a));
     links.back()["kind"] = kinds[static_cast<std::size_t>(link.kind)];
   }
   return links;
 }
 
-ordered_json find_similar(const VisualMemory& memory, ViewId view) {
+ordered_json find_similar_views(const VisualMemory& memory, ViewId view) {
   auto similar = ordered_json::array();
   const auto found =
-      memory.search(memory.packed(view), {.top = nearest}, {.excluded_views = {&view, 1}});
+      memory.search(memory.packed(view), {.top = max_listed_views}, {.excluded_views = {&view, 1}});
   for (const Match& match : found.matches) {
-    similar.push_back(describe_neighbour(memory, view, match.view));
+    similar.push_back(neighbour_json(memory, view, match.view));
     similar.back()["dissimilarity"] = match.dissimilarity;
   }
   return similar;
 }
 
-ordered_json find_near(const VisualMemory& memory, ViewId view) {
+ordered_json find_nearest_views(const VisualMemory& memory, ViewId view) {
   std::vector<std::pair<double, ViewId>> near;
   const auto& pose = memory.info(view).pose;
   for (const ViewId other : memory.views()) {
@@ -62,8 +63,8 @@ ordered_json find_near(const VisualMemory& memory, ViewId view) {
   }
   std::ranges::sort(near);
   auto list = ordered_json::array();
-  for (std::size_t i = 0; i < std::min<std::size_t>(near.size(), nearest); ++i) {
-    list.push_back(describe_neighbour(memory, view, near[i].second));
+  for (std::size_t i = 0; i < std::min<std::size_t>(near.size(), max_listed_views); ++i) {
+    list.push_back(neighbour_json(memory, view, near[i].second));
   }
   return list;
 }
@@ -145,8 +146,8 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
                      {"signature_bytes", 2 * file.header().shape.size()},
                      {"thumbnail", nullptr},
                      {"links", list_links(memory, view)},
-                     {"similar", find_similar(memory, view)},
-                     {"near", find_near(memory, view)},
+                     {"similar", find_similar_views(memory, view)},
+                     {"near", find_nearest_views(memory, view)},
                      {"maps", find_maps(file, view)}};
   const auto bytes = file.thumbnail(view);
   if (!bytes && arguments.thumbnail) {
@@ -181,7 +182,7 @@ Run declare_show(Arguments& arguments) {
   arguments.positional("VIEW", values->view, "Name or id of a view");
   arguments.option("-o,--thumbnail FILE", values->thumbnail,
                    "Write the thumbnail of the view into this PNG file");
-  arguments.writes({"--thumbnail"});
+  arguments.declare_outputs({"--thumbnail"});
   return [values](Session& session) { return show(*values, session); };
 }
 

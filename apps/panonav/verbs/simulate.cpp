@@ -28,9 +28,9 @@ struct SimulateArguments {
   Ros2Robot robot;
 };
 
-/// --grid, --random and --trajectory each say all of the way; with the options of [recording] they
-/// would contradict.
-void apply_shorthands(const Arguments& declared, SimulateArguments& arguments) {
+/// Sets the path for --grid or --random and the default heading. Throws UsageError if several of
+/// --grid, --random, --trajectory and --path are set.
+void apply_path_options(const Arguments& declared, SimulateArguments& arguments) {
   const int path_count =
       (arguments.grid_m ? 1 : 0) + (arguments.random ? 1 : 0) + (arguments.trajectory ? 1 : 0);
   if (path_count > 1 || (path_count == 1 && declared.is_set("recording", "path"))) {
@@ -38,7 +38,8 @@ void apply_shorthands(const Arguments& declared, SimulateArguments& arguments) {
   }
   auto& recording = arguments.simulation.recording;
   if (arguments.grid_m) {
-    if (!(*arguments.grid_m >= 0.001 && *arguments.grid_m <= 1000.0)) {  // as --spacing-m
+    if (!(*arguments.grid_m >= 0.001 &&
+          *arguments.grid_m <= 1000.0)) {  // same range as --spacing-m
       throw UsageError("--grid is " + to_text(*arguments.grid_m) +
                        "; allowed: 0.001 to 1000 metres");
     }
@@ -92,7 +93,7 @@ ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Sessio
                                     : "one folder OUT for the data set is required");
   }
   const std::string out = arguments.ros2 ? "" : arguments.out.front();
-  apply_shorthands(declared, arguments);
+  apply_path_options(declared, arguments);
   if (!arguments.ros2) require_new_folder(out);
   const simulation::SimulatedWorld world(arguments.scene, arguments.simulation,
                                          make_option_lookup(declared), session.executor());
@@ -182,7 +183,7 @@ Run declare_simulate_verb(Arguments& arguments) {
                          path() == simulation::RecordingPath::zigzag;
       },
       "without --heading fixed");
-  arguments.writes({"OUT"});
+  arguments.declare_outputs({"OUT"});
   return [values, &arguments](Session& session) { return simulate(arguments, *values, session); };
 }
 

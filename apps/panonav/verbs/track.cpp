@@ -21,7 +21,8 @@ namespace panonav::command {
 
 namespace {
 
-/// Uncertainty of the start pose. The defaults are for a robot put down by hand on a mark.
+/// Standard deviations of the start pose. The defaults are for a robot that was placed on a mark by
+/// hand.
 struct StartOptions {
   double deviation_m = 0.1;
   double heading_deviation_deg = 5.0;
@@ -181,34 +182,36 @@ ExitCode to_exit_code(const TrackSummary& summary) {
 
 /// Restarts the tracker at the pose that a viewer has set; false if none did.
 bool start_at_viewer_pose(Tracker& tracker, RunRecord& record) {
-  // A finger on a map, and an arrow beside it.
+  // Chosen for a click on a map and an arrow drawn next to it.
   constexpr double deviation_m = 0.3;
   constexpr double heading_deviation_deg = 20.0;
-  constexpr double any_heading_deg = 180.0;
-  const auto wish = record.take_viewer_input();
-  if (!wish) return false;
-  const double heading_rad = wrap_angle(wish->heading_rad.value_or(0.0));
-  tracker.start_at({wish->x_m, wish->y_m, heading_rad}, deviation_m,
-                   radians(wish->heading_rad ? heading_deviation_deg : any_heading_deg));
+  constexpr double unknown_heading_deviation_deg = 180.0;
+  const auto clicked = record.take_viewer_input();
+  if (!clicked) return false;
+  const double heading_rad = wrap_angle(clicked->heading_rad.value_or(0.0));
+  tracker.start_at(
+      {clicked->x_m, clicked->y_m, heading_rad}, deviation_m,
+      radians(clicked->heading_rad ? heading_deviation_deg : unknown_heading_deviation_deg));
   return true;
 }
 
-/// `visual`: the motion is read from the images.
+/// `uses_visual_odometry`: the motion is read from the images.
 TrackerOptions make_tracker_options(const Arguments& declared, const TrackArguments& arguments,
-                                    const PictureSource& source, bool visual) {
-  TrackerOptions options{
-      arguments.filter,
-      visual && !declared.is_set("odometry") ? visual_odometry_noise() : arguments.odometry,
-      source};
-  // These use all views of the memory, whatever its size.
-  if (visual || arguments.report || arguments.record.file || arguments.record.view) {
+                                    const PictureSource& source, bool uses_visual_odometry) {
+  TrackerOptions options{arguments.filter,
+                         uses_visual_odometry && !declared.is_set("odometry")
+                             ? visual_odometry_noise()
+                             : arguments.odometry,
+                         source};
+  // Visual odometry, reports and records need all views of the memory, so all are loaded.
+  if (uses_visual_odometry || arguments.report || arguments.record.file || arguments.record.view) {
     options.max_held_views = std::numeric_limits<std::size_t>::max();
   }
   return options;
 }
 
-/// Follows a robot through images of a live source, which has no odometry: motion is read from the
-/// images.
+/// Tracks a robot with images of a live source. Motion is computed from the images, as live sources
+/// have no odometry.
 class LiveTrack {
  public:
   LiveTrack(const Arguments& declared, const TrackArguments& arguments, const MemoryFile& file,
@@ -223,11 +226,11 @@ class LiveTrack {
                  format_number(odometry_.scale_m()) + " m, as in the memory");
     set_start(tracker_, arguments);
     if (record_.is_active()) shown_.emplace(tracker_.memory());
-    settings_ = {.recorded = &file, .shown = shown_ ? &*shown_ : nullptr};
+    settings_ = {.thumbnail_file = &file, .shown_references = shown_ ? &*shown_ : nullptr};
   }
 
-  /// Moves the tracker by the image's motion and localises every N-th image; returns the line to
-  /// print.
+  /// Moves the tracker by the motion since the image before and localises every N-th image. Returns
+  /// the line to print.
   std::string observe(const Observation& observation, std::optional<double> decoding_ms) {
     const std::size_t number = count_++;
     const ViewEncoder& encoder = tracker_.encoder();
@@ -242,7 +245,7 @@ class LiveTrack {
     odometry_.add(OdometryView(view));
     tracker_.move_to(odometry_.pose());
     clock.stage("visual odometry");
-    const bool moved_by_hand = start_at_viewer_pose(tracker_, record_);
+    const bool is_set_by_viewer = start_at_viewer_pose(tracker_, record_);
     if (number % static_cast<std::size_t>(arguments_.every) != 0) return "";
     if (record_.is_active()) {
       moment_ = record_.make_moment(observation, number);
@@ -254,18 +257,18 @@ class LiveTrack {
     TrackedImage image = track_image(tracker_, pack(view, encoder.header().full_scale), settings_,
                                      std::move(moment_));
     moment_ = std::move(image.moment);
-    if (moment_ && moved_by_hand) note_viewer_pose(*moment_);
+    if (moment_ && is_set_by_viewer) note_viewer_pose(*moment_);
     image.index = number;
     image.file = observation.name;
     image.stamp_s = observation.stamp_s;
     add(summary_, image);
-    const bool later = trajectory_.empty() || trajectory_.back().stamp_s < *observation.stamp_s;
-    if (arguments_.tum && is_localised(image) && later) {
+    const bool is_later = trajectory_.empty() || trajectory_.back().stamp_s < *observation.stamp_s;
+    if (arguments_.tum && is_localised(image) && is_later) {
       trajectory_.push_back({*observation.stamp_s, *image.estimate.pose});
     }
     return session_.json() ? json_line(to_json(image)) : format_line(image, session_);
   }
-  /// Records the image that was observed last.
+  /// Adds the last observed image to the record.
   void record() {
     if (moment_) record_.add(std::move(*moment_));
     moment_.reset();
@@ -289,7 +292,7 @@ class LiveTrack {
   RunRecord record_;
   std::optional<ShownReferences> shown_;
   TrackSettings settings_;
-  std::optional<recordings::RunMoment> moment_;  // of the image observed last
+  std::optional<recordings::RunMoment> moment_;  // moment of the last observed image
   std::size_t count_ = 0;
   TrackSummary summary_;
   std::vector<StampedPose> trajectory_;
@@ -310,9 +313,9 @@ ExitCode track_live(const Arguments& declared, const TrackArguments& arguments,
   return track.finish(loop);
 }
 
-/// Writes the poses of the images at which the robot was localised; `seconds` are stamps of all.
-void write_localised(const std::string& path, const std::vector<TrackedImage>& images,
-                     const std::vector<double>& seconds) {
+/// Writes the poses of localised images. `seconds` are the stamps of all images.
+void write_localised_poses(const std::string& path, const std::vector<TrackedImage>& images,
+                           const std::vector<double>& seconds) {
   std::vector<StampedPose> trajectory;
   for (const TrackedImage& image : images) {
     if (is_localised(image)) trajectory.push_back({seconds[image.index], *image.estimate.pose});
@@ -320,8 +323,9 @@ void write_localised(const std::string& path, const std::vector<TrackedImage>& i
   write_trajectory(path, trajectory);
 }
 
-/// Adds the odometry that the pictures themselves show, and says so.
-void read_motion(Dataset& run, const std::string& name, const Tracker& tracker, Session& session) {
+/// Adds odometry that is computed from the images, and prints a note.
+void estimate_odometry(Dataset& run, const std::string& name, const Tracker& tracker,
+                       Session& session) {
   session.note("panonav track: " + to_readable_line(name) +
                " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is computed "
                "from the images, " +
@@ -333,36 +337,37 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
   if (recordings::is_live(arguments.dataset)) return track_live(declared, arguments, file, session);
   reject_live_options(declared, arguments.dataset, true);
-  Dataset run = read_run(arguments.dataset, arguments.topics, arguments.part, file, session);
-  const bool visual = odometry_poses(run).empty();
+  Dataset run = open_run(arguments.dataset, arguments.topics, arguments.part, file, session);
+  const bool uses_visual_odometry = odometry_poses(run).empty();
   std::vector<double> seconds;
   if (arguments.tum)
     seconds = trajectory_stamps(run, "track", arguments.dataset, *arguments.tum, session);
-  Tracker tracker(arguments.memory, make_tracker_options(declared, arguments, run.source, visual));
-  if (visual) read_motion(run, arguments.dataset, tracker, session);
+  Tracker tracker(arguments.memory,
+                  make_tracker_options(declared, arguments, run.source, uses_visual_odometry));
+  if (uses_visual_odometry) estimate_odometry(run, arguments.dataset, tracker, session);
   set_start(tracker, arguments);
   TrackSettings settings{.every = arguments.every};
   if (arguments.report) {
     prepare_report_folder(*arguments.report, "track");
-    settings.particles_kept = count_shown_particles(run.entries.size());
+    settings.particles_per_image = count_shown_particles(run.entries.size());
   }
 
   RunRecord record(arguments.record, std::array{arguments.dataset, arguments.memory}, false,
                    session, {.memory = arguments.memory, .takes = viewer::ViewerInput::pose});
   const std::size_t image_count = (run.entries.size() - 1) / settings.every + 1;
-  std::optional<ShownReferences> shown;
+  std::optional<ShownReferences> shown_references;
   if (record.is_active() || arguments.report) {
-    settings.recorded = &file;
-    settings.shown = &shown.emplace(tracker.memory());
+    settings.thumbnail_file = &file;
+    settings.shown_references = &shown_references.emplace(tracker.memory());
     settings.has_viewer_input = [&] { return start_at_viewer_pose(tracker, record); };
   }
-  viewer::RunPage played("panonav track: " + to_readable_line(arguments.dataset), image_count);
+  viewer::RunPage replay_page("panonav track: " + to_readable_line(arguments.dataset), image_count);
   std::vector<TrackedImage> images;
   Progress progress(session, "tracking", image_count);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
     session.print(session.json() ? json_line(to_json(image)) : format_line(image, session));
-    if (arguments.report) add(played, image);
+    if (arguments.report) add(replay_page, image);
     if (record.is_active()) record.add(std::move(*image.moment));
     image.moment.reset();
     images.push_back(std::move(image));
@@ -371,12 +376,12 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   progress.clear();
   record.close();
 
-  if (arguments.tum) write_localised(*arguments.tum, images, seconds);
+  if (arguments.tum) write_localised_poses(*arguments.tum, images, seconds);
   const TrackSummary summary = summarise_track(images);
   if (!session.json()) print_summary(summary, session);
   if (arguments.report) {
     write_track_report(*arguments.report, tracker.memory(), tracker.localiser().model().spacing_m,
-                       images, summary, played);
+                       images, summary, replay_page);
     print_report_path(*arguments.report, session);
   }
   return to_exit_code(summary);
@@ -409,7 +414,7 @@ Run declare_track(Arguments& arguments) {
   arguments.options("monte_carlo", values->filter);
   arguments.options("odometry", values->odometry, "odometry");
   arguments.show_in_help({"--seed"});
-  arguments.writes({"--tum"});
+  arguments.declare_outputs({"--tum"});
   return [values, &arguments](Session& session) { return track_run(arguments, *values, session); };
 }
 

@@ -46,7 +46,7 @@ std::string format_line(const Panorama& panorama) {
   return text;
 }
 
-/// Its name in the folder of panoramas: "morning/view_1.jpg" becomes "morning_view_1.png".
+/// Returns the file name of a panorama: "morning/view_1.jpg" becomes "morning_view_1.png".
 std::string panorama_name(const std::string& file) {
   std::string name = file;
   for (const char* ending : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
@@ -101,7 +101,7 @@ ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Ses
   if (fs::exists(input)) {
     declared.reject_options(recording_flags(), "as " + input + " is one image");
   }
-  auto source = picture_source(arguments.pictures);
+  auto source = make_picture_source(arguments.pictures);
   if (!source) {
     throw UsageError(
         "set the type of the image: --camera camera.toml for a mirror, or --kind equirectangular");
@@ -132,7 +132,7 @@ Run declare_unwrap(Arguments& arguments) {
   declare_pictures(arguments, values->pictures);
   arguments.options("unwarper", values->unwarper);
   arguments.show_in_help({"--rows", "--columns"});
-  arguments.writes({"--out"});
+  arguments.declare_outputs({"--out"});
   return [values, &arguments](Session& session) { return unwrap(arguments, *values, session); };
 }
 

@@ -49,7 +49,7 @@ void write_all(int descriptor, std::span<const std::uint8_t> bytes, const fs::pa
   }
 }
 
-// Returns the file that all symbolic links end at.
+// Returns the file that a symbolic link points to in the end; `path` itself if it is no link.
 fs::path resolve_links(const fs::path& path) {
   std::error_code code;
   if (!fs::is_symlink(fs::symlink_status(path, code))) return path;
@@ -99,7 +99,8 @@ std::vector<std::uint8_t> read_file(const fs::path& path, std::size_t limit_byte
   }
   if (S_ISDIR(status.st_mode)) throw FileError(path.string(), "is a folder; allowed: a file");
 
-  // The size that the system reports is a first guess only: pipes have none and files may grow.
+  // The size that the system reports is only a first guess, because pipes have none and files may
+  // grow.
   std::vector<std::uint8_t> bytes;
   std::size_t filled = 0;
   const auto guess = static_cast<std::size_t>(status.st_size > 0 ? status.st_size : 0);

@@ -9,16 +9,17 @@
 
 namespace panonav {
 
-/// Writes a file that appears whole or not at all: the bytes go to a temporary file in the same
-/// folder, which takes the name `path` only when every byte is on the disk. An existing file is
-/// replaced, a symbolic link keeps pointing at the file that is replaced. Something that is not a
-/// regular file (a pipe, /dev/stdout) is written to directly. Throws FileError; whatever was at
-/// `path` is then still there.
+/// Writes a file completely or not at all: the bytes go to a temporary file in the same folder,
+/// which is renamed to `path` once all bytes are on the disk. An existing file is replaced; a
+/// symbolic link stays, and the file that it points to is replaced. Something that is not a regular
+/// file (a pipe, /dev/stdout) is written to directly. Throws FileError; an existing file at `path`
+/// is then unchanged.
 void write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
-/// Writes the bytes of a text; no line end is added.
+/// Writes the bytes of a text, without adding an end of line.
 void write_file(const std::filesystem::path& path, std::string_view text);
 
-/// All bytes of a file. Throws FileError when it cannot be read or is larger than `limit_bytes`.
+/// Reads all bytes of a file. Throws FileError when it cannot be read or is larger than
+/// `limit_bytes`.
 [[nodiscard]] std::vector<std::uint8_t> read_file(const std::filesystem::path& path,
                                                   std::size_t limit_bytes);
 

@@ -75,7 +75,7 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
   return source;
 }
 
-// A data set comes from anybody: its table names files of its own folder alone.
+// Data sets may come from strangers, so their tables may only name files in their own folder.
 bool is_inside_folder(const std::string& name) {
   const fs::path path(name);
   return path.is_relative() && *path.lexically_normal().begin() != "..";
@@ -90,7 +90,7 @@ void require_picture(const fs::path& table, const DatasetEntry& entry) {
   }
 }
 
-// Columns that belong together are given all or not at all.
+// True if all of these columns exist, false if none do; throws FileError if only some do.
 bool has_all_or_none(const CsvTable& table, const fs::path& path,
                      std::initializer_list<std::string_view> names) {
   std::size_t found = 0;
@@ -182,7 +182,7 @@ bool is_picture(const fs::path& path) {
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 
-// Digits compare as numbers, everything else letter by letter.
+// Compares digits as numbers, and all other text character by character.
 bool is_naturally_less(const std::string& a, const std::string& b) {
   const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
   std::size_t i = 0;
@@ -208,7 +208,7 @@ bool is_naturally_less(const std::string& a, const std::string& b) {
       ++j;
     }
   }
-  if (i == a.size() && j == b.size()) return a < b;  // differ in leading zeros at most
+  if (i == a.size() && j == b.size()) return a < b;  // equal but for leading zeros
   return i == a.size();
 }
 
@@ -259,7 +259,7 @@ constexpr std::array<EntryField, 5> entry_fields{{
     {"roll_deg", &Dataset::Fields::tilts, [](const auto& e) { return e.tilt.has_value(); }},
 }};
 
-/// Throws ContractError where some entries have a value and others have not.
+/// Throws ContractError if only some of the entries have a field.
 void require_whole_fields(const std::vector<DatasetEntry>& entries) {
   require(!entries.empty(), "number of images", 0.0, ">= 1");
   const auto all = static_cast<std::ptrdiff_t>(entries.size());
@@ -304,7 +304,7 @@ std::string format_table(const std::vector<DatasetEntry>& entries, const Dataset
   return table;
 }
 
-/// Returns the section [images]; the camera of a mirror is written into a file of its own.
+/// Returns the section [images]; writes the camera of mirror pictures to camera.toml.
 std::string format_images_section(const Dataset& dataset) {
   const PictureSource& source = dataset.source;
   std::string text = "[images]\nkind = \"" +

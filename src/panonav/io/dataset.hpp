@@ -16,14 +16,15 @@
 
 namespace panonav {
 
-/// A store of pictures that are not files of their own: those of a video, of a recording of topics.
+/// A store of pictures that have no files of their own, such as those of a video or a recording of
+/// topics.
 class PictureStore {
  public:
   virtual ~PictureStore() = default;
-  /// Reads the picture of this number. Several threads may call at a time; in ascending order it
-  /// costs least. Throws FileError.
+  /// Reads the picture of this number. Several threads may call at a time; reading in ascending
+  /// order is fastest. Throws FileError.
   [[nodiscard]] virtual Image read(std::size_t index) const = 0;
-  /// Returns the recorded JPEG or PNG; nullopt if there is none.
+  /// Returns the recorded JPEG or PNG file of a picture; nullopt if there is none.
   [[nodiscard]] virtual std::optional<std::vector<std::uint8_t>> encoded(
       std::size_t /*index*/) const {
     return std::nullopt;
@@ -32,14 +33,14 @@ class PictureStore {
 
 /// One picture of a data set with its stamp, poses and tilt.
 struct DatasetEntry {
-  std::string file;            ///< as the data set names it, relative to its folder; unique
-  std::filesystem::path path;  ///< where it lies: its own file, or that of all pictures
+  std::string file;            ///< name relative to the data set's folder; unique
+  std::filesystem::path path;  ///< its own file, or that of all pictures
   /// Time of the image, in seconds on the recording's clock.
   std::optional<double> stamp_s;
   std::optional<ReferencePose> pose;  ///< in the world frame
   std::optional<Pose2> odometry;      ///< in the odometry frame
   std::optional<Tilt> tilt;           ///< as an inertial sensor measured it
-  /// Holds the picture; empty: `path` is the picture's own file.
+  /// Store that has the picture; null: the picture is the file `path`.
   std::shared_ptr<const PictureStore> store;
   std::size_t store_index = 0;  ///< number of the picture in `store`
   friend bool operator==(const DatasetEntry&, const DatasetEntry&) = default;
@@ -47,20 +48,19 @@ struct DatasetEntry {
 
 /// Reads the image from its own file or from its store. Throws FileError.
 [[nodiscard]] Image read_picture(const DatasetEntry& entry);
-/// Reads the picture as a JPEG or PNG: the bytes of its own file, or those of its store; else a new
+/// Returns the picture as JPEG or PNG: the bytes of its own file or of its store, otherwise a new
 /// PNG.
 [[nodiscard]] std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry);
 
-/// A recording: pictures in order, and how they become panoramic cylinders. Pictures are read when
-/// they are needed (PanoramaReader).
+/// A recording: pictures in order, and their layout, by which they become panoramas. Pictures are
+/// read when they are needed (PanoramaReader).
 struct Dataset {
-  /// Pictures of a recording that are read. Times are seconds from its first picture.
+  /// Selects the pictures of a recording that are used. Times are seconds from its first picture.
   struct Selection {
-    int every = 1;  ///< each n-th of those that the times leave
-    std::optional<double>
-        every_s;  ///< the first, then the next one that is at least this much later
-    std::optional<double> from_s;  ///< this moment included; empty: from the first
-    std::optional<double> to_s;    ///< this moment included
+    int every = 1;                  ///< each n-th of those that the times select
+    std::optional<double> every_s;  ///< seconds from one used picture to the next, at least
+    std::optional<double> from_s;   ///< inclusive; nullopt: from the first
+    std::optional<double> to_s;     ///< this moment included
 
     /// True if pictures need stamps to be selected.
     [[nodiscard]] bool by_time() const noexcept { return every_s || from_s || to_s; }
@@ -70,56 +70,56 @@ struct Dataset {
   struct Fields {
     bool stamps = false;     ///< `stamp_s`
     bool positions = false;  ///< `pose`
-    bool headings = false;   ///< of `pose`; true only with `positions`
+    bool headings = false;   ///< heading of `pose`; only with `positions`
     bool odometry = false;   ///< `odometry`
     bool tilts = false;      ///< `tilt`
   };
 
-  std::filesystem::path folder;       ///< that `file` names are relative to
-  PictureSource source;               ///< how all pictures lie
+  std::filesystem::path folder;       ///< folder of the names `file`
+  PictureSource source;               ///< layout of all pictures
   std::vector<DatasetEntry> entries;  ///< in the order in which they were taken
-  /// Of a folder of pictures: what lies in it and was left out, sorted; folders end in "/".
+  /// Other files and folders (with final "/") in a folder of pictures, which were left out; sorted.
   std::vector<std::string> left_out;
-  /// Warnings of the reader: what was left out, guessed or missing, a line each.
+  /// Warnings of the reader about things left out, guessed or missing, one line each.
   std::vector<std::string> warnings;
 };
 
 /// Reads `folder`/dataset.toml and the table that it names (docs/formats.md). Throws FileError with
-/// one line that names the file, the row or field, the value and what is allowed: wrong or missing
-/// fields, numbers that are not finite, a name that stands twice, a picture that is not there, no
-/// picture at all.
+/// one line that names file, row or field, value and what is allowed, if a field is wrong or
+/// missing, a number is not finite, a name is repeated, a picture is missing, or there is none at
+/// all.
 [[nodiscard]] Dataset read_dataset(const std::filesystem::path& folder);
 
-/// Returns the indices of the pictures with these ascending stamps that are selected. A tenth of a
-/// millisecond does not count.
+/// Returns the indices of the selected pictures, given the ascending stamps of all. Differences of
+/// up to 0.1 ms are ignored.
 [[nodiscard]] std::vector<std::size_t> choose_pictures(const std::vector<double>& stamps_s,
                                                        const Dataset::Selection& selection);
 
-/// Keeps the selected entries. Throws FileError when the selection has times and an entry has no
-/// stamp or one before that of its predecessor, and when nothing is left.
+/// Keeps the selected entries. Throws FileError if times are selected and an entry has no stamp or
+/// a smaller one than the entry before, or if no entry is left.
 void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 
 /// Reads a folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
-/// ("view_9" before "view_10"). Throws FileError when there is none.
+/// ("view_9" before "view_10"). Throws FileError if it contains none.
 [[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
                                           PictureSource source);
-/// Reads a folder with the images of all folders within ("morning/view_1"); links are not followed.
+/// Reads a folder with the images of all folders below it ("morning/view_1"); symbolic links are
+/// not followed.
 [[nodiscard]] Dataset read_picture_tree(const std::filesystem::path& folder, PictureSource source);
 
 /// Makes a data set of one picture.
 [[nodiscard]] Dataset read_single_picture(const std::filesystem::path& file, PictureSource source);
 
-/// Returns the fields that all entries have; at least one entry.
+/// Returns the fields that all entries have; needs at least one entry.
 [[nodiscard]] Dataset::Fields find_shared_fields(const Dataset& dataset);
 /// Drops fields that only some entries have, so that `write_dataset` accepts them. Returns the
 /// remaining ones.
 Dataset::Fields drop_partial_fields(Dataset& dataset);
 
-/// Writes dataset.toml, the table (poses.csv, or images.csv when no position is known) and, for
-/// mirror pictures, camera.toml into `dataset.folder`; the pictures are the caller's. The table
-/// comes before dataset.toml, so that a data set with a dataset.toml is whole. Only the columns
-/// that every entry has can be written: throws ContractError when some entries have a value and
-/// others have not.
+/// Writes dataset.toml, the table (poses.csv, or images.csv if no position is known) and, for
+/// mirror pictures, camera.toml into `dataset.folder`; the caller must write the pictures.
+/// dataset.toml is written last, so that a data set that has one is complete. Throws ContractError
+/// if only some of the entries have a field (`drop_partial_fields`).
 void write_dataset(const Dataset& dataset);
 
 }  // namespace panonav

@@ -113,7 +113,8 @@ ImageSize upright_size(ImageSize stored, int orientation) {
 
 Image upright(Image stored, int orientation) {
   if (orientation == 1) return stored;
-  // The stored pixel that the upright picture shows at (u, v) [EXIF 2.32, tag 0x0112].
+  // Copies from the stored pixel that belongs to (u, v) of the upright picture [EXIF 2.32, tag
+  // 0x0112].
   const bool is_transposed = orientation >= 5;
   const bool from_right =
       orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;

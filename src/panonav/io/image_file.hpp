@@ -10,22 +10,22 @@
 
 namespace panonav {
 
-/// Bounds of a picture. Larger ones are refused before memory is allocated, those with too many
-/// scans before they are decoded.
+/// Limits of pictures. Larger pictures are refused before memory is allocated, and those with too
+/// many scans before they are decoded.
 struct ImageLimits {
   int side_px = 32768;               ///< the longest side, in pixels
   std::int64_t area_px = 134217728;  ///< 16384 x 8192
-  /// Of a JPEG: pixels that all its scans pass over, each scan counted as 65536 more. A progressive
-  /// picture comes in about ten scans, but a small file can ask for thousands.
+  /// Limit of the work for a JPEG, in pixels: the sum over its scans of its area + 65536. A
+  /// progressive picture has about ten scans, but a small hostile file can have thousands.
   std::int64_t scanned_px = std::int64_t{16} * 134217728;
 };
 
-/// Reads a PNG or JPEG file, identified by its first bytes, and turns it upright as its EXIF
-/// orientation says. Grey pictures of any bit depth give one channel of 8 bit, colour and palette
-/// pictures three; 16-bit values are scaled, an alpha channel is dropped (the stored colours are
-/// what the camera saw), gamma chunks and colour profiles are ignored. Throws FileError on a file
-/// that is missing, of another format, damaged, cut short or beyond the limits; never crashes,
-/// whatever the bytes.
+/// Reads a PNG or JPEG file, which it identifies by the first bytes, and turns the picture upright
+/// by its EXIF orientation. Grey pictures of any bit depth give one channel of 8 bit, colour and
+/// palette pictures three. 16-bit values are scaled. Alpha channels are dropped (the stored colours
+/// are those of the camera); gamma chunks and colour profiles are ignored. Throws FileError if the
+/// file is missing, of another format, damaged, cut short or beyond the limits; no content can make
+/// it crash.
 [[nodiscard]] Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
 
 /// A format of picture files.
@@ -34,10 +34,11 @@ enum class ImageFormat {
   jpeg  ///< with losses
 };
 
-/// Returns the format by the first bytes. Throws FileError, which names `name`, for any other.
+/// Returns the format by the first bytes. Throws a FileError on `name` for any other format.
 [[nodiscard]] ImageFormat image_format(std::span<const std::uint8_t> bytes, std::string_view name);
 
-/// Reads the bytes of a PNG or JPEG file. Throws FileError when it begins otherwise.
+/// Reads the bytes of a PNG or JPEG file. Throws FileError if its first bytes are of another
+/// format.
 [[nodiscard]] std::vector<std::uint8_t> read_encoded_image(const std::filesystem::path& path);
 
 /// Reads width and height of the upright picture from the head of the file, without decoding the
@@ -52,11 +53,11 @@ enum class ImageFormat {
 /// Encodes a picture (1 or 3 channels) as PNG. Throws ContractError on an empty picture.
 [[nodiscard]] std::vector<std::uint8_t> encode_png(ImageView image);
 
-/// Encodes a picture (1 or 3 channels, sides at most 65,500 px) as baseline JPEG. `quality`: 1 ..
-/// 100. About 3 ms for 1280 x 640 x 3. Throws ContractError outside these.
+/// Encodes a picture (1 or 3 channels, sides at most 65,500 px) as baseline JPEG. `quality` is 1 ..
+/// 100. About 3 ms for 1280 x 640 x 3. Throws ContractError if a value is out of range.
 [[nodiscard]] std::vector<std::uint8_t> encode_jpeg(ImageView image, int quality = 85);
 
-/// Writes a PNG that appears whole or not at all. Throws FileError.
+/// Writes a PNG completely or not at all (`write_file`). Throws FileError.
 void write_png(const std::filesystem::path& path, ImageView image);
 
 }  // namespace panonav

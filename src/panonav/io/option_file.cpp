@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-template <class Table>  // const or not
+template <class Table>  // const or not const
 auto find_section(Table& table, std::string_view section) {
   const auto found = std::ranges::find(table, section, &TomlField::name);
   return found == table.end() ? nullptr : std::get_if<TomlTable>(&found->value.content);

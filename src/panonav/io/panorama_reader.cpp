@@ -14,9 +14,9 @@ namespace panonav {
 
 namespace {
 
-// Throws ContractError unless the picture can show the whole sphere.
+// Throws ContractError unless the picture is twice as wide as high, as one of the whole sphere is.
 void require_whole_sphere(ImageSize size) {
-  constexpr double tolerance = 0.02;  // borders and scaling take or add a few pixels
+  constexpr double tolerance = 0.02;  // for cropped borders and rounding
   if (std::abs(size.width - 2.0 * size.height) <= tolerance * size.width) return;
   throw ContractError("equirectangular image",
                       std::to_string(size.width) + " x " + std::to_string(size.height) + " px",
@@ -24,7 +24,7 @@ void require_whole_sphere(ImageSize size) {
                       "the kind panorama with an elevation band");
 }
 
-/// A band with more rows of the same height at both ends, as far as `limit` goes and at most
+/// A band extended at both ends by rows of the same height, up to `limit` and at most by
 /// `margin_rad`.
 struct WiderBand {
   int rows = 0;
@@ -62,7 +62,7 @@ Panorama level_equirectangular(ImageView picture, PictureLayout layout, Panorama
 
 struct PanoramaReader::Wide {
   std::once_flag is_made;
-  std::optional<Unwarper> unwarper;  // empty: the camera shows no more than the band
+  std::optional<Unwarper> unwarper;  // nullopt: the camera shows nothing beyond the band
   std::vector<std::uint8_t> hidden;
 };
 
@@ -81,7 +81,7 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
 
 const PanoramaReader::Wide* PanoramaReader::get_or_create_wide() const {
   std::call_once(wide_->is_made, [&] {
-    constexpr double margin_rad = 0.175;  // 10 degrees: robots lean less
+    constexpr double margin_rad = 0.175;  // 10 degrees, more than robots lean
     const WiderBand band = widen_band(unwarper_->elevations(), unwarper_->rows(),
                                       visible_elevations(*source_.camera), margin_rad);
     if (band.rows == unwarper_->rows()) return;

@@ -14,38 +14,39 @@
 
 namespace panonav {
 
-/// Turns the pictures of one recording into panoramic cylinders of one shape. For mirror pictures
-/// the table is computed once, at construction. Several threads may use one at a time.
+/// Turns the pictures of one recording into panoramic cylinders of one shape. The unwarping table
+/// of mirror pictures is computed once, at construction. Several threads may use one reader at a
+/// time.
 class PanoramaReader {
  public:
-  /// `shape`: rows or columns 0 keep the pictures' own (80 x 512 for mirror pictures). Throws
-  /// ContractError on a source that is not valid.
+  /// If rows or columns of `shape` are 0, the pictures' own number is kept (80 x 512 for mirror
+  /// pictures). Throws ContractError on a source that is not valid.
   PanoramaReader(PictureSource source, PanoramaShape shape);
 
-  /// The layout of the pictures, as stated at construction.
+  /// Returns the layout of the pictures.
   [[nodiscard]] const PictureSource& source() const noexcept { return source_; }
-  /// The table that turns mirror pictures into panoramas where that is all there is to do: null for
-  /// other pictures and where a mask hides a part of the mirror.
+  /// Returns the unwarping table of mirror pictures if nothing else is needed to convert them; null
+  /// for other pictures, and if a mask hides a part of the mirror.
   [[nodiscard]] const Unwarper* unwarper() const noexcept {
     return unwarper_ && hidden_.empty() ? &*unwarper_ : nullptr;
   }
-  /// Converts a picture. With a tilt, to the view of a level robot (`level_panorama`), for which
-  /// more than the band is read where the picture shows more. Throws ContractError on a picture
-  /// whose size is not the camera's, on an equirectangular one that is not twice as wide as high (2
-  /// % off at most), and on a tilt as `level_panorama` does.
+  /// Converts a picture. With a tilt it gives the view of a level robot (`level_panorama`), and
+  /// reads rows beyond the band for that, as far as the picture shows them. Throws ContractError if
+  /// the size of a mirror picture is not the camera's, if an equirectangular one is not twice as
+  /// wide as high (within 2 %), and on a tilt as `level_panorama` does.
   [[nodiscard]] Panorama convert(ImageView picture, const Tilt& tilt = {}) const;
-  /// Reads and converts. Throws FileError that names the file and what is wrong with it.
+  /// Reads a file and converts it. Throws FileError with the file and the fault.
   [[nodiscard]] Panorama read(const std::filesystem::path& file) const;
 
  private:
-  /// The table of a wider band of mirror pictures, made when the first tilted picture comes.
+  /// The unwarping table of a wider band of mirror pictures, computed for the first tilted picture.
   struct Wide;
   const Wide* get_or_create_wide() const;
 
   PictureSource source_;
   PanoramaShape shape_;
   std::optional<Unwarper> unwarper_;
-  std::vector<std::uint8_t> hidden_;  ///< by the mask; empty without one
+  std::vector<std::uint8_t> hidden_;  ///< values that the mask hides; empty: no mask
   std::shared_ptr<Wide> wide_;
 };
 

@@ -35,7 +35,7 @@ std::vector<StampedPose> read_csv(const std::filesystem::path& path) {
   return trajectory;
 }
 
-// The eight numbers of a line of TUM text.
+// Parses the eight numbers of a line of TUM text; false if it has others.
 bool parse_line(std::string_view line, std::array<double, 8>& numbers) {
   const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == ','; };
   std::size_t count = 0;

@@ -29,7 +29,7 @@ UnfinishedFolder::UnfinishedFolder(const fs::path& target) : target_(resolve_fre
   if (error) throw FileError(target.string(), "cannot be created: " + error.message());
   mark_.emplace(target_);
   path_ = mark_->path().string() + ".d";
-  fs::remove_all(path_, error);  // of a process that was killed: the mark's name was free
+  fs::remove_all(path_, error);  // left by a killed process; no living one uses it
   if (!fs::create_directory(path_, error)) {
     throw FileError(target.string(), "cannot be created: " + error.message());
   }

@@ -7,25 +7,26 @@
 
 namespace panonav {
 
-/// A folder that gets its name when it is complete, and is removed if it never is.
+/// A folder that is filled under a temporary name and renamed when it is complete; otherwise it is
+/// removed.
 class UnfinishedFolder {
  public:
-  /// Makes the folder under a temporary name, and the folders that it lies in. Throws FileError
-  /// when it cannot be made, and when something is at `target` but an empty folder.
+  /// Makes the folder under a temporary name, and its parent folders. Throws FileError if that
+  /// fails, or if `target` exists and is not an empty folder.
   explicit UnfinishedFolder(const std::filesystem::path& target);
   ~UnfinishedFolder();
   UnfinishedFolder(const UnfinishedFolder&) = delete;
   UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
 
-  /// Returns the temporary name, under which the folder is filled.
+  /// Returns the temporary path under which to fill the folder.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  /// Gives the folder its name. Throws FileError.
+  /// Renames the folder to its final name. Throws FileError.
   void finish();
 
  private:
   std::filesystem::path target_;
   std::filesystem::path path_;
-  std::optional<TemporaryFile> mark_;  // tells living processes apart
+  std::optional<TemporaryFile> mark_;  // keeps its temporary name unique
 };
 
 }  // namespace panonav

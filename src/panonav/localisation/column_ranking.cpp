@@ -9,7 +9,7 @@
 namespace panonav {
 
 double RankedMatch::score_with(double difference) const {
-  // Keeps both factors above 0 where views agree to the last byte in columns or in brightness.
+  // Keeps both factors above 0 if two views have equal columns or equal brightness.
   constexpr double min_factor = 1e-6;
   constexpr double dissimilarity_exponent = 0.125;  // chosen on recordings (docs/decisions.md)
   return (difference + min_factor) *

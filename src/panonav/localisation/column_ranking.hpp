@@ -18,9 +18,9 @@ struct RankedMatch {
   std::optional<int> verified_features = std::nullopt;
 
   /// Returns the re-ranking score; the lowest is the best. It is the difference of the columns
-  /// times the dissimilarity to the power of 1/8. The dissimilarity adds brightness, which the
-  /// columns ignore. An occlusion raises the dissimilarity to all references by similar amounts, so
-  /// it hardly changes the order.
+  /// times the dissimilarity to the power of 1/8. The dissimilarity accounts for brightness, which
+  /// the columns ignore. An occlusion raises the dissimilarities to all references by similar
+  /// amounts, so it hardly changes their order.
   [[nodiscard]] double score() const { return score_with(columns.difference); }
   /// Returns the score for another difference of the columns than the stored one.
   [[nodiscard]] double score_with(double difference) const;
@@ -28,17 +28,17 @@ struct RankedMatch {
 
 /// Re-ranks the matches of a search by comparing views column by column. The search compares
 /// magnitudes only, and an occlusion changes all of them. Columns separate occluded parts from
-/// visible ones and use the phases, too.
+/// visible ones, and they also depend on the phases.
 class ColumnRanking {
  public:
-  /// Caches the column profiles of all views if the memory has at most `max_kept` views
-  /// (2.5 kB each); otherwise they are computed again for each query. `components`: number of
-  /// Fourier components compared, 0 for all. The memory must outlive *this. Throws ContractError if
+  /// Caches the column profiles of all views (2.5 kB each) if the memory has at most
+  /// `max_kept` views; otherwise computes profiles for each query. `components`: number of
+  /// Fourier components compared; 0: all. The memory must outlive *this. Throws ContractError if
   /// the memory has fewer components.
   explicit ColumnRanking(const VisualMemory& memory, int components = 0, int max_kept = 1000);
 
   /// Returns the matches, ascending by score, then by view. `allowed_rows`: see SearchMask. Cost: 1
-  /// microsecond for a match with cached profiles, about 10 for others.
+  /// microsecond for a match with cached profiles, about 10 microseconds for others.
   [[nodiscard]] std::vector<RankedMatch> rank(
       const PackedSignature& query, std::span<const Match> matches,
       std::span<const std::uint8_t> allowed_rows = {}) const;

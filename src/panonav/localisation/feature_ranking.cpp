@@ -27,7 +27,7 @@ void rank_by_verified_features(const LocalFeatures& query, const FeatureSource& 
 
 bool FeatureTrial::is_significantly_better() const {
   const int changed = gained + lost;
-  // Probability of at least `gained` of `changed` at 1/2 each.
+  // Computes the probability of at least `gained` successes in `changed` trials of probability 1/2.
   double coefficient = 1.0;  // of `changed` over i
   double sum = 0.0;
   for (int i = 0; i <= changed; ++i) {
@@ -40,7 +40,7 @@ bool FeatureTrial::is_significantly_better() const {
 FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupport& support,
                                const FeatureSource& features) {
   constexpr int max_sampled = 100;  // takes 0.3 s; five gains without a loss are significant
-  // Largest distance of a right match over that of the nearest view: the diagonal of a grid.
+  // Largest ratio of a right match's distance to that of the nearest view: a grid's diagonal.
   constexpr double right_ratio = 1.5;
   const VisualMemory& memory = ranking.memory();
   const std::span<const ViewId> views = memory.views();
@@ -59,7 +59,7 @@ FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupp
       }
       return distance(memory.info(other).pose->position(), memory.info(view).pose->position());
     };
-    // Views at the same position are excluded: a robot that stood still took the same view again.
+    // Excludes views at the same position, because a standing robot takes the same view repeatedly.
     std::vector<ViewId> excluded;
     double nearest = std::numeric_limits<double>::infinity();
     for (const ViewId other : views) {

@@ -37,15 +37,15 @@ class ReferenceAreas {
   [[nodiscard]] std::optional<std::vector<std::size_t>> find_sites(
       std::span<const Match> views) const;
 
-  std::vector<ViewId> views_;  // posed ones, ascending; in the order of the positions of `cells_`
+  std::vector<ViewId> views_;  // with a pose, ascending; same order as the positions of `cells_`
   VoronoiCells cells_;
   std::vector<double> areas_m2_;  // by site
 };
 
 /// Localises a query hierarchically [M04 section 2.3, figures 9 and 10]: compares more and more
-/// components, each of which narrows the area, until the accuracy is reached. Returns one level for
-/// each step; none for an empty memory. Does not detect unknown places (see `Localiser`). Throws
-/// OptionError; ContractError on a query of another shape.
+/// components, which narrows the area step by step, until the accuracy is reached. Returns one
+/// level for each step; none for an empty memory. Does not detect unknown places (see `Localiser`).
+/// Throws OptionError; ContractError on a query of another shape.
 [[nodiscard]] std::vector<LocalisationLevel> localise_hierarchically(
     const VisualMemory& memory, const ReferenceAreas& areas, const PackedSignature& query,
     const LocalisationAccuracy& accuracy = {}, const SearchMask& mask = {});

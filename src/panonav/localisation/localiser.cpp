@@ -38,16 +38,17 @@ std::optional<LocalFeatures> keep_rows(std::optional<LocalFeatures> features,
   return features;
 }
 
-/// Number of best matches whose headings are averaged and whose nearest one is listed first: the
-/// corners of a grid's square.
+/// Number of best matches whose headings are averaged, and of which the nearest is listed first: a
+/// grid square has four corners.
 constexpr std::size_t nearest_references = 4;
 
-/// Half width of the compass's search window: columns give the rotation to within one column.
+/// Half width of the compass's search window: the rotation by columns is exact to one column.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
-// Returns the weighted mean of the headings by the nearest references. Weights are the inverse
-// fourth power of the difference, as the compass's error grows with its square. Headings far from
-// that of the best match are outliers of the compass and are ignored.
+// Returns the weighted mean of the robot's headings relative to the best references. The weight is
+// the inverse fourth power of the column difference, because the compass's error grows with the
+// square of the difference. Ignores headings far from that of the best match, which are outliers of
+// the compass.
 std::optional<double> estimate_heading(const VisualMemory& memory,
                                        std::span<const PlaceMatch> matches) {
   constexpr double agreement_rad = radians(15.0);  // three times the compass's typical error
@@ -70,8 +71,9 @@ std::optional<double> estimate_heading(const VisualMemory& memory,
   return wrap_angle(*centre_rad + sum / weights);
 }
 
-// Moves the nearest of the best references to the front. The interpolated position identifies it
-// better than single differences, which noise dominates between neighbours.
+// Moves the best reference nearest to the interpolated position to the front. The position
+// identifies it better than column differences, because noise dominates the differences between
+// neighbours.
 void move_nearest_first(const VisualMemory& memory, Point2 position,
                         std::vector<PlaceMatch>& matches) {
   const auto end =
@@ -90,7 +92,7 @@ std::vector<ViewId> to_ids(std::span<const RankedMatch> matches) {
   return ids;
 }
 
-// Merges overlapping rectangles into one that encloses both.
+// Replaces overlapping rectangles by one that encloses both, until none overlap.
 std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) {
   const auto overlap = [](const PositionBounds& a, const PositionBounds& b) {
     return a.min_x_m <= b.max_x_m && b.min_x_m <= a.max_x_m && a.min_y_m <= b.max_y_m &&
@@ -137,7 +139,7 @@ VisualMemory join_memories(const VisualMemory& part, const VisualMemory& drawn) 
   std::ranges::set_union(part.views(), drawn.views(), std::back_inserter(views));
   for (const ViewId view : views) {
     const VisualMemory& from = part.contains(view) ? part : drawn;
-    // Another user may meanwhile have given its name to another view.
+    // Meanwhile, another user may have reused the name for another view.
     if (all.find(from.info(view).name)) continue;
     all.append_with_id(view, from.packed(view), from.info(view));
   }
@@ -209,8 +211,8 @@ class Localiser::Query {
   }
 
  private:
-  /// Searches the views of least dissimilarity [M04 section 2.2] and ranks them by columns;
-  /// searches more of them if none explains the query.
+  /// Searches the views of smallest dissimilarity [M04 section 2.2] and ranks them by columns. If
+  /// no match explains the query, searches `reranked_views` instead.
   void find_candidates() {
     const int first = std::max(
         {options_.top, PositionModel::candidates, ranks_by_features_ ? verified_candidates : 0});
@@ -240,8 +242,8 @@ class Localiser::Query {
                   .rank(view_, found.matches, mask_.allowed_rows);
   }
 
-  /// Loads the views that the answer needs from a memory that is not held: the candidates,
-  /// references that may support them, and those of chance.
+  /// Loads the views that this query needs from a memory that is not held in RAM: the candidates,
+  /// the references that may support them, and the sampled views for chance.
   void load_compared_views() {
     if (compared_ != nullptr) return;
     std::vector<ViewId> views = to_ids(ranked_);
@@ -258,7 +260,7 @@ class Localiser::Query {
   void weigh_columns() { place_.evidence = compared_->criterion.evidence(view_, ranked_, mask_); }
 
   void rank_by_support() {
-    // Profiles of the references cover all rows.
+    // The references' profiles cover all rows, so they cannot be compared with a masked query.
     if (options_.reranked_views == 0 || !mask_.allowed_rows.empty()) return;
     compared_->support.rank_by_support(ColumnProfiles(view_, options_.components), ranked_,
                                        mask_.excluded_views);
@@ -310,7 +312,8 @@ class Localiser::Query {
   void estimate_pose() {
     const PositionModel& model = own_.position_model_;
     place_.position = interpolate_position(compared_->ranking, model, ranked_);
-    // If columns alone do not recognise the place, the position is no more precise than this.
+    // If only local features recognise the place, the position is no more precise than the
+    // neighbourhood.
     if (!is_known_by_columns_ && place_.position && place_.position->radius_m) {
       place_.position->radius_m = std::max(*place_.position->radius_m, model.neighbourhood_m);
     }
@@ -330,11 +333,11 @@ class Localiser::Query {
   const PackedSignature& view_;
   const SearchMask& mask_;
   const QueryFeatures& make_features_;
-  const ComparedViews* compared_;       // null until `load_compared_views` of a memory not held
-  std::optional<VisualMemory> loaded_;  // its views
+  const ComparedViews* compared_;       // null before `load_compared_views` if not held
+  std::optional<VisualMemory> loaded_;  // the views of `compared_`
   std::optional<ComparedViews> loaded_views_;
   std::vector<RankedMatch> ranked_;
-  std::optional<LocalFeatures> features_;  // of the query, as seen
+  std::optional<LocalFeatures> features_;  // of the query, not mirrored
   bool ranks_by_features_ = false;
   bool is_known_by_columns_ = false;
   Place place_;

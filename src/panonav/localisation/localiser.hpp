@@ -14,27 +14,27 @@
 namespace panonav {
 
 /// Recognises places of a memory from single views, whatever the robot's heading. The memory is
-/// held in RAM or searched where it is stored, with the same results.
+/// held in RAM or searched in its storage, with the same results.
 class Localiser {
  public:
   /// Learns the place model and the position model from the memory, which must outlive *this. Views
   /// appended later can be found, but the models do not include them. Throws OptionError;
-  /// ContractError if the memory has fewer components. Cost: at most about 200 searches, and 0.2 s
-  /// for comparing columns.
+  /// ContractError if the memory has fewer components than `options.components`. Cost: at most
+  /// about 200 searches, and 0.2 s for comparing columns.
   explicit Localiser(const VisualMemory& memory, const LocaliserOptions& options = {});
   /// Uses models learnt before. `spacing_m`: spacing of the references
   /// (`NeighbourSupport::spacing_m`); computed if nullopt. Throws ContractError if the position
-  /// model was learnt over other components.
+  /// model was learnt with another number of components.
   Localiser(const VisualMemory& memory, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options = {},
             std::optional<double> spacing_m = std::nullopt);
-  /// Uses a memory that is not held, with models learnt before. `drawn`: the views that
-  /// `sample_reference_views` returns for it. Throws as above.
+  /// Uses a memory that is not held in RAM, with models learnt before. `sampled`: the views that
+  /// `sample_reference_views` returns for it. Throws like the constructor above.
   Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options, double spacing_m);
 
-  /// Uses local features as further evidence of whether a place is known, wherever columns are
-  /// inconclusive. `rank`: features also sort the best matches, for memories where
+  /// Uses local features as further evidence of whether a place is known if columns are
+  /// inconclusive. `rank`: features also sort the best matches; set it if
   /// `FeatureTrial::is_significantly_better`.
   void use_features(FeatureSource features, bool rank) {
     features_ = std::move(features);
@@ -57,12 +57,12 @@ class Localiser {
   ///    [M04 footnote 1] and the absolute heading.
   ///
   /// `features` computes the local features of the query on demand; if empty, none are used. Throws
-  /// ContractError on a query of another shape, and if the memory is not held. Cost: a search and
-  /// 0.2 ms; 3 ms and a second search for 1000 views; 2 to 4 ms with features.
+  /// ContractError on a query of another shape, and if the memory is not held in RAM. Cost: a
+  /// search and 0.2 ms; if no near view matches, a second search and 3 ms for 1000 views.
   [[nodiscard]] Place localise(const PackedSignature& query, const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
-  /// Localises by searching `index`. If the memory is not held, loads only the views needed: those
-  /// found and the references around them. Throws as `index`.
+  /// Localises by searching `index`. If the memory is not held in RAM, loads only the views found
+  /// and the references around them. Passes on exceptions of `index`.
   [[nodiscard]] Place localise(ViewIndex& index, const PackedSignature& query,
                                const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
@@ -72,10 +72,11 @@ class Localiser {
   struct ComparedViews;
 
   LocaliserOptions options_;
-  // Shared by copies. Null if the memory is not held; each query then loads its own.
+  // Shared by copies of the localiser. Null if the memory is not held in RAM; each query then loads
+  // its own views.
   std::shared_ptr<const ComparedViews> held_;
-  std::shared_ptr<const VisualMemory> drawn_;  // null: the memory is held
-  double spacing_m_ = 0.0;                     // of the references; set if the memory is not held
+  std::shared_ptr<const VisualMemory> drawn_;  // null: the memory is held in RAM
+  double spacing_m_ = 0.0;                     // of the references; only if not held
   PlaceModel place_model_;
   PositionModel position_model_;
   FeatureSource features_;  // empty if features are not used

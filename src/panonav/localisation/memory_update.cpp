@@ -13,15 +13,17 @@ namespace panonav {
 
 namespace {
 
-/// Smallest probability of a sure localisation: 99 % of these are right (docs/decisions.md).
+/// Smallest `known_probability` of a sure localisation; 99 % of sure ones are right
+/// (docs/decisions.md).
 constexpr double sure_probability = 0.9;
-/// Longest travel to a witness, in spacings: odometry errs by 0.4 spacings over it.
+/// Longest travel between an image and its witness, in spacings; over this length odometry errs by
+/// 0.4 spacings.
 constexpr double witness_reach_spacings = 8.0;
 /// Largest number of witnesses before an image, and after it.
 constexpr std::size_t max_witnesses = 64;
-/// Smallest share of the expected similarity at which a reference explains a view.
+/// A reference explains a view if their similarity is at least this share of the expected one.
 constexpr double explained_share = 0.5;
-/// Shortest travel between two images, in spacings: nearer ones show the same.
+/// Shortest travel between two images, in spacings; nearer images show the same.
 constexpr double new_image_spacings = 0.25;
 
 }  // namespace
@@ -143,7 +145,8 @@ void MemoryUpdate::decide(std::size_t index) {
       unlike.push_back(view);
     }
   }
-  // If nothing explains the view, something may be in front of the camera: no reference has failed.
+  // If no reference explains the view, something may occlude the camera, so no reference has
+  // failed.
   if (is_explained) failed_.insert(unlike.begin(), unlike.end());
   const auto own = image.witness();
   const bool is_sure = own && distance(own->pose.position(), pose->position()) <= half_spacing_m;

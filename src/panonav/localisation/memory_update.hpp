@@ -25,37 +25,37 @@ struct MemoryUpdateOptions {
 void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor);
 
 /// Decides which views a run adds to a memory and which it removes. At each certain pose
-/// (`find_witnessed_pose`), the robot's view is compared with the references around. One explains
-/// it if they are at least half as similar as expected at their distance (`ObservationModel`).
+/// (`find_witnessed_pose`), compares the robot's view with the references around the pose. A
+/// reference explains the view if their similarity is at least half of that expected at their
+/// distance (`ObservationModel`).
 /// - A reference that explains the view is reinforced. One that does not, while another does, has
 ///   failed; it is forgotten after `failures` successive runs.
 /// - A view that no reference explains is added, at most once a run for each place; if the place
 ///   has `appearances` views, it replaces the least useful one.
 /// - A place keeps at least one view.
 ///
-/// Cost: 10 microseconds for each reference around. Holds at most 128 images.
+/// Cost: 10 microseconds for each reference. Holds at most 128 images.
 class MemoryUpdate {
  public:
   /// Statistics of earlier runs, to be stored with the memory and passed to its next update.
   struct Use {
     /// Statistics of one view.
     struct View {
-      int matched = 0;  ///< runs in which it explained the robot's view at its place
-      int failed = 0;  ///< successive runs in which another view of the place did, but not this one
-      int last_run = 0;     ///< last run in which it matched or was learnt; 0: none
+      int matched = 0;      ///< runs in which the view explained the robot's view at its place
+      int failed = 0;       ///< successive runs in which only another view of the place did so
+      int last_run = 0;     ///< last run in which the view matched or was added; 0: none
       bool learnt = false;  ///< added by an update
       friend bool operator==(const View&, const View&) = default;
     };
 
     int runs = 0;  ///< number of runs that have updated the memory
-    /// Spacing of the memory before its first update: later, several views of a place make
-    /// references seem nearer to each other and less similar than places are. 0 before the first
-    /// update.
+    /// Spacing of the memory before its first update; 0 before the first update. Later, places have
+    /// several views, so spacing and similarity of the references would be measured too small.
     double spacing_m = 0.0;
-    double far_difference = 0.0;   ///< `ObservationModel::far_difference` of the same memory
-    double range_m = 0.0;          ///< `ObservationModel::range_m` of the same memory
-    int places = 0;                ///< places of the same memory, and those added later
-    int size = 0;                  ///< views of the memory after the last update
+    double far_difference = 0.0;   ///< `ObservationModel::far_difference` of that memory
+    double range_m = 0.0;          ///< `ObservationModel::range_m` of that memory
+    int places = 0;                ///< number of places of that memory and of those added later
+    int size = 0;                  ///< number of views of the memory after the last update
     std::map<ViewId, View> views;  ///< views that have matched or failed
     friend bool operator==(const Use&, const Use&) = default;
   };
@@ -64,9 +64,9 @@ class MemoryUpdate {
   struct AnsweredView {
     Pose2 odometry;                  ///< absolute, in its own frame
     PackedSignature signature;       ///< of the image, in the memory's shape
-    double known_probability = 0.0;  ///< of the answer
+    double known_probability = 0.0;  ///< probability that the place is known, by the localiser
     std::optional<Pose2> pose;       ///< estimated; nullopt if position or heading is unknown
-    std::optional<double> radius_m;  ///< holds the position in 95 % of the cases
+    std::optional<double> radius_m;  ///< contains the true position in 95 % of the cases
   };
 
   /// Changes of the memory by one run.
@@ -78,23 +78,23 @@ class MemoryUpdate {
     };
     std::vector<Added> added;       ///< ascending
     std::vector<ViewId> replaced;   ///< removed for an added one; ascending
-    std::vector<ViewId> forgotten;  ///< removed because others have long been better; ascending
+    std::vector<ViewId> forgotten;  ///< removed after too many failures; ascending
     std::vector<ViewId> matched;    ///< ascending
     std::size_t certain = 0;        ///< number of images whose pose was certain
-    Use use;                        ///< to be stored; without the added views and the new size
+    Use use;                        ///< to be stored; without the added views and their number
   };
 
   /// `ranking` and its memory must outlive *this and not change. Throws OptionError.
   MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model, Use use,
                const MemoryUpdateOptions& options = {});
 
-  /// Adds the next image; its number is the count of earlier ones. An image less than a quarter of
-  /// a spacing from the previous one shows nothing new and is skipped.
+  /// Adds the next image; images are numbered from 0 in the order of these calls. Ignores an image
+  /// taken less than a quarter of a spacing from the previous one, since it shows nothing new.
   void add(AnsweredView view);
-  /// True if the image may still become a view of the memory: it is undecided or was chosen.
+  /// True if the image may still become a view of the memory: it was chosen or is not decided yet.
   [[nodiscard]] bool can_become_view(std::size_t number) const;
-  /// True if the last image is within reach of a certain answer before it, so that it may become
-  /// certain.
+  /// True if the robot was localised with certainty shortly before the last image, so that this
+  /// image's pose may become certain.
   [[nodiscard]] bool is_near_known_place() const;
   /// Decides the remaining images and returns all changes. Call it last.
   [[nodiscard]] Changes finish();
@@ -120,7 +120,7 @@ class MemoryUpdate {
   const ColumnRanking* ranking_;
   Use use_;
   MemoryUpdateOptions options_;
-  std::deque<Image> images_;  // those before `undecided_` are witnesses only
+  std::deque<Image> images_;  // images before `undecided_` only serve as witnesses
   std::size_t undecided_ = 0;
   std::size_t count_ = 0;
   std::size_t certain_ = 0;

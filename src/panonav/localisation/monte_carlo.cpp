@@ -22,16 +22,17 @@ namespace panonav {
 
 namespace {
 
-/// Number of heading sectors in which particles are clustered: 15 degrees, between the compass's
-/// error of some 5 degrees and the quarter turn after which rooms look similar.
+/// Number of heading sectors in which particles are clustered: 15 degrees each, between the
+/// compass's error of about 5 degrees and the quarter rotation after which rooms look similar.
 constexpr int heading_bins = 24;
 
 // Limits of the work per image; lower while the robot is localised.
 constexpr int searched_views = 16;                ///< views that the search finds
-constexpr int searched_views_when_localised = 4;  ///< the same of a localised robot
+constexpr int searched_views_when_localised = 4;  ///< the same while localised
 constexpr std::size_t max_followed_sites = 256;   ///< compared references near the particles
 constexpr std::size_t max_followed_sites_when_localised = 16;
-/// Smallest share of the particles' weight around a reference for it to be compared: five of 5000.
+/// A reference is compared if the particles around it have at least this share of the weight: five
+/// of 5000 particles.
 constexpr double min_followed_weight = 1e-3;
 
 // Probabilities from one image to the next (docs/decisions.md, particle injection).
@@ -40,31 +41,31 @@ constexpr double p_leave = 0.02;   ///< that it leaves the memorised area
 constexpr double p_return = 0.1;   ///< that it comes back
 /// Probability at the first image that the robot is not near any particle.
 constexpr double p_elsewhere_at_start = 0.9;
-/// Belief in being inside the memorised area before the first image: undecided.
+/// Probability of being inside the memorised area before the first image: undecided.
 constexpr double p_inside_at_start = 0.5;
 
-/// Log-likelihood ratio that one in a hundred views of another place reaches by chance
-/// (docs/decisions.md, "Lost is a second belief"). It limits the evidence of one image against the
-/// memorised area.
+/// Log-likelihood ratio that 1 % of the views of other places reach by chance (docs/decisions.md,
+/// "Lost is a second belief"). Limits the evidence of one image against being in the memorised
+/// area.
 constexpr double chance_log_ratio = 1.0;
-// Limits of the evidence of one image for the memorised area, by its likelihood and by its
-// difference alone: odds of 150 and of 7, so that a few images can refute it
+// Limits of the evidence of one image for being in the memorised area: by its likelihood (odds of
+// 150) and by its difference alone (odds of 7). A few images can refute them
 // (tests/localisation/monte_carlo_test.cpp).
 constexpr double max_log_ratio = 5.0;
 constexpr double max_log_ratio_of_difference = 2.0;
 /// Log-likelihood ratio of an explained difference against an unrelated one (the same tests).
 constexpr double log_ratio_per_margin = 4.0;
-/// Smallest unit of the margin; keeps it finite if both differences coincide.
+/// Smallest unit of the margin; avoids a division by 0 if both differences are equal.
 constexpr double min_margin_unit = 0.05;
 
-/// Smallest exponent of a view's likelihood, however close it is to the view before, so that a
-/// standing robot can be localised.
+/// Smallest exponent of a view's likelihood, even if it was taken where the previous view was, so
+/// that a standing robot can be localised.
 constexpr double min_view_exponent = 0.05;
 
 // When the robot is localised (docs/decisions.md, "Localised means").
 constexpr double min_localised_weight = 0.9;  ///< of the heaviest mode
 constexpr double memorised_reach = 2.0;       ///< largest distance from a reference, in spacings
-constexpr double min_inside = 0.5;            ///< belief in being in the memorised area
+constexpr double min_inside = 0.5;            ///< probability of being in the memorised area
 
 double position_variance_m2(const ParticleModes& modes) {
   return modes.modes.front().covariance[0] + modes.modes.front().covariance[4];
@@ -85,7 +86,7 @@ struct MonteCarloLocaliser::Implementation {
   double travelled_m = 0.0;  // since the last image
   PositionError error;
   bool knows_nothing = true;          // no image since a start without a known pose
-  double inside = p_inside_at_start;  // belief that the robot is in the memorised area
+  double inside = p_inside_at_start;  // probability that the robot is in the memorised area
   MonteCarloEstimate latest;
 
   Implementation(std::unique_ptr<ComparedViews> views, const ObservationModel& model_,
@@ -141,14 +142,14 @@ struct MonteCarloLocaliser::Implementation {
     return latest;
   }
 
-  /// Views from nearly the same place share their errors: a view is weighted by how independent it
-  /// is of the last one.
+  /// Views from nearly the same place have the same errors, so a view's weight falls with its
+  /// correlation with the previous view.
   [[nodiscard]] double correlation_with_last_view() const {
     return std::exp(-travelled_m / model.range_m);
   }
 
-  /// Compares, column by column, the views found by the search, those around the best of them, and
-  /// those around the particles.
+  /// Compares column by column: the views found by the search, those near the particles and those
+  /// near the best match.
   void compare_views(const PackedSignature& view, bool was_localised) {
     likelihood.set_view(view);
     likelihood.compare(
@@ -221,21 +222,22 @@ struct MonteCarloLocaliser::Implementation {
     ExplainedInjection injection(likelihood, sampler, model, options.compass);
     if (!injection.find_places(particles, random)) return;
     latest.log_there = injection.log_evidence();
-    // A robot that was outside may return anywhere.
+    // A robot that was outside the memorised area may return anywhere.
     const double prior =
         knows_nothing ? p_elsewhere_at_start : p_kidnap + (1.0 - inside) * p_return;
     const double elsewhere = kidnap_probability(prior, latest.log_there, latest.log_here);
     latest.injected = injection.inject(particles, elsewhere, random);
   }
 
-  /// Updates the belief in being inside the memorised area by how much better than chance the view
-  /// is explained.
+  /// Updates the probability of being inside the memorised area, by Bayes' rule: evidence is how
+  /// much better than chance the view is explained.
   void update_inside() {
     double evidence = latest.log_here;
     if (options.injection == MonteCarloOptions::Injection::explained) {
       evidence = std::max(evidence, latest.log_there + std::log(p_kidnap));
     }
-    // Before anything is known, a view like one of the memory's is evidence for being inside.
+    // If the particles are still spread over all places, a view similar to one of the memory is
+    // evidence for being inside.
     if (latest.difference_anywhere) {
       const double unit =
           std::max(min_margin_unit, model.far_difference - model.explained_difference);
@@ -378,8 +380,8 @@ void MonteCarloLocaliser::start_globally(std::optional<double> heading_rad) {
   auto& own = *implementation_;
   const auto count = static_cast<std::size_t>(own.options.max_particles);
   own.particles.resize(count);
-  // Particles are spread evenly over the references: with as many particles as references, each
-  // gets one.
+  // Spreads the particles evenly over the references: if there are as many particles as references,
+  // each reference gets one.
   const std::size_t sites = own.likelihood.sites().size();
   const double first = own.random.uniform(0.0, 1.0);
   for (std::size_t i = 0; i < count; ++i) {

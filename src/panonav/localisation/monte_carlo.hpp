@@ -19,29 +19,29 @@ namespace panonav {
 
 /// Options of the particle filter.
 struct MonteCarloOptions {
-  /// Particle injection: how many particles are replaced at each image and where new ones are
-  /// sampled, so that a kidnapped robot is found again.
+  /// Particle injection: replaces some particles by new ones at each image, so that a kidnapped
+  /// robot is localised again.
   enum class Injection {
     none,       ///< none
-    explained,  ///< as many as the view's likelihood elsewhere demands (Bayes)
+    explained,  ///< number by Bayes' rule from the view's likelihood elsewhere
   };
 
-  int min_particles = 200;      ///< >= 1; used for one narrow mode
-  int max_particles = 5000;     ///< used when the robot may be anywhere
+  int min_particles = 200;      ///< >= 1; number of particles for one narrow mode
+  int max_particles = 5000;     ///< number of particles when the robot may be anywhere
   double kld_error = 0.05;      ///< largest error (Kullback-Leibler) of the particles' distribution
   double resample_below = 0.5;  ///< smallest effective sample size, as a share of the particles
-  bool compass = true;          ///< headings are weighed by the visual compass, too
+  bool compass = true;          ///< the visual compass also weights the particles' headings
   Injection injection = Injection::explained;  ///< how new particles are sampled
-  int reranked_views = 1000;  ///< compared column by column when no near view explains the image
+  int reranked_views = 1000;  ///< compared column by column if no near view explains the image
   int seed = 1;               ///< of all random choices, >= 0
 };
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
 
 /// Certainty of the estimated position.
 enum class LocalisationState {
-  localised,  ///< one mode, no wider than the references resolve, explains the views
-  ambiguous,  ///< the views are of this memory, but several places or a large area explain them
-  lost,       ///< the views are not explained by this memory, or odometry has led out of its area
+  localised,  ///< one mode, no wider than the references' resolution, explains the views
+  ambiguous,  ///< the views fit the memory, but at several places or in a large area
+  lost,       ///< the views do not fit the memory, or odometry has left its area
 };
 /// Returns "localised", "ambiguous" or "lost".
 [[nodiscard]] std::string_view name_of(LocalisationState state);
@@ -50,25 +50,25 @@ enum class LocalisationState {
 struct MonteCarloEstimate {
   LocalisationState state = LocalisationState::lost;  ///< localised, ambiguous or lost
   /// Modes with at least 1 % of the weight, heaviest first. Covariance and spread are those of the
-  /// position error. They exceed the particles' own, which ignore that the errors of successive
-  /// views and of travel are correlated (docs/decisions.md).
+  /// position error. They are larger than the particles', because the filter ignores that errors of
+  /// successive views and of travel are correlated (docs/decisions.md).
   std::vector<PoseMode> modes;
   std::optional<Pose2> pose;         ///< mean of the heaviest mode; nullopt when lost
   double spread_m = 0.0;             ///< root mean square distance of all particles from their mean
   int particles = 0;                 ///< number of particles, chosen by KLD sampling
   double effective_particles = 0.0;  ///< effective sample size before resampling
   bool resampled = false;            ///< particles were resampled after this image
-  int injected = 0;                  ///< particles that were replaced by new ones
-  /// Minimum difference (`ColumnMatch`) of the view from references near the particles; nullopt if
-  /// none was compared.
+  int injected = 0;                  ///< number of particles replaced by new ones
+  /// Smallest difference (`ColumnMatch`) between the view and the references near the particles;
+  /// nullopt if none was compared.
   std::optional<double> difference_here;
-  std::optional<double> difference_anywhere;  ///< the same to all references
-  /// Log-likelihood of the view at the particles, relative to that of an unexplained view.
+  std::optional<double> difference_anywhere;  ///< smallest difference to any reference
+  /// Logarithm of the view's mean likelihood over the particles, relative to an unexplained view.
   double log_here = 0.0;
-  double log_there = 0.0;  ///< the same anywhere in the memory (only with `Injection::explained`)
-  double inside = 0.0;  ///< belief that the robot is in the memorised area, 0 .. 1; lost below 0.5
+  double log_there = 0.0;  ///< the same over all places (only `Injection::explained`)
+  double inside = 0.0;     ///< probability of being in the memorised area; lost if < 0.5
   /// Probability that the robot is at the heaviest mode: `inside` times the mode's weight. Of
-  /// estimates with 0.9 and more inside the memorised area, more than nine of ten are right
+  /// estimates with at least 0.9 inside the memorised area, more than 90 % are right
   /// (docs/decisions.md).
   double probability = 0.0;
   std::uint64_t views_compared = 0;  ///< column by column
@@ -76,30 +76,30 @@ struct MonteCarloEstimate {
 
 /// Localises a robot by a particle filter over the posed views of a memory [M03 section 4].
 ///
-/// A robot with an unknown start is localised within a few images, keeps its position while images
-/// are missing or uninformative, and recovers after being kidnapped. Among places that look similar
-/// the filter keeps several modes. Runs in the calling thread. Deterministic.
+/// Localises a robot with an unknown start within a few images, tracks it by odometry while images
+/// are missing or uninformative, and relocalises it after a kidnapping. Keeps several modes if
+/// places look similar. Runs in the calling thread. Deterministic.
 class MonteCarloLocaliser {
  public:
   /// Result of an injection rule for one image.
   struct InjectedParticles {
-    std::size_t count = 0;       ///< replaced by new ones
-    std::vector<ViewId> around;  ///< references around which they are sampled; empty: anywhere
+    std::size_t count = 0;       ///< number of particles replaced by new ones
+    std::vector<ViewId> around;  ///< references around which new ones are sampled; empty: anywhere
   };
   /// Decides which particles to inject, from the image's signature and the number of particles.
   using InjectionRule =
       std::function<InjectedParticles(const PackedSignature& view, std::size_t particles)>;
 
   /// Starts anywhere in the memorised area, with any heading. The memory must outlive *this and
-  /// must not change. Throws OptionError; ContractError as `learn_observation_model`.
+  /// must not change. Throws OptionError; ContractError like `learn_observation_model`.
   explicit MonteCarloLocaliser(const VisualMemory& memory, const MonteCarloOptions& options = {},
                                const OdometryNoise& odometry = {});
   /// Uses a model learnt before.
   MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking, const ObservationModel& model,
                       const MonteCarloOptions& options = {}, const OdometryNoise& odometry = {});
-  /// Uses views that lie elsewhere: only their positions are held, 200 bytes for each.
-  /// `open_index` opens an index of the views for each image (`IndexedMemory::index`); what it
-  /// throws is passed on by all functions that read views. `shape`: of their signatures.
+  /// Uses views that are not held in RAM; holds only their positions, 200 bytes each. `open_index`
+  /// opens an index of the views for each image (`IndexedMemory::index`); its exceptions are passed
+  /// on by all functions that read views. `shape`: of the views' signatures.
   MonteCarloLocaliser(std::function<std::unique_ptr<ViewIndex>()> open_index, SignatureShape shape,
                       const ObservationModel& model, const MonteCarloOptions& options = {},
                       const OdometryNoise& odometry = {});
@@ -122,15 +122,15 @@ class MonteCarloLocaliser {
   /// number of steps may come between two images.
   void move(const Pose2& step);
 
-  /// Uses the views that have positions now, after some came or went. The particles stay. Throws
-  /// ContractError when there is none; then all stays as it was.
+  /// Reloads the positions of the memory's views after views were added or removed. Keeps the
+  /// particles. Throws ContractError, without any change, if no view has a position.
   void update_views();
   /// Returns the view that is nearest to the position. Cost: linear in the views.
   [[nodiscard]] ViewId find_nearest_view(Point2 position) const;
 
   /// Weighs the particles by an image and returns the new estimate. Throws ContractError on a
-  /// signature of another shape than the memory's, FileError when views that lie elsewhere cannot
-  /// be read; then the estimate stays as it was.
+  /// signature of another shape than the memory's; FileError, with the estimate unchanged, if views
+  /// cannot be read.
   MonteCarloEstimate observe(const PackedSignature& view);
   /// Returns the present estimate, without a new image.
   [[nodiscard]] MonteCarloEstimate estimate() const;

@@ -16,15 +16,16 @@ namespace {
 
 /// Largest number of neighbours of a reference: those on a grid.
 constexpr std::size_t max_neighbours = 8;
-/// Number of views that jointly explain a query: the corners of a grid's square.
+/// Number of views that jointly explain a query: a grid square has four corners.
 constexpr std::size_t counted_views = 4;
 /// Radius of the neighbourhood in spacings: more than the diagonal of a grid's square.
 constexpr double radius_spacings = 1.5;
-/// Largest ratio of an examined match's score to that of the best: places that look similar differ
-/// by less (tests/localisation/neighbour_support_test.cpp).
+/// Largest ratio of an examined match's score to the best score; places that look similar differ by
+/// less (tests/localisation/neighbour_support_test.cpp).
 constexpr double max_score_ratio = 1.25;
-/// Largest difference of heading between the chosen match and neighbours of its group: above the
-/// error of the compass between neighbours, far below the quarter turn of places that look similar.
+/// Largest difference between the robot's headings by the chosen match and by a neighbour moved
+/// with it: larger than the compass's error between neighbours, far below the quarter rotation of
+/// places that look similar.
 constexpr double heading_tolerance_rad = radians(20.0);
 
 }  // namespace

@@ -10,9 +10,9 @@
 namespace panonav {
 
 /// Decides between places that look similar. A view taken between references is explained by
-/// several of them together: what one shows from too far left, another shows from too far right. At
-/// a place that only looks similar, no neighbour explains what the best match does not. Only
-/// references with headings count.
+/// several of them together: one shows a thing from too far left, another from too far right. At a
+/// place that only looks similar, neighbours do not explain what the best match leaves unexplained.
+/// Uses only references with headings.
 class NeighbourSupport {
  public:
   /// Indexes the references; neighbours are the 8 nearest ones within 1.5 spacings. `spacing_m`:
@@ -31,17 +31,18 @@ class NeighbourSupport {
   /// Returns the neighbours ascending by distance; none for a view without a position or heading.
   [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
 
-  /// Returns the difference (`ColumnMatch::difference`) of the query from the match and its
-  /// neighbours together, all rotated to the heading that `match` shows. Of the four best-fitting
-  /// views, each column takes the mean of its two best ones. nullopt for a view without a position
-  /// or heading. `query`: over all rows. `excluded`: views that do not count as neighbours.
+  /// Returns the joint difference (as `ColumnMatch::difference`) between the query and the match
+  /// with its neighbours, all rotated to the heading estimated from `match`. Takes the four views
+  /// that fit best, and for each column the mean of its two smallest differences. nullopt for a
+  /// view without a position or heading. `query`: over all rows. `excluded`: views not used as
+  /// neighbours.
   [[nodiscard]] std::optional<double> supported_difference(
       const ColumnProfiles& query, const RankedMatch& match,
       std::span<const ViewId> excluded = {}) const;
 
-  /// Moves the match with the lowest score by its supported difference, and its neighbours, to the
-  /// front; the order is otherwise kept. Examines only matches whose score is at most 1.25 times
-  /// the first one's. Changes nothing if no match has neighbours.
+  /// Moves the match whose score by the supported difference is lowest to the front, together with
+  /// its neighbours; otherwise keeps the order. Examines only matches whose score is at most 1.25
+  /// times that of the first. Changes nothing if no match has neighbours.
   void rank_by_support(const ColumnProfiles& query, std::vector<RankedMatch>& ranked,
                        std::span<const ViewId> excluded = {}) const;
 

@@ -22,29 +22,31 @@ namespace panonav {
 
 namespace {
 
-/// Number of references compared around a position: as many as decide a likelihood
+/// Number of references compared around a position, as in the likelihood
 /// (`ViewLikelihood::sites_near`).
 constexpr std::size_t near_sites = 12;
-/// Distance in spacings beyond which views are unrelated: longer than most ranges of similarity.
+/// Distance in spacings beyond which views are unrelated: more than most similarity ranges.
 constexpr double far_spacings = 6.0;
-/// Number of references to which the fall of similarity is fitted: those within four spacings on a
-/// grid.
+/// Number of references to which the decay of similarity is fitted: on a grid, those within four
+/// spacings.
 constexpr std::size_t fitted_sites = 48;
 constexpr double fitted_spacings = 4.0;
 /// Largest distance of neighbours on a grid in spacings, diagonal ones included.
 constexpr double adjacent_site_spacings = 1.5;
-/// Bounds of the range of similarity in spacings: at shorter ones neighbours have nothing in
-/// common, at longer ones the fitted four spacings show no fall.
+/// Limits of the similarity range in spacings. With a shorter range, neighbours would have nothing
+/// in common; with a longer one, no decay is measurable over four spacings.
 constexpr double min_range_spacings = 0.4;
 constexpr double max_range_spacings = 20.0;
-/// Largest log-likelihood of a typical view at its own place: a higher one would place no view
-/// better, and one wrong view would outweigh all others.
+/// Upper limit of a typical view's log-likelihood at its own place. A higher one would not improve
+/// any position, but let one wrong view outweigh all others.
 constexpr double max_log_likelihood = 50.0;
 /// Smallest heading width: three columns, the possible error of a neighbouring view.
 constexpr double min_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
-/// Heading width in median errors: normal errors exceed it once in 23 times.
+/// Heading width as a multiple of the median absolute error; a Gaussian error exceeds it in 1 of 23
+/// cases.
 constexpr double median_heading_errors = 3.0;
-/// Largest heading error learnt from; larger ones are chance or symmetric fits.
+/// Largest heading error used in learning; larger ones come from chance matches or symmetric
+/// scenes.
 constexpr double max_heading_error_rad = std::numbers::pi / 4.0;
 
 struct Site {
@@ -78,7 +80,7 @@ std::vector<std::uint32_t> find_nearest_sites(std::span<const Site> sites, std::
   return nearest;
 }
 
-/// One view, left out of the memory, compared with the others where needed.
+/// A view left out of the memory. Compares it with other views on demand and keeps the results.
 class LeftOutView {
  public:
   LeftOutView(const ColumnRanking& ranking, std::span<const Site> sites, std::size_t own)
@@ -107,9 +109,9 @@ double to_similarity(const ColumnMatch& match, double far) {
   return far * far - match.difference * match.difference;
 }
 
-// Fits the range of similarity: the slope of the logarithm of the mean similarity over distance
-// [M04 section 2.2]. The line starts at far^2, the similarity of a view to itself. Bins below a
-// twentieth of that are noise.
+// Fits the similarity range: minus the inverse slope of the logarithm of the mean similarity over
+// distance [M04 section 2.2]. The line starts at far^2, the similarity of a view to itself. Ignores
+// distance bins whose mean is below far^2 / 20, which is noise.
 double fit_range(std::span<const std::pair<double, double>> distance_and_similarity,
                  double spacing_m, double far) {
   constexpr auto bins = static_cast<std::size_t>(2.0 * fitted_spacings);
@@ -129,18 +131,19 @@ double fit_range(std::span<const std::pair<double, double>> distance_and_similar
     product -= counts[b] * distance_m * std::log(similarities[b] / (counts[b] * far * far));
     square += counts[b] * distance_m * distance_m;
   }
-  // If no view resembles its neighbours, the range is at most the smallest one.
+  // If no view is similar to its neighbours, the range is the smallest one.
   if (!(square > 0.0)) return min_range_spacings * spacing_m;
   if (!(product > 0.0)) return max_range_spacings * spacing_m;
   return std::clamp(square / product, min_range_spacings * spacing_m,
                     max_range_spacings * spacing_m);
 }
 
-/// Squared similarity explained at each candidate position; the view's own one first.
+/// Squared similarity that the model explains at each candidate position; first at the view's own.
 using Explained = std::vector<double>;
 
 // Fits the sharpness that maximises the probability of the true positions of the left-out views
-// among all candidates. Its logarithm is concave in the sharpness.
+// among all candidates. The logarithm of this probability is concave in the sharpness, so bisection
+// of its slope finds the maximum.
 double fit_sharpness(std::span<const Explained> views) {
   std::vector<double> own;
   for (const Explained& view : views) own.push_back(view.front());
@@ -195,7 +198,8 @@ class LearningSample {
       own_.push_back(number_of(view));
       left_out_.emplace_back(ranking, sites_, own_.back());
     }
-    // All sites, or as many as keep the limit together with the references around them.
+    // Takes all sites if `compared_views` allows it, else fewer, because the 12 references around
+    // each candidate are compared too.
     const int count = static_cast<int>(sites_.size()) <= options.compared_views
                           ? static_cast<int>(sites_.size())
                           : std::max(8, options.compared_views / static_cast<int>(near_sites));
@@ -220,7 +224,7 @@ class LearningSample {
         far.push_back(left_out_[i].match(c).difference);
       }
     }
-    // A smaller memory has no far views; this is the difference of places with nothing in common.
+    // A small memory has no distant views; the fallback is the difference of unrelated places.
     return far.empty() ? PlaceModel::unrelated_difference : quantile(far, 0.5);
   }
 

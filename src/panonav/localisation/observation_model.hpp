@@ -5,14 +5,15 @@
 
 namespace panonav {
 
-/// Models how the similarity of a memory's views falls with distance, and how sharply it determines
-/// a position. Learnt from the memory's posed views, to be stored with it.
+/// Models how the similarity between a view and a reference falls with their distance, and how
+/// sharply the similarities determine a position. Learnt from the memory's posed views and stored
+/// with the memory.
 ///
 /// The similarity of two views is far_difference^2 - difference^2 (`ColumnMatch`), never below 0. A
 /// view's expected similarity to a reference at distance r is amplitude * exp(-r / range_m), since
 /// dissimilarity grows with distance and saturates [M04 section 2.2]. People in view, light and
-/// noise lower the amplitude, so it is free: only the pattern over the references locates the
-/// robot.
+/// noise lower the amplitude, so each view gets its own: only the relative similarities to the
+/// references locate the robot.
 struct ObservationModel {
   /// Smallest number of posed views needed for learning.
   static constexpr int min_views = 8;
@@ -20,15 +21,15 @@ struct ObservationModel {
   double spacing_m = 0.0;       ///< between references
   double far_difference = 0.6;  ///< median difference of two distant views
   double range_m = 0.0;         ///< distance at which the similarity has fallen to 1/e
-  /// Log-likelihood per squared unit of explained similarity: half the inverse variance of a
-  /// similarity around its expectation.
+  /// Log-likelihood of a view per unit of squared explained similarity: half the inverse variance
+  /// of a similarity around its expected value.
   double sharpness = 0.0;
   double heading_width_rad =
       0.0;  ///< largest heading difference at which a reference explains a view
-  /// Largest difference from the best reference of a view taken at a memorised place
+  /// Largest difference between a view taken at a memorised place and its best reference
   /// (`PlaceModel::threshold`).
   double explained_difference = 0.5;
-  double neighbouring_difference = 0.4;  ///< expected between references one spacing apart
+  double neighbouring_difference = 0.4;  ///< expected difference of views one spacing apart
   int sampled_views = 0;                 ///< number of views from which it was learnt
   friend bool operator==(const ObservationModel&, const ObservationModel&) = default;
 };

@@ -23,7 +23,8 @@ PackedSignature mirror(PackedSignature signature) {
   return signature;
 }
 
-// Returns the nearest view taken at another position: a standing robot takes the same view again.
+// Returns the nearest view taken at another position. Views at the same position are ignored, as a
+// standing robot takes the same view repeatedly.
 std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId view) {
   const auto& pose = memory.info(view).pose;
   if (!pose) return std::nullopt;
@@ -41,20 +42,21 @@ std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId v
   return nearest;
 }
 
-/// Number of sampled views compared with the mirrored query: their standard deviation errs by 9 %.
+/// Number of sampled views compared with the mirrored query: enough to estimate the standard
+/// deviation of the differences to 9 %.
 constexpr std::size_t chance_views = 64;
-/// Number of further sampled views that replace excluded ones; 80 column profiles take 0.2 MB in
-/// all.
+/// Number of spare sampled views, which replace excluded ones. All 80 column profiles take 0.2 MB.
 constexpr std::size_t spare_views = 16;
 /// Number of views whose local features are compared for chance and for neighbours, 0.1 ms each.
 constexpr std::size_t feature_views = 12;
-/// Number of best matches among which the best and the tenth best by the better half are found.
+/// Number of best matches that are compared by the better half of their columns to find the best
+/// and the tenth best.
 constexpr std::size_t examined_matches = 16;
-/// Standard deviations of a Gaussian between its mean and its first decile.
+/// Distance of a Gaussian's 10 % quantile from its mean, in standard deviations.
 constexpr double decile_deviations = 1.2816;
 
-// Returns the mean difference over the better half of the columns, at the rotation at which all
-// columns fit best.
+// Returns the mean difference over the half of the columns that agree best, at the rotation
+// `heading_rad`.
 double better_half_difference(const ColumnProfiles& query, const ColumnProfiles& reference,
                               double heading_rad) {
   auto columns = column_distances_at_heading(query, reference, heading_rad);
@@ -65,7 +67,7 @@ double better_half_difference(const ColumnProfiles& query, const ColumnProfiles&
          static_cast<double>(half - columns.begin());
 }
 
-// Returns the tenth smallest difference; the largest of fewer than ten.
+// Returns the tenth smallest difference; the largest one if there are fewer than ten.
 double tenth_smallest(std::vector<double> differences) {
   std::ranges::sort(differences);
   return differences[std::min<std::size_t>(10, differences.size()) - 1];
@@ -85,7 +87,7 @@ double log_ratio(int verified, int reference) {
 }  // namespace
 
 std::vector<ViewId> sample_reference_views(std::span<const ViewId> views) {
-  std::vector<std::pair<std::uint64_t, ViewId>> drawn;  // a heap, the largest number in front
+  std::vector<std::pair<std::uint64_t, ViewId>> drawn;  // a heap, largest random number first
   for (const ViewId view : views) {
     const std::pair number(Random(1, view.value).next(), view);
     if (drawn.size() == chance_views + spare_views) {
@@ -145,8 +147,8 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
   double min_threshold =
       std::min(PlaceModel::related_share * model.arbitrary, PlaceModel::unrelated_difference);
   if (beside.size() >= static_cast<std::size_t>(PlaceModel::min_views)) {
-    model.beside = quantile(beside, 0.9);
-    min_threshold = std::min(min_threshold, *model.beside);
+    model.nearest_view_difference = quantile(beside, 0.9);
+    min_threshold = std::min(min_threshold, *model.nearest_view_difference);
   }
   model.threshold = std::max(0.5 * (model.neighbouring + model.mirrored), min_threshold);
   model.learnt = true;
@@ -154,8 +156,8 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
 }
 
 std::array<double, column_term_count> column_terms(const PlaceEvidence& evidence) noexcept {
-  // Ranges in which `bench/place_probability` learnt: below the smallest difference rounding
-  // dominates, above the large one a view is clearly dissimilar.
+  // Limits of the ranges used by `bench/place_probability` for learning. Below `min_difference`
+  // rounding dominates; up to `large_difference` the difference over all columns is no evidence.
   constexpr double min_difference = 0.02;
   constexpr double large_difference = 0.5;
   constexpr int min_views = 8;
@@ -221,7 +223,7 @@ ColumnProfiles PlaceCriterion::profiles(ViewId view,
 double PlaceCriterion::chance_difference(const PackedSignature& query,
                                          const ColumnProfiles& query_profiles,
                                          const SearchMask& mask) const {
-  // An image without structure resembles any other one without structure.
+  // An image without structure matches any other image without structure, so it gives no evidence.
   const auto is_flat = [](std::uint8_t value) { return value == 128; };
   if (std::ranges::all_of(query_profiles.values(), is_flat)) return 0.0;
   const ColumnProfiles elsewhere(mirror(query), 0, mask.allowed_rows);

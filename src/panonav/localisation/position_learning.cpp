@@ -17,30 +17,31 @@ namespace panonav {
 
 namespace {
 
-/// Candidates for the neighbourhood, in spacings (rings of a grid), and for the variogram's
-/// exponent. 1 is exact for signatures that change as a random walk, 2 for signatures that change
-/// linearly with position, but without a unique solution.
+/// Candidates for the radius of the neighbourhood, in spacings (rings of a grid), and for the
+/// variogram's exponent. An exponent of 1 is exact if signatures change with position as a random
+/// walk, 2 if they change linearly; but 2 has no unique solution.
 constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
 constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
-/// Share of the true positions that are within the radius; of the rest, half may be at another
-/// place that looks alike.
+/// Share of the true positions within the radius. Half of the others may be due to lookalike
+/// places.
 constexpr double coverage = 0.95;
 constexpr double max_wrong_share = 0.5 * (1.0 - coverage);
-/// Number of matches searched for a left-out view, so that its lookalikes at up to 48 places can be
-/// removed.
+/// Number of matches searched for a left-out view: `candidates` remain after its best matches at up
+/// to 48 other places have been removed.
 constexpr int searched_matches = 4 * PositionModel::candidates;
-/// Largest distance of a right best match in spacings: a grid's neighbours.
+/// Largest distance between a view and its best match, in spacings, at which the match is right: a
+/// grid's neighbours are nearer.
 constexpr double own_place_spacings = 2.0;
-/// Smallest unit of squared differences, for memories of identical views.
+/// Smallest unit of squared differences; avoids a division by 0 if all views are identical.
 constexpr double min_difference_unit = 1e-4;
 
 /// Views left out of the memory in turn, and the views that resemble them.
 struct LeftOutViews {
   std::vector<Point2> truths;
-  /// Matches of the search, duplicates of the place included: the interpolation is learnt from
-  /// them, and they matter most if there are few views.
+  /// All matches of the search, lookalikes included. The interpolation is learnt from these, since
+  /// they matter if there are few views.
   std::vector<ResemblingViews> found;
-  /// The views found without lookalikes, as for a query; the radius is learnt from them.
+  /// Matches without lookalikes, ranked as for a query; the radius is learnt from these.
   std::vector<ResemblingViews> answered;
 
   [[nodiscard]] std::size_t size() const { return truths.size(); }
@@ -52,7 +53,8 @@ struct LeftOutViews {
   }
 };
 
-// Returns the best match of each place except that of the view itself, at `truth`.
+// Returns the best match at each place farther than `elsewhere_spacings` from `truth` and from the
+// others: the view's lookalikes.
 std::vector<ViewId> find_doubles(const VisualMemory& memory, Point2 truth,
                                  std::span<const RankedMatch> ranked, double spacing_m) {
   std::vector<Point2> places{truth};
@@ -114,8 +116,8 @@ double learn_difference_unit(const LeftOutViews& left_out) {
 }
 
 // Chooses the neighbourhood and the exponent with the smallest position errors. Returns false if no
-// view is found near its place. Views whose best match only looks alike are ignored: they would
-// favour a wide neighbourhood, as averaging many wrong places lowers their error.
+// view is found near its place. Views found at a lookalike are ignored: they would favour a wide
+// neighbourhood, because averaging over many wrong places lowers their error.
 bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
   double best_sum_m = std::numeric_limits<double>::infinity();
   for (const double spacings : neighbourhoods) {
@@ -155,8 +157,8 @@ InterpolationErrors interpolate_all(const LeftOutViews& left_out, const Position
   return result;
 }
 
-// Learns the ratio from which on the position may be that of a lookalike. Sorted by ratio, the
-// longest prefix of views of which hardly any was found elsewhere counts as clear.
+// Learns `ambiguous_from`: sorts the views by ratio and takes the longest prefix in which hardly
+// any view was found elsewhere; the next ratio is the first ambiguous one.
 void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> errors_m,
                      PositionModel& model) {
   std::vector<std::pair<double, std::size_t>> by_ratio;
@@ -180,8 +182,8 @@ void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> error
   model.ambiguous_radius_m = quantile(ambiguous_errors_m, coverage);
 }
 
-// Learns the radii that hold the errors of views found near their place, separately for views that
-// references surround. Returns false if there is no such view.
+// Learns the radii that contain the errors of views found near their place, separately for
+// surrounded views and views at the edge. Returns false if no view was found near its place.
 bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors,
                  PositionModel& model) {
   std::vector<double> all;
@@ -194,11 +196,12 @@ bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors
     (is_surrounded(left_out.answered[i], model.spacing_m) ? surrounded : at_edge)
         .push_back(all.back());
   }
-  // If none is near, every answer is ambiguous.
+  // If no view was found near its place, every answer is ambiguous, and `ambiguous_radius_m`
+  // decides.
   if (all.empty() && model.ambiguous_from) all.push_back(0.0);
   if (all.empty()) return false;
-  // Returns the quantile of a sample below which a further draw stays with at least this
-  // probability; uses all errors if there are few of a kind.
+  // Returns the value that a further sample exceeds with at most the probability 1 - `coverage`.
+  // Uses all errors if there are few of this kind.
   const auto bound = [&](const std::vector<double>& kind) {
     const auto& of = kind.size() < PositionModel::min_views ? all : kind;
     const double n = static_cast<double>(of.size());

@@ -11,8 +11,8 @@ namespace panonav {
 
 /// Options of learning a model from views.
 struct LearningOptions {
-  int sampled_views = 100;    ///< views left out in turn; all of a smaller memory
-  int compared_views = 1000;  ///< views with which each is compared; all of a smaller memory
+  int sampled_views = 100;    ///< number of views left out in turn; a smaller memory uses all
+  int compared_views = 1000;  ///< largest number of views to which each of them is compared
   int seed = 1;               ///< seed of the sampling
 };
 void visit_options(LearningOptions& options, OptionVisitor& visitor);

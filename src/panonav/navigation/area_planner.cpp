@@ -78,7 +78,8 @@ std::vector<Guide> AreaPlanner::search_from(std::size_t area, std::size_t node) 
   return search_area(graph_, areas_, area, {&root, 1}, blocked_);
 }
 
-// Returns the index among the gate ends of the next area of the one to which the exit leads.
+// Returns the node to which the exit leads, as an index among the gate ends of its area; nullopt if
+// the exit stays in `area`, is blocked or leads to no gate end.
 std::optional<std::size_t> AreaPlanner::find_end_beyond(std::size_t area,
                                                         const NavigationGraph::Exit& exit) const {
   const std::size_t beyond = areas_.area_of[exit.node];
@@ -89,7 +90,7 @@ std::optional<std::size_t> AreaPlanner::find_end_beyond(std::size_t area,
   return static_cast<std::size_t>(found - nodes.begin());
 }
 
-// Chooses gates one after the other, each the farthest from those chosen before.
+// Chooses gates one after another; each is the one farthest from those already chosen.
 void AreaPlanner::choose_gates(Border& border) const {
   std::vector<std::size_t> open;
   for (const std::size_t gate : border.edges) {
@@ -142,7 +143,7 @@ std::optional<ViewId> AreaPlanner::goal() const {
   return goal_ ? std::optional(graph_.view(*goal_)) : std::nullopt;
 }
 
-// Finds the lengths from the gate ends of all areas to the goal [Dijkstra].
+// Computes the path lengths from the gate ends of all areas to the goal [Dijkstra].
 void AreaPlanner::plan_over_areas() {
   for (GateEnds& ends : ends_) std::ranges::fill(ends.lengths_to_goal, unreachable);
   if (!goal_) return;
@@ -189,7 +190,7 @@ void AreaPlanner::block(std::span<const std::size_t> edges) {
       changed.insert(areas_.area_of[*graph_.node_of(view)]);
     }
   }
-  // Another gate of the border replaces a blocked one.
+  // Another open gate of the border replaces a blocked one.
   for (Border& border : borders_) {
     const bool lost =
         std::ranges::any_of(border.gates, [&](std::size_t gate) { return blocked_[gate] != 0; });

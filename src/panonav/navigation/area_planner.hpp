@@ -18,24 +18,26 @@ namespace panonav {
 struct PlannerOptions {
   FieldOptions field;    ///< of the directions within an area
   SubAreaOptions areas;  ///< of the areas' size
-  /// Gates used between two areas at most, spread over their border; more make paths through wide
-  /// borders shorter and planning slower. 0: all, and every path is a shortest one.
+  /// Largest number of gates used between two areas, spread over their border. With more gates,
+  /// paths through wide borders become shorter and planning becomes slower. 0: all, and every path
+  /// is a shortest one.
   int gates_per_border = 4;
 };
 void visit_options(PlannerOptions& options, OptionVisitor& visitor);
 
-/// Plans over areas first, then inside: the sub-goals of the outlook of [M04 section 3.5]. The
-/// paths between the gates of an area are found once; a goal then costs a search in its own area
-/// and one over the gates, and the field of an area a search in that area. So a plan looks at no
-/// views outside of the areas that it needs. Blocked edges stay blocked until they are unblocked.
+/// Plans first over areas, then within each: the sub-goals of the outlook of [M04 section 3.5].
+/// Computes the paths between the gates of an area once. A goal then costs a search in its own area
+/// and one over the gates; the direction field of an area costs a search in that area. So a plan
+/// uses only views of the areas that it crosses. Blocked edges stay blocked until `unblock_all`.
 class AreaPlanner {
  public:
-  /// Throws OptionError. Cost: that of `divide_into_areas`, and a search in its area for each gate.
+  /// Throws OptionError. Cost: that of `divide_into_areas`, and for each gate a search in each of
+  /// its two areas.
   explicit AreaPlanner(NavigationGraph graph, const PlannerOptions& options = {});
-  /// Plans over areas made before. Throws ContractError when they are not those of this graph.
+  /// Uses areas made before. Throws ContractError if they do not belong to this graph.
   AreaPlanner(NavigationGraph graph, SubAreas areas, const PlannerOptions& options = {});
 
-  /// Options that the constructor was given.
+  /// Returns the graph that was passed to the constructor.
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return graph_; }
   /// Made at construction, or as passed to the constructor.
   [[nodiscard]] const SubAreas& areas() const noexcept { return areas_; }
@@ -48,21 +50,21 @@ class AreaPlanner {
   [[nodiscard]] std::optional<ViewId> goal() const;
 
   /// Excludes edges from plans. Throws ContractError on an edge that the graph does not have. Cost:
-  /// finds the paths between gates again for the areas at both ends, and the plan over areas.
+  /// recomputes the paths between gates in the areas at both ends, and the plan over areas.
   void block(std::span<const std::size_t> edges);
-  /// Allows all edges again. Cost: as `block`, for the areas of the edges that were blocked.
+  /// Allows all edges again. Cost: as `block`, for the areas of the blocked edges.
   void unblock_all();
   /// True if the edge of this number is excluded from plans.
   [[nodiscard]] bool is_blocked(std::size_t edge) const { return blocked_.at(edge) != 0; }
   /// Number of blocked edges.
   [[nodiscard]] std::size_t blocked_edges() const noexcept;
 
-  /// Returns the guides towards the goal, in the order of the area's nodes; without a goal none is
-  /// reachable. Throws ContractError when there is no such area.
+  /// Returns the guides of the area's nodes towards the goal, in the order of the nodes. Without a
+  /// goal, all are unreachable. Throws ContractError if there is no such area.
   [[nodiscard]] std::vector<Guide> field(std::size_t area) const;
 
-  /// Returns the nodes from `start` to the goal, both included; none when it cannot be reached.
-  /// Makes the fields of the areas on the path.
+  /// Returns the nodes from `start` to the goal, both included; none if the goal cannot be reached.
+  /// Computes the field of each area on the path.
   [[nodiscard]] std::vector<std::size_t> plan_path(std::size_t start) const;
 
  private:
@@ -76,10 +78,10 @@ class AreaPlanner {
   struct GateEnds {
     std::vector<std::size_t> borders;
     std::vector<std::size_t> nodes;       // ascending
-    std::vector<double> path_lengths;     // nodes.size() squared; infinite where there is no path
+    std::vector<double> path_lengths;     // matrix between `nodes`; infinite: no path
     std::vector<double> lengths_to_goal;  // of each of `nodes`
   };
-  /// Returns the ends of an edge, that in `area` first.
+  /// Returns the two nodes of an edge; the one in `area` comes first.
   [[nodiscard]] std::pair<std::size_t, std::size_t> ends_of(std::size_t edge,
                                                             std::size_t area) const;
   [[nodiscard]] std::vector<Guide> search_from(std::size_t area, std::size_t node) const;

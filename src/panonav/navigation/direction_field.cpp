@@ -61,7 +61,7 @@ std::vector<Guide> search_area(const NavigationGraph& graph, const SubAreas& are
 
 namespace {
 
-// Returns the mean direction to the next nodes, as far as the path is straight.
+// Returns the mean direction to the next nodes, up to the first bend larger than `max_bend_rad`.
 std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas& areas,
                                    std::size_t node, const FieldOptions& options,
                                    std::span<const Guide> guides) {

@@ -12,23 +12,23 @@
 
 namespace panonav {
 
-/// Distance ahead of a node at which its direction of motion is read.
+/// Options of the direction of motion at a node: how much of the path ahead determines it.
 struct FieldOptions {
-  /// Edges ahead that count for a direction, as far as the path is straight.
+  /// Number of edges ahead that determine a direction, if the path is straight.
   int links_ahead = 3;
-  /// Edges beyond a larger bend do not count: the path may turn a corner there.
+  /// Edges beyond a larger bend are not used, since the path may turn a corner there.
   double max_bend_rad = 0.7854;
 };
 void visit_options(FieldOptions& options, OptionVisitor& visitor);
 
-/// The way from one reference view to the goal.
+/// The next step on the path from one reference view to the goal.
 struct Guide {
-  /// Length of the path along the edges; infinite where the goal cannot be reached.
+  /// Length of the path along the edges; infinite if the goal cannot be reached.
   double path_length = std::numeric_limits<double>::infinity();
-  std::size_t next = 0;  ///< next node; the node itself at the goal, or when unreachable
-  std::size_t edge = 0;  ///< that leads there
-  /// Direction of motion in the frame of the robot that took this view. Empty at the goal, when
-  /// unreachable, and where no edge has a motion.
+  std::size_t next = 0;  ///< next node; the node itself at the goal or if unreachable
+  std::size_t edge = 0;  ///< edge to `next`
+  /// Direction of motion in the frame of the robot that took this view; nullopt at the goal, if
+  /// unreachable, and if the motion of the edge is unknown.
   std::optional<double> direction_rad;
 
   /// True if a path leads to the goal.
@@ -37,8 +37,8 @@ struct Guide {
   }
 };
 
-/// Returns the guide of each node of the whole graph; `blocked` edges are not 0 (empty: none).
-/// Throws ContractError when the goal is not in the graph, OptionError.
+/// Returns the guide of each node of the whole graph. `blocked`: one entry for each edge, not 0 if
+/// blocked (empty: none). Throws ContractError when the goal is not in the graph, OptionError.
 [[nodiscard]] std::vector<Guide> direction_field(const NavigationGraph& graph, ViewId goal,
                                                  const FieldOptions& options = {},
                                                  std::span<const std::uint8_t> blocked = {});

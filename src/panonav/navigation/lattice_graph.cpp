@@ -18,32 +18,33 @@ namespace {
 /// The part of a spring that navigation needs.
 struct Spring {
   EdgeEnds ends;
-  std::optional<Pose2> motion;  // a_from_b by the phases; unit R
+  std::optional<Pose2> motion;  // a_from_b by the phases, in units of R
   double length = 0.0;          // in the arrangement
   double weight = 0.0;
   bool one_component = false;
   int support = 0;  // number of third views that confirm it
 };
 
-/// A third view joins two readings, each with the error of one: 20 degrees, and this share of the
-/// motion's length.
+/// Largest disagreement between a spring's motion and the chain of two motions over a third view:
+/// 20 degrees, and this share of the motion's length.
 constexpr double max_rotation_error_rad = 0.35;
 constexpr double max_position_error = 0.4;
-/// Length of springs in spacings up to which they become edges. The distance to the nearest of
-/// several views, each with an error, is a tenth below the spacing, so this means two spacings:
-/// views of a square grid have others at 1.41 and 2.
+/// Largest length of springs that become edges, in spacings. The spacing is estimated a tenth too
+/// small (as the minimum of several noisy distances), so this means two spacings: on a square grid,
+/// distances between views are 1, 1.41 and 2 spacings.
 constexpr double max_spacings = 2.3;
-/// Limits for springs that a distorted arrangement rejected although they are right: as short as
-/// those to nearest views, and confirmed by this number of third views.
+/// Limits for springs that were rejected, perhaps only because the arrangement is distorted: they
+/// become edges if they are as short as springs to nearest views and confirmed by this number of
+/// third views.
 constexpr double max_spacings_of_rejected = 1.5;
 constexpr int min_support_of_rejected = 3;
-/// Share of their neighbours that the ends of an edge have in common. On an open square grid with
-/// edges up to two spacings nearest neighbours have half of theirs in common, views two spacings
-/// apart a quarter; one may be missing.
+/// Smallest share of neighbours that the ends of an edge have in common. On an open square grid
+/// with edges up to two spacings, the share is a half for nearest neighbours and a quarter for
+/// views two spacings apart; one neighbour may be missing.
 constexpr double min_common_share = 0.25;
 
-// Counts for each spring the third views that show the same motion. Those of one place confirm the
-// rotation alone.
+// Counts for each spring the third views over which two chained motions give the same motion. If
+// all three views are of one place, only rotations are compared.
 void count_support(std::size_t views, std::vector<Spring>& springs) {
   struct Motion {
     std::size_t to;
@@ -71,9 +72,9 @@ void count_support(std::size_t views, std::vector<Spring>& springs) {
   }
 }
 
-// Returns for each view the spacing of the references around it, in the unit of `lengths`, which
-// are those of the springs: the median distance to the nearest one, of the view and those that
-// springs join to it. Infinite where no length is known.
+// Returns for each view the spacing of the references around it, in the unit of `lengths` (one for
+// each spring): the median, over the view and its neighbours by springs, of the distance to the
+// nearest neighbour. Infinite if no length is known.
 std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>& springs,
                                     const std::vector<double>& lengths) {
   constexpr double unknown = std::numeric_limits<double>::infinity();
@@ -102,13 +103,13 @@ struct Candidate {
   NavigationGraph::Edge edge;
   EdgeEnds ends;
   double spacings = 0.0;    // its length in spacings of the references around
-  bool joins_only = false;  // kept only where without it two components would not be joined
+  bool joins_only = false;  // kept only if it joins two components
 };
 
-// Makes edges whose lengths are in spacings of the references around: similarity falls faster with
-// distance where things are near, so the unit of phases and of the arrangement changes from place
-// to place. The arrangement laid out what it kept by the directions of all springs around; of what
-// it rejected only the phases have a length.
+// Makes edges with lengths in units of the local spacing of the references. The unit of phases and
+// of the arrangement differs between places, because similarity falls faster with distance where
+// objects are near. The length of a kept spring comes from the arrangement, which combines the
+// directions of all springs around; that of a rejected spring from its phases.
 std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
                                        const std::vector<Spring>& springs, double min_weight) {
   const auto is_rejected = [&](const Spring& spring) {
@@ -144,8 +145,8 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
   return candidates;
 }
 
-// Marks edges whose ends have hardly any neighbour in common: they lead to another place that looks
-// similar, and paths would be planned through them as through a hole in the wall.
+// Marks edges whose ends have hardly any neighbour in common. Such edges lead to another place that
+// looks similar; a planned path would pass through the wall between the two places.
 void mark_isolated_edges(std::size_t views, std::vector<Candidate>& candidates) {
   std::vector<std::vector<std::size_t>> around(views);
   for (const Candidate& candidate : candidates) {
@@ -173,7 +174,8 @@ std::vector<NavigationGraph::Edge> choose_edges(const std::vector<ViewId>& views
   });
   std::vector<Candidate> candidates = make_candidates(views, springs, min_weight);
   mark_isolated_edges(views.size(), candidates);
-  // Marked ones last, the nearest first: they are left out where others lead there, too.
+  // Sorts marked edges last, the shortest first, so that they are kept only if no other edges
+  // connect the two components.
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
     return std::pair(candidate.joins_only, candidate.spacings);
   });
@@ -196,7 +198,7 @@ NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight) {
   for (const Lattice::Spring& spring : lattice.springs) {
     const Lattice::Node& a = lattice.nodes.at(spring.a);
     const Lattice::Node& b = lattice.nodes.at(spring.b);
-    // An arrangement without phases has no headings, and so no directions.
+    // An arrangement made without phases has no headings, so its edges have no directions.
     springs.push_back({{spring.a, spring.b},
                        spring.phases ? to_motion(*spring.phases) : std::nullopt,
                        distance(a.pose.position(), b.pose.position()),

@@ -28,8 +28,8 @@ void require_valid(const NavigationGraph::Edge& edge) {
   }
 }
 
-/// Largest error of the heading of a map where its views are compared: about 30 degrees, less than
-/// half of the quarter turn after which rooms look similar.
+/// Largest assumed error of the map's relative heading of two views: about 30 degrees, less than
+/// half of the quarter rotation after which rooms look similar.
 constexpr float max_heading_error_rad = 0.5F;
 
 bool agree(const Pose2& a, const Pose2& b) {
@@ -38,8 +38,8 @@ bool agree(const Pose2& a, const Pose2& b) {
   return std::abs(turned) <= max_disagreement_rad && std::abs(aside) <= max_disagreement_rad;
 }
 
-// True if most triangles with a third view whose motions are known confirm an edge, as in
-// `arrange`, or there is no triangle at all; false where no motions are known.
+// True if most triangles with a third view confirm the motion of the edge, as in `arrange`, or if
+// there is no triangle; false if no triangle has known motions.
 bool is_supported(const NavigationGraph& graph, const NavigationGraph::Edge& edge) {
   const std::size_t a = *graph.node_of(edge.a);
   const std::size_t b = *graph.node_of(edge.b);
@@ -92,7 +92,8 @@ NavigationGraph::NavigationGraph(std::vector<ViewId> views,
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
   exits_.resize(begins_.back());
   std::vector<std::size_t> next(begins_.begin(), begins_.end() - 1);
-  // This order puts the exits of a node to lower nodes before those to higher ones.
+  // Fills exits to lower nodes first and those to higher nodes last, so that the exits of each node
+  // ascend.
   for (const Ends& e : ends) {
     exits_[next[e.high]++] = {e.low, edges_.size()};
     edges_.push_back(edges[e.edge]);
@@ -165,11 +166,11 @@ NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight) {
 
 namespace {
 
-// Returns nodes of one component within `reach` of each other that no edge joins.
+// Returns pairs of nodes of one component that are at most `reach` apart and not joined by an edge.
 std::vector<EdgeEnds> find_near_pairs(const TopologicalMap& map, double reach) {
   std::set<std::pair<ViewId, ViewId>> known;
   for (const TopologicalMap::Edge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
-  // Sorted by x, so that nodes too far along it need not be visited.
+  // Sorts by x, so that nodes too far away in x need not be visited.
   std::vector<std::size_t> order(map.nodes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [&](std::size_t i) { return map.nodes[i].pose.x_m; });
@@ -204,7 +205,8 @@ NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const V
     differences.push_back(image_difference(homing_view(memory.signature(edge.a)),
                                            homing_view(memory.signature(edge.b))));
   }
-  // The diagonal of a grid over its spacing; and what nine of ten edges differ by at most.
+  // Limits of a pair: a grid's diagonal is 1.41 spacings; 90 % of the edges have a smaller
+  // difference.
   const double reach = 1.5 * upper_median(lengths);
   const double max_difference = quantile(differences, 0.9);
   const std::vector<EdgeEnds> pairs = find_near_pairs(map, reach);

@@ -15,28 +15,28 @@
 
 namespace panonav {
 
-/// The reference views and the edges between them. Nodes are numbered from 0 in the order of their
-/// views. Holds no signatures, about 100 bytes an edge. Immutable.
+/// Graph of reference views and the edges between them. Nodes are numbered from 0 in the order of
+/// their views. Holds no signatures, only about 100 bytes for each edge. Immutable.
 class NavigationGraph {
  public:
   /// Two reference views between which a robot can move in both directions.
   struct Edge {
     ViewId a;             ///< one end
     ViewId b;             ///< the other
-    double length = 1.0;  ///< path length, > 0; in whatever unit the graph has
-    /// Pose of b in the frame of a, in the graph's unit; nullopt where it is not known. x and y are
-    /// 0 for views of one place: no direction is meant.
+    double length = 1.0;  ///< path length > 0, in the graph's unit
+    /// Pose of b in the frame of a, in the graph's unit; nullopt if unknown. x and y are 0 for two
+    /// views of one place, which have no direction.
     std::optional<Pose2> a_from_b;
     friend bool operator==(const Edge&, const Edge&) = default;
   };
-  /// An edge as seen from one of its ends.
+  /// An edge that leaves a node.
   struct Exit {
-    std::size_t node = 0;  ///< where it leads
-    std::size_t edge = 0;  ///< its number
+    std::size_t node = 0;  ///< node at the other end of the edge
+    std::size_t edge = 0;  ///< number of the edge
   };
 
-  /// `views` ascend. Of several edges between two views the first counts. Throws ContractError
-  /// on an edge of a view that is not there or to itself, or numbers that are not finite or out
+  /// `views`: ascending. Of several edges between two views, uses the first. Throws ContractError
+  /// if an edge has an unknown view or joins a view to itself, or if a number is not finite or out
   /// of range.
   NavigationGraph(std::vector<ViewId> views, std::vector<Edge> edges);
 
@@ -49,11 +49,11 @@ class NavigationGraph {
   [[nodiscard]] std::optional<std::size_t> node_of(ViewId view) const;
   /// Each edge once, in the order of their numbers.
   [[nodiscard]] std::span<const Edge> edges() const noexcept { return edges_; }
-  /// The edges of a node, ascending by the node where they lead.
+  /// The edges of a node, ascending by the node at their other end.
   [[nodiscard]] std::span<const Exit> exits(std::size_t node) const {
     return std::span(exits_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
   }
-  /// Pose of the far end of an edge in the frame of `node`, one of its ends: node_from_other.
+  /// Pose of an edge's other end in the frame of `node`, one of its ends: node_from_other.
   [[nodiscard]] std::optional<Pose2> motion_from(std::size_t node, std::size_t edge) const;
 
  private:
@@ -63,52 +63,53 @@ class NavigationGraph {
   std::vector<Exit> exits_;
 };
 
-/// Returns the nodes at most `links` edges away from one of `from`, these included; ascending.
+/// Returns the nodes at most `links` edges away from one of the nodes `from`, including them;
+/// ascending.
 [[nodiscard]] std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
                                                     std::span<const std::size_t> from, int links);
 
-/// Largest difference between the directions that the two views of an edge show: 45 degrees, as in
-/// `arrange`.
+/// Largest difference between the directions of an edge as computed from its two views: 45 degrees,
+/// as in `arrange`.
 inline constexpr double max_disagreement_rad = 0.78539816339744831;
 
-/// Reads an edge for each link from the phases of its two views by their home vectors [M04 section
-/// 3.5], without any position. Lengths are in units of R, the typical distance of the things
-/// around, and at least a tenth of their median. Where the views disagree by more than 45 degrees,
-/// or not more than half of the triangles with third views close to that, nothing is known of the
-/// motion and the length is three times the median. At most some thousand views are held at once.
-/// Throws ContractError on a link of a view that the source does not have. Cost: two home vectors a
-/// link.
+/// Computes an edge for each link from the phases of its two views by their home vectors [M04
+/// section 3.5], without any position. Lengths are in units of R, the typical distance of the
+/// objects around, and at least a tenth of their median. The motion is unknown and the length three
+/// times the median in two cases: the views disagree by more than 45 degrees, or at most half of
+/// the triangles with third views close within 45 degrees. Holds at most a few thousand views at
+/// once. Throws ContractError on a link of a view that the source does not have. Cost: two home
+/// vectors for each link.
 [[nodiscard]] NavigationGraph graph_from_links(const ViewSource& source,
                                                std::span<const Link> links, Executor& executor);
 
-/// Takes the edges of a map within one component whose weight is at least `min_weight`: others
-/// contradict the rest of the map. Motions and lengths follow from the poses. Throws ContractError
-/// as `validate`.
+/// Uses the edges of a map that lie within one component and have at least the weight `min_weight`;
+/// edges of smaller weight contradict the rest of the map. Computes motions and lengths from the
+/// poses. Throws ContractError like `validate`.
 [[nodiscard]] NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight = 0.1);
 
-/// Like `graph_from_map`, with edges also between nodes of one component that are near each other
-/// in the map, up to one and a half of the median length of its edges, if their views are as
-/// similar as those of most edges and agree on a direction: a robot that passes a place for the
-/// second time can continue as it did the first time. The memory must hold the map's views. Cost: a
-/// home vector and a half for each such pair.
+/// Like `graph_from_map`, but also joins near nodes of one component, so that a robot that passes a
+/// place for the second time can continue as it did the first time. Their distance in the map must
+/// be at most 1.5 times the median length of its edges, their views must be as similar as those of
+/// most edges, and the two views must agree on a direction. The memory must hold the map's views.
+/// Cost: one and a half home vectors for each such pair.
 [[nodiscard]] NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map,
                                                             const VisualMemory& memory,
                                                             Executor& executor,
                                                             double min_weight = 0.1);
 
-/// Takes the springs that kept `min_weight` of themselves and are at most two spacings of the
-/// references around long, and rejected ones of up to one and a half spacings that three third
-/// views confirm; of these the ones whose ends have about a quarter of their neighbours in common:
-/// others lead to places that look similar. Those left out thereby join what would not be connected
-/// otherwise. Directions and turns follow from the phases, so that the distortion of the
-/// arrangement bends none. Lengths, in spacings of the references around, are those of the
-/// arrangement, of rejected springs those of the phases. Cost: the springs times those of a view.
+/// Uses the springs of weight at least `min_weight` that are at most two local spacings of the
+/// references long, and rejected springs of at most one and a half spacings that three third views
+/// confirm. The ends of these springs must have about a quarter of their neighbours in common,
+/// since other springs lead to places that look similar. Springs left out by these rules are used
+/// only if they connect components. Directions and rotations are computed from the phases, so that
+/// a distorted arrangement does not change them. Lengths, in local spacings of the references, come
+/// from the arrangement; those of rejected springs from the phases. Cost: the number of springs
+/// times the number of springs at a view.
 [[nodiscard]] NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight = 0.1);
 
-/// Same as `graph_from_lattice` for a lattice that was stored as a map (`to_topological_map`): the
-/// phases are read again from the views, with the support that the edges of links need. Throws
-/// ContractError as `validate`, and on a view that the source does not have. Cost: two home vectors
-/// an edge.
+/// Same as `graph_from_lattice` for a lattice that was stored as a map (`to_topological_map`):
+/// computes the motions again from the phases of the views. Throws ContractError like `validate`,
+/// and on a view that the source does not have. Cost: two home vectors for each edge.
 [[nodiscard]] NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,
                                                         const ViewSource& source,
                                                         Executor& executor,

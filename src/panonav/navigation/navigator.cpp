@@ -16,16 +16,19 @@ namespace panonav {
 
 namespace {
 
-/// The direction of the next reference counts where it differs from that of the field by less:
-/// twice the 30 degrees by which neighbours on a grid's diagonal may differ from the path.
+/// Largest difference between the home vector to the next reference and the direction field at
+/// which the home vector is used: twice the 30 degrees by which neighbours on a grid's diagonal may
+/// differ from the path.
 constexpr double max_correction_rad = std::numbers::pi / 3.0;
-/// A step that leads aside by more is no attempt of the edge ahead, of which it makes half or less.
+/// A detour by a larger angle is not counted as an attempt at the edge ahead, as it advances along
+/// the edge by half a step or less.
 constexpr double max_aside_rad = 1.0;
-/// An edge of this number of typical lengths is followed to its end: no reference stands along it.
+/// Length, in typical edge lengths, from which an edge is followed to its end, because no
+/// references are along it.
 constexpr double min_long_edge = 2.0;
-/// Steps for each typical length of an edge: `step_m` is half of one.
+/// Number of steps per typical edge length: `step_m` is about half of that length.
 constexpr double steps_per_length = 2.0;
-/// Fewer components give no home vector.
+/// Smallest number of components from which a home vector can be computed.
 constexpr int min_components = 3;
 
 MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
@@ -58,7 +61,8 @@ Navigator::Core::Core(const ViewSource& source_, AreaPlanner planner_,
     : source(&source_),
       planner(std::move(planner_)),
       options(options_),
-      // The next place and the references compared there are loaded on both sides of a border.
+      // Loads one edge more than is searched, so that the next place and the references compared
+      // there are loaded on both sides of a border.
       views(source_, options_.near_links + 1),
       criterion(source_) {
   validate(options);
@@ -93,7 +97,8 @@ void Navigator::Core::forget_place() {
   plan.committed.reset();
 }
 
-// Ends homing, the committed edge and the leg of a robot that is not where it was assumed to be.
+// Ends homing, the committed edge and the route leg, because the robot is not where it was assumed
+// to be.
 void Navigator::Core::abandon_plans(Step& step) {
   homing.reset();
   plan.committed.reset();
@@ -111,8 +116,8 @@ const Guide& Navigator::Core::guide() const {
   return plan.field.at(planner.areas().place_of[*place.node]);
 }
 
-// Commits to a long edge; and to any other one whose beginning the robot has come back to although
-// nothing obstructed it: a reference beside the edge has sent it back.
+// Commits to a long edge, or to an edge to whose start the robot has come back without an
+// obstruction: then a reference next to the edge has misled it.
 void Navigator::Core::commit_to_edge_if_needed() {
   const double length = relative_length(guide());
   const bool came_back = progress.steps_without_progress >= options.min_agreeing_steps &&
@@ -129,7 +134,7 @@ void Navigator::Core::home_to_goal(Step& step) {
     HomingPursuitOptions pursuit = options.homing;
     pursuit.max_step_m = std::min(pursuit.max_step_m, options.step_m);
     pursuit.arrived_difference = arrival.max_difference;
-    // Keeps a margin for the error of the vector.
+    // Stops at a quarter of the arrival length to leave a margin for the home vector's error.
     pursuit.stop_length = 0.25 * arrival.max_length;
     homing.emplace(goal->view, pursuit);
     step.add_event(NavigationDecision::Event::homing);
@@ -143,8 +148,8 @@ void Navigator::Core::home_to_goal(Step& step) {
   decision.advance_m = pursued.advance_m;
   const bool is_obstructed = obstruction.level >= 2 * options.min_agreeing_steps;
   if (pursued.state == HomingPursuit::State::moving && !is_obstructed) return;
-  // Homing may stop for other reasons than a short vector, so the place decides. Noise and new
-  // objects in view raise the difference, too: a shorter vector makes up for a larger one.
+  // Homing may also stop without a short vector, so arrival is tested here. Noise and new objects
+  // raise the difference, so a larger difference is accepted if the vector is shorter.
   const double length = pursued.vector.length();
   if ((pursued.difference <= arrival.max_difference && length <= arrival.max_length) ||
       (pursued.difference <=
@@ -160,8 +165,8 @@ void Navigator::Core::home_to_goal(Step& step) {
       step, is_obstructed ? NavigationDecision::State::blocked : NavigationDecision::State::lost);
 }
 
-// Returns the direction in which the robot last knew its place: by its own steps, as something near
-// may hide what the reference there shows; where it has hardly moved, by the home vector.
+// Returns the direction to where the robot last knew its place. Uses its own steps, because a near
+// obstacle may hide the reference; if it has hardly moved, uses the home vector.
 std::optional<double> Navigator::Core::direction_to_known_place(const QueryView& view) {
   if (const auto& known = place.known_position_m;
       known && std::hypot(known->x_m, known->y_m) >= 0.5 * options.step_m) {
@@ -173,7 +178,8 @@ std::optional<double> Navigator::Core::direction_to_known_place(const QueryView&
   return back.direction_rad();
 }
 
-// Leads back from an unknown place; false where nothing tells in which direction.
+// Decides to move back from an unknown place to the last known one. Returns false if that direction
+// is unknown.
 bool Navigator::Core::return_to_known_place(Step& step) {
   if (!place.known_node || obstruction.is_present) return false;
   const std::size_t node = *place.known_node;
@@ -183,7 +189,7 @@ bool Navigator::Core::return_to_known_place(Step& step) {
   const SubAreas& areas = planner.areas();
   if (place.doubt.unknown_steps == options.min_agreeing_steps &&
       areas.area_of[node] == views.area()) {
-    // Something hides the place that should come next, as an obstacle does.
+    // Something hides the next place, so this counts as an obstructed attempt.
     const Guide& ahead = plan.field.at(areas.place_of[node]);
     if (ahead.is_reachable() && ahead.next != node) {
       EdgeAttempts& attempts = progress.get_or_create_attempts(ahead.edge, node);
@@ -198,12 +204,12 @@ bool Navigator::Core::return_to_known_place(Step& step) {
   return true;
 }
 
-// True at the goal, and at a reference from which it is too near for a direction, as views of
-// several drives may be, or for a step, which would lead beyond it.
+// True at the goal, and at a reference so near to the goal that the goal has no reliable direction
+// (as between views of several drives) or that a step would pass it.
 bool Navigator::Core::is_at_goal() const {
   if (*place.node == goal->node) return true;
   const bool is_around = goal->around.contains(*place.node);
-  // The first steps of homing show how far one leads.
+  // Once begun, homing continues at all references around the goal.
   if (homing && is_around) return true;
   if (!path_reductions.empty() && is_around &&
       guide().path_length <= 0.5 * upper_median(path_reductions)) {
@@ -214,9 +220,9 @@ bool Navigator::Core::is_at_goal() const {
   return motion && std::hypot(motion->x_m, motion->y_m) <= 0.5 * scales.typical_length;
 }
 
-// Returns the direction of an edge in the frame of the robot: that of the field, turned by the
-// compass, and half way from there to where the home vector sees the end of the edge. Empty where
-// no view shows it.
+// Returns the direction of an edge in the robot's frame: the field's direction rotated by the
+// compass, corrected by half the difference to the home vector's direction to the end of the edge.
+// nullopt if neither is available.
 std::optional<double> Navigator::Core::direction_along_edge(std::size_t from, const Guide& ahead,
                                                             const Step& step) {
   std::optional<double> direction;
@@ -244,11 +250,11 @@ void Navigator::Core::follow_field(Step& step) {
   const std::size_t from = plan.committed ? plan.committed->from : *place.node;
   const Guide ahead = plan.committed ? plan.committed->guide : guide();
   std::optional<double> direction = direction_along_edge(from, ahead, step);
-  // If no view shows a direction, the robot continues in that of the step before.
+  // If no view gives a direction, the robot continues in that of the last step.
   if (!direction) direction = obstruction.is_present ? 0.0 : step.last_direction_rad.value_or(0.0);
   double detour = detour_rad();
   if (obstruction.is_present && place.doubt.unknown_steps > 0 && step.last_direction_rad) {
-    // Backs away from the obstacle that hides the place, to recognise it.
+    // Moves back from the obstacle that hides the place, until the place is recognised.
     direction = step.last_direction_rad;
     detour = std::numbers::pi;
   }
@@ -260,8 +266,8 @@ void Navigator::Core::follow_field(Step& step) {
   if (obstruction.level >= 2 || std::abs(detour) < max_aside_rad) last.target_edge = ahead.edge;
 }
 
-// Begins a leg along a recorded route where the place is beyond doubt and nothing obstructed the
-// robot so far: what blocks an edge may block the route, too.
+// Begins a leg along a recorded route if the place is certain and nothing has obstructed the robot,
+// since what blocks an edge may also block the route.
 void Navigator::Core::begin_leg_if_possible(Step& step) {
   if (pilot.routes().empty() || step.report.line.empty() || obstruction.is_present ||
       place.doubt.unknown_steps > 0 || place.doubt.other_place_steps > 0 ||
@@ -275,7 +281,7 @@ void Navigator::Core::begin_leg_if_possible(Step& step) {
   step.add_event(NavigationDecision::Event::route);
 }
 
-// Repeats a recorded route [Y03]; false where no leg is under way.
+// Repeats a recorded route [Y03]. Returns false if the robot is not on a leg.
 bool Navigator::Core::follow_route(Step& step) {
   if (!pilot.is_on_leg()) {
     begin_leg_if_possible(step);
@@ -284,7 +290,7 @@ bool Navigator::Core::follow_route(Step& step) {
              progress.steps_without_progress > max_steps_without_progress()) {
     pilot.abandon_leg();
     step.add_event(NavigationDecision::Event::route_left);
-    // The path by views has not been tried here.
+    // The robot has not yet tried the planned edges here, so their attempts are reset.
     progress.edge_attempts.clear();
     obstruction.level = progress.steps_without_progress = 0;
   }
@@ -298,7 +304,7 @@ bool Navigator::Core::follow_route(Step& step) {
   decision.on_route = true;
   decision.next = pilot.end();
   decision.direction_rad = std::atan2(target->y_m, target->x_m);
-  // The straight line there is near the route; odometry errs little over one step.
+  // The straight line to the target stays near the route, and odometry errs little over one step.
   decision.advance_m = std::min(options.step_m, std::hypot(target->x_m, target->y_m));
   last.direction_rad = decision.direction_rad;
   return true;
@@ -311,7 +317,7 @@ void Navigator::Core::decide(Step& step) {
   if (state == NavigationDecision::State::moving && !guide().is_reachable() &&
       !relocalise_with_path(step)) {
     unblock_edges_or_end(step, NavigationDecision::State::unreachable);
-    // No edge is blocked that could be unblocked.
+    // Unreachable even with all edges unblocked.
     if (!guide().is_reachable()) state = NavigationDecision::State::unreachable;
   }
   update_probability(step);
@@ -326,7 +332,8 @@ void Navigator::Core::decide(Step& step) {
 }
 
 void Navigator::Core::choose_motion(Step& step) {
-  // At an unknown place the robot waits for observations to agree; then the best guess counts.
+  // At an unknown place the robot waits until `min_agreeing_steps` observations were unknown; then
+  // it uses the best guess.
   const int unknown_steps = place.doubt.unknown_steps;
   if (unknown_steps > 0 && unknown_steps < options.min_agreeing_steps && !obstruction.is_present) {
     return;
@@ -362,7 +369,7 @@ NavigationDecision Navigator::Core::observe(const FourierSignature& view,
   decision.path_length = guide().path_length;
   decision.components = step.view.components;
   decision.bytes_read = views.bytes_read() - bytes_before;
-  // An observation that entered an area has loaded enough.
+  // Does not prefetch after entering an area, which has loaded many views already.
   const bool entered_area =
       std::ranges::find(decision.events, NavigationDecision::Event::entered_area) !=
       decision.events.end();

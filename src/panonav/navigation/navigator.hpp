@@ -17,45 +17,46 @@
 
 namespace panonav {
 
-/// Options of a navigator, and when a robot counts as blocked or lost.
+/// Options of a navigator, among them when a robot is considered blocked or lost.
 struct NavigatorOptions {
-  /// Longest step between two observations; about half the references' spacing.
+  /// Longest step between two observations; should be about half the references' spacing.
   double step_m = 0.25;
   int near_links = 2;  ///< the next place is searched within this number of edges of the last one
-  /// Components compared in the open: 3 or more, or 0 for all. All are compared around narrow gates
-  /// and the goal, and where a place is doubtful.
+  /// Number of components compared in open areas: 3 or more, or 0 for all. All are compared near
+  /// narrow gates and the goal, and when the place is doubtful.
   int coarse_components = 6;
-  /// Views of the next area that an observation prefetches, so that none waits for all; 0: none.
+  /// Number of views of the next area that each observation prefetches, so that entering an area
+  /// takes little time; 0: none.
   int views_ahead = 20;
-  /// Homing to the goal. Its difference and length of arrival come from the references around the
-  /// goal, its longest step is `step_m` at most.
+  /// Homing to the goal. The navigator replaces its arrival thresholds (difference and length) by
+  /// values learnt from the references around the goal, and limits its longest step to `step_m`.
   HomingPursuitOptions homing;
-  /// Observations that must agree before another place or a blocked edge is believed.
+  /// Number of observations that must agree before another place or a blocked edge is accepted.
   int min_agreeing_steps = 3;
-  /// Observations without a known or probable place after which the robot is lost.
+  /// Number of observations without a known or probable place after which the robot is lost.
   int lost_patience = 12;
-  /// Observations without coming nearer to the goal, more along a long edge, after which the edge
-  /// tried most counts as blocked; from half of them on the robot searches around.
+  /// Number of observations without progress towards the goal (more on a long edge) after which the
+  /// most tried edge is blocked. After half this number the robot tries other directions.
   int edge_patience = 8;
   double min_leg_m = 0.75;   ///< shortest leg along a recorded route: three steps
-  int attempts = 3;          ///< times that blocked edges, or homing, are tried
+  int attempts = 3;          ///< number of attempts: blocked edges or homing are tried again
   int max_run_steps = 5000;  ///< after which a run ends as blocked
 };
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
 
-/// Report of a robot besides its view.
+/// Report of a robot about its last step, in addition to its view.
 struct RobotReport {
-  bool obstacle = false;  ///< something stopped the robot before the last step was done
-  /// The reference nearest to the position of another estimate, as of `MonteCarloLocaliser` or
-  /// `Localiser`. It replaces the last place, and the navigator searches around it, so it need not
-  /// be exact: for places that look similar, where single views mislead. nullopt where the estimate
-  /// is not certain: the views decide then.
+  bool obstacle = false;  ///< an obstacle stopped the robot during the last step
+  /// Reference nearest to the position estimated by a `MonteCarloLocaliser` or `Localiser`; nullopt
+  /// if that estimate is not certain. Replaces the last place for memories in which single views
+  /// mislead because places look similar. The navigator searches around it, so it need not be
+  /// exact.
   std::optional<ViewId> estimate;
   /// The horizon scanline of this observation (route/horizon_scanline.hpp), for legs along routes;
   /// empty: none.
   std::span<const float> line;
-  /// Motion since the last observation by odometry, in the frame that the robot had then; for legs
-  /// along routes.
+  /// Motion since the last observation by odometry, in the robot frame of that observation; for
+  /// legs along routes.
   Pose2 moved;
 };
 
@@ -65,11 +66,11 @@ struct NavigationDecision {
   enum class State {
     moving,       ///< the run continues
     arrived,      ///< the views show the goal
-    blocked,      ///< the robot cannot pass although the memory has a path
-    lost,         ///< the view is nowhere in the memory, or not where the robot should be
+    blocked,      ///< the robot cannot pass, although a path is planned
+    lost,         ///< the view is not in the memory, or not where the robot should be
     unreachable,  ///< no path leads to the goal, or all of them turned out to be blocked
   };
-  /// Why a decision is not simply the next step.
+  /// Special events of a decision, beyond simply the next step.
   enum class Event {
     relocalised,    ///< the place was searched in the whole memory
     kidnapped,      ///< another place than the expected one is accepted
@@ -86,25 +87,27 @@ struct NavigationDecision {
 
   int step = 0;                   ///< counts from 1
   State state = State::moving;    ///< after this observation
-  double direction_rad = 0.0;     ///< of motion, in the current robot frame
+  double direction_rad = 0.0;     ///< direction of motion in the current robot frame
   double advance_m = 0.0;         ///< length of the step; 0 unless moving
   bool homing = false;            ///< the robot homes to the goal by the home vector
-  bool on_route = false;          ///< a leg along a recorded route, by the horizon scanline
+  bool on_route = false;          ///< the robot follows a recorded route by the horizon scanline
   std::optional<ViewId> nearest;  ///< the place
-  /// Probability that the robot is there: `place_probability` of the view, with the difference of
-  /// `nearest` instead of the best match's. 0 once the run has ended.
+  /// Probability that the robot is at `nearest`: `place_probability` with the difference to
+  /// `nearest` instead of that to the best match. 0 after the end of the run.
   double probability = 0.0;
-  std::optional<ViewId> next;  ///< the reference ahead; of a leg that at its end
-  std::size_t area = 0;        ///< that is loaded
-  /// `image_difference` of the view from `nearest`; while homing from the goal.
+  std::optional<ViewId> next;  ///< next reference; on a route leg the one at its end
+  std::size_t area = 0;        ///< loaded area
+  /// `image_difference` between the view and `nearest`; during homing, between the view and the
+  /// goal.
   double difference = 0.0;
-  double path_length = 0.0;  ///< that is left along the edges, in the graph's unit
-  int components = 0;        ///< by which references were compared
-  /// Of the loaded area's signatures and index, by this observation, without `probability`.
+  double path_length = 0.0;  ///< remaining path length along the edges, in the graph's unit
+  int components = 0;        ///< number of components compared with references
+  /// Bytes of the loaded area's signatures and index read by this observation, without those read
+  /// for `probability`.
   std::uint64_t bytes_read = 0;
   std::vector<Event> events;  ///< in the order in which they happened
 };
-/// "moving", "arrived", "blocked", "lost", "unreachable".
+/// Returns "moving", "arrived", "blocked", "lost" or "unreachable".
 [[nodiscard]] std::string_view name_of(NavigationDecision::State state);
 /// Returns the event in lower case with underscores, as in logs and JSON: "relocalised",
 /// "entered_area", ...
@@ -113,14 +116,14 @@ struct NavigationDecision {
 [[nodiscard]] std::string describe(const NavigationDecision& decision);
 
 /// Leads a robot to a place of the memory by views alone [M04 section 3.5]: observe, find the
-/// nearest reference, take its direction, move, observe again; near the goal by homing. Where the
+/// nearest reference, move in its direction, observe again; near the goal, home to it. Where the
 /// path follows a recorded route and the robot reports its horizon scanlines, it repeats the route
 /// instead [Y03].
 ///
-/// Holds the state of a run and the views of one area, two at a border. `compute_command_towards`
-/// (motion/velocity.hpp) makes the robot's commands. Same calls, same bits. Cost of an observation
-/// without a change of area: the search among the loaded views and three home vectors at most; near
-/// a route also a plan or a fit.
+/// Holds the state of a run and the views of one area, near a border of two.
+/// `compute_command_towards` (motion/velocity.hpp) computes the robot's commands. Same calls, same
+/// bits. Cost of an observation without a change of area: a search among the loaded views and at
+/// most three home vectors; near a route also a path plan or a scanline fit.
 class Navigator {
  public:
   /// The source must hold all views of the planner's graph and outlive *this. Throws OptionError,
@@ -131,8 +134,8 @@ class Navigator {
   Navigator(Navigator&& other) noexcept;
   Navigator& operator=(Navigator&& other) noexcept;
 
-  /// Begins a run. The robot's place stays known, blocked edges are unblocked. Throws ContractError
-  /// when the view is not in the graph.
+  /// Begins a run to this goal. Keeps the robot's place and unblocks all edges. Throws
+  /// ContractError if the view is not in the graph.
   void set_goal(ViewId goal);
 
   /// Sets recorded routes to follow, which must outlive *this. Without any, `RobotReport::line` is
@@ -140,19 +143,19 @@ class Navigator {
   void set_routes(std::span<const KnownRoute> routes);
   [[nodiscard]] std::span<const KnownRoute> routes() const noexcept;  ///< Same as were set.
 
-  /// Forgets where the robot is: the next observation is searched for in the whole memory.
+  /// Forgets the robot's place, so that the next observation is searched in the whole memory.
   void forget_place();
 
-  /// Decides what to do after an observation. After a decision that stops, further ones do too.
-  /// Throws ContractError without a goal, and on a signature or line of another shape than the
-  /// memory's and the routes'.
+  /// Decides on the next motion after an observation. After the run has ended, every decision is to
+  /// stand still. Throws ContractError without a goal, and on a signature or line of another shape
+  /// than the memory's and the routes'.
   [[nodiscard]] NavigationDecision observe(const FourierSignature& view,
                                            const RobotReport& report = {});
 
   /// The planner with its graph, its areas and the edges blocked now.
   [[nodiscard]] const AreaPlanner& planner() const noexcept;
-  /// Returns the number of loaded views: of an area and its surroundings, and prefetched ones of
-  /// the next area.
+  /// Returns the number of loaded views: those in and around the current area, and prefetched views
+  /// of the next area.
   [[nodiscard]] std::size_t loaded_views() const noexcept;
 
  private:

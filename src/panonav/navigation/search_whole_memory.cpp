@@ -9,7 +9,7 @@ namespace panonav {
 
 namespace {
 
-/// Views of each area that are compared by their phases, too: the least dissimilar ones.
+/// Number of least dissimilar views of each area that are also compared by their phases.
 constexpr int compared_per_area = 3;
 
 }  // namespace

@@ -18,9 +18,10 @@ struct FoundView {
   double difference = 0.0;          ///< `image_difference`, of magnitudes and phases
 };
 
-/// Relocalises in the whole memory, one area after the other, so that only one is held: of the
-/// least dissimilar views of each area the one of least difference. Only nodes that `filter`
-/// accepts count (empty: all). nullopt when there is none. Cost: loads all that count.
+/// Searches the whole memory for a view, area by area, so that only one area is held at a time. Of
+/// the three views of smallest dissimilarity of each area, returns the one with the smallest
+/// difference; nullopt if there are no views. `filter` selects the nodes to search (empty: all).
+/// Cost: loads all views searched.
 [[nodiscard]] std::optional<FoundView> search_whole_memory(
     const ViewSource& source, const NavigationGraph& graph, const SubAreas& areas,
     const FourierSignature& view, const std::function<bool(std::size_t node)>& filter = {});

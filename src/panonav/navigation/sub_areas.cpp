@@ -26,7 +26,7 @@ constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 /// Smallest share of the views on one side of a cut, so that areas become similar in size.
 constexpr double min_side_share = 1.0 / 3.0;
 
-/// Some nodes of a graph with the edges among them, numbered from 0.
+/// A subgraph: some nodes of a graph, numbered from 0, and the edges between them.
 struct Component {
   std::vector<std::size_t> nodes;  // ascending
   std::vector<std::size_t> begins, neighbours;
@@ -53,8 +53,8 @@ Component make_component(const NavigationGraph& graph, std::vector<std::size_t> 
   return component;
 }
 
-// Returns the number of edges from `from` to every node over nodes of `side`; `none` where there is
-// no such path.
+// Returns the number of edges on the shortest path from `from` to every node over nodes of `side`;
+// `none` if there is no such path.
 std::vector<std::size_t> steps_from(const Component& component, std::size_t from,
                                     std::span<const std::uint8_t> sides, std::uint8_t side) {
   std::vector<std::size_t> steps(component.size(), none);
@@ -78,9 +78,9 @@ std::size_t find_farthest(std::span<const std::size_t> steps) {
   return best;
 }
 
-// Approximates the second eigenvector of the random walk on a connected component. The walk is
-// lazy, so that its eigenvalues are not negative; the constant, its first eigenvector, is taken
-// out.
+// Approximates the second eigenvector of the random walk on a connected component by power
+// iteration. Uses the lazy walk, whose eigenvalues are not negative, and subtracts the constant
+// first eigenvector in each step.
 std::vector<double> second_eigenvector(const Component& component, int iterations) {
   const std::vector<std::uint8_t> everywhere(component.size(), 0);
   const auto outermost = find_farthest(steps_from(component, 0, everywhere, 0));
@@ -112,7 +112,8 @@ std::vector<double> second_eigenvector(const Component& component, int iteration
   return values;
 }
 
-// Returns 1 for the nodes before the least normalised cut in the order of `values`.
+// Returns 1 for the nodes before the smallest normalised cut in the order of `values`, 0 for the
+// others.
 std::vector<std::uint8_t> find_best_cut(const Component& component,
                                         std::span<const double> values) {
   std::vector<std::size_t> order(component.size());
@@ -143,7 +144,7 @@ std::vector<std::uint8_t> find_best_cut(const Component& component,
   return sides;
 }
 
-// Moves all nodes of a side but those of its largest piece to the other side.
+// Moves all nodes of a side, except those of its largest connected piece, to the other side.
 void move_fragments(const Component& component, std::uint8_t side,
                     std::vector<std::uint8_t>& sides) {
   std::vector<std::size_t> piece(component.size(), none);
@@ -206,7 +207,7 @@ SubAreas divide_into_areas(const NavigationGraph& graph, const SubAreaOptions& o
   std::vector<std::size_t> all(graph.size());
   std::iota(all.begin(), all.end(), 0U);
   std::vector<std::vector<std::size_t>> open = find_pieces(graph, all, number);
-  // Halving stops where the whole is nearer to the size aimed at than the halves, as a ratio.
+  // Stops bisecting when the whole is closer to the intended size than its halves, by ratio.
   const auto largest = static_cast<std::size_t>(std::sqrt(2.0) * options.views_per_area);
   while (!open.empty()) {
     std::vector<std::size_t> nodes = std::move(open.back());

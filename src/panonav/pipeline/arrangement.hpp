@@ -13,7 +13,8 @@
 
 namespace panonav {
 
-/// Lowest weight, of 1, of a spring that becomes a link; those below contradict the others.
+/// Smallest weight (of 1) of a spring that becomes a link; springs of smaller weight contradict the
+/// others.
 inline constexpr double min_spring_weight = 0.25;
 
 /// Stores an arrangement of the file's views in the file: as the map "lattice", and as links
@@ -28,8 +29,8 @@ void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFil
 /// Returns the number of springs with a weight below `min_spring_weight`.
 [[nodiscard]] std::size_t count_rejected_springs(const Lattice& lattice);
 
-/// Returns the poses of the largest component, ordered by stamp. If any view has no stamp, the view
-/// ids serve as stamps. Throws ContractError if two views have the same stamp.
+/// Returns the poses of the largest component as a trajectory, ordered by stamp. If any view has no
+/// stamp, the view ids serve as stamps. Throws ContractError if two views have the same stamp.
 [[nodiscard]] std::vector<StampedPose> make_trajectory(const Lattice& lattice,
                                                        const VisualMemory& memory);
 

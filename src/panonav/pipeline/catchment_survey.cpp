@@ -17,7 +17,7 @@ namespace panonav {
 
 namespace {
 
-// Rounding of coordinates must not decide whether a distance counts.
+// Tolerance for distances, so that rounding of coordinates does not decide whether a pair is used.
 constexpr double rounding_m = 1e-6;
 
 /// Home vector of a pair, without its quality.
@@ -64,7 +64,7 @@ std::vector<PairVector> compute_home_vectors(const RecordedViews& goals,
   return vectors;
 }
 
-/// Estimates the median of true distance over length of the home vector, over nearby pairs.
+/// Estimates the metres per unit of home vector length: median ratio over nearby pairs.
 double estimate_typical_distance_m(const std::vector<Pose2>& goals,
                                    const std::vector<Pose2>& places,
                                    const std::vector<PairVector>& vectors, double near_m) {

@@ -23,13 +23,13 @@ struct RecordedViews {
   std::vector<HomingView> views;     ///< homing views of the images as the rotated robot sees them
 };
 
-/// Receives, on the caller's thread, the name of the current work, the number of its steps since
-/// the last call (0 at first), and the number of all its steps.
+/// Callback on the caller's thread that receives the name of the current work, the number of steps
+/// done since the last call (0 at first), and its total number of steps.
 using WorkProgress =
     std::function<void(const std::string& work, std::size_t steps, std::size_t total)>;
 
-/// Reads all images on all threads. With a seed, the robot is rotated by a random number of whole
-/// columns before each image. Throws FileError, also if the images differ in their number of rows.
+/// Reads all images on all threads. With a seed, rotates the robot by a random whole number of
+/// columns before each image.
 [[nodiscard]] RecordedViews read_views(const Dataset& recording, const HomingViewOptions& options,
                                        const std::optional<std::uint64_t>& rotation_seed,
                                        Executor& executor, const WorkProgress& progress = {});
@@ -37,22 +37,23 @@ using WorkProgress =
 /// Options of a survey of two recordings.
 struct CatchmentSettings {
   FourierHomingOptions homing;  ///< options of all home vectors
-  /// Highest frequency of each stage of a run; where one stage stops, the run continues with the
-  /// next [S06 section 5]. Empty: a single stage, as `homing` says. Averages always use `homing`.
+  /// Highest frequency of each stage of a run. Where a run stops in one stage, it continues with
+  /// the next [S06 section 5]. Empty: a single stage with the options `homing`. Averages always use
+  /// `homing`.
   std::vector<int> stages;
-  HomingSurveyOptions run;  ///< steps and obstacles; the values below that are not set are learnt
+  HomingSurveyOptions run;            ///< steps and obstacles; parts are learnt, see below
   bool has_typical_distance = false;  ///< false: `run.typical_distance_m` is learnt from the pairs
   bool has_longest_step = false;      ///< false: the step is twice the spacing [S06 section 4.4]
   bool has_obstacle = false;          ///< false: the obstacle radius is 0.8 of the spacing
   std::optional<double> bin_m;        ///< width of the bins of distances; nullopt: the spacing
-  std::optional<double> up_to_m;  ///< pairs farther apart are left out of averages; nullopt: none
+  std::optional<double> up_to_m;      ///< largest distance of pairs in averages; nullopt: any
 };
 
 /// Results of all home vectors between two recordings.
 struct CatchmentResult {
   /// Pairs whose distance is in one range.
   struct Bin {
-    HomingSurvey::Bin homeward;  ///< pairs of these distances and their mean cosine
+    HomingSurvey::Bin homeward;  ///< number of pairs at these distances and their mean cosine
     /// Circular standard deviation of the error of the heading; NaN without pairs.
     double orientation_error_rad = 0.0;
   };
@@ -60,7 +61,7 @@ struct CatchmentResult {
   double spacing_m = 0.0;           ///< mean distance between neighbouring places
   double typical_distance_m = 0.0;  ///< metres of a home vector of length 1
   HomingSurveyOptions run;          ///< options of the runs, learnt values included
-  HomingSurvey survey;              ///< survey with `homing` alone, without stages
+  HomingSurvey survey;              ///< survey with `CatchmentSettings::homing`, without stages
   std::size_t pairs = 0;            ///< number of pairs at different places, up to `up_to_m` apart
   /// Mean cosine of the angle between home vector and true direction over these pairs [S06 eq. 48];
   /// NaN without pairs.

@@ -12,14 +12,14 @@ namespace panonav {
 
 namespace {
 
-/// The estimate: poses over time, and the closures of a map.
+/// The estimate: a trajectory and, if it comes from a memory file, its map.
 struct Estimate {
   Trajectory trajectory;
   std::optional<TopologicalMap> map;
   std::map<ViewId, double> stamp_s;  // of the map's views
 };
 
-/// Reads the map of `Mapper`: the poses of its first component over time.
+/// Reads a map stored by `Mapper`; the trajectory consists of the poses of its first component.
 Estimate read_map(const std::filesystem::path& path) {
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
   auto map = file.map("map");

@@ -16,9 +16,9 @@ struct EstimateEvaluation {
       closures;  ///< loop closures of a map; nullopt for a trajectory
 };
 
-/// Compares an estimate with a true trajectory (TUM text or CSV). The estimate is a trajectory too,
-/// or a memory file (NAME.panonav) with the map that `Mapper` stored, of which the first component
-/// counts. Returns nullopt if fewer than two poses have a true pose at their stamp. Throws
+/// Compares an estimate with a true trajectory (TUM text or CSV). The estimate is a trajectory, or
+/// a memory file (NAME.panonav) with a map stored by `Mapper`, of which only the first component is
+/// compared. Returns nullopt if fewer than two poses have a true pose at their stamp. Throws
 /// FileError, also if a view of the map has no stamp; OptionError. Cost: that of
 /// `compare_positions`.
 [[nodiscard]] std::optional<EstimateEvaluation> evaluate_estimate(

@@ -24,25 +24,26 @@ struct HomingViewOptions {
   bool horizon = false;
 };
 
-/// Makes homing views of observations. Several threads may use one object at a time.
+/// Makes homing views of observations. Several threads may use one object concurrently.
 class HomingEncoder {
  public:
   /// Encodes without a memory; ready-made panoramas keep their size unless the options say
   /// otherwise.
   HomingEncoder(const PictureSource& source, const HomingViewOptions& options);
-  /// Encodes like a memory, using the first `components` of its views; 0: all. Throws ContractError
-  /// unless the memory has them and they are 3 or more; else as `ViewEncoder`.
+  /// Encodes like the memory with this header, using the first `components` of its views; 0: all.
+  /// Throws ContractError unless `components` is 0, or from 3 to the memory's number; else like
+  /// `ViewEncoder`.
   HomingEncoder(const MemoryHeader& header, const PictureSource& source, int components = 0,
                 bool horizon = false);
 
   /// Returns the preprocessed panorama of an observation. Throws ContractError (FileError if the
-  /// observation has a file) if the image is too small for the components or covered by the masks;
-  /// else as `ViewEncoder::panorama`.
+  /// observation has a file) if the image is too small for the components or completely masked;
+  /// else like `ViewEncoder::panorama`.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
-  /// Returns the homing view of a panorama that `panorama` made.
+  /// Returns the homing view of a panorama returned by `panorama`.
   [[nodiscard]] HomingView view(const Panorama& panorama) const;
-  /// Returns the homing view of an existing signature: all of its rows or the horizon alone, as the
-  /// encoder was made.
+  /// Returns the homing view of an existing signature: all rows, or only the horizon if the encoder
+  /// was constructed with `horizon`.
   [[nodiscard]] HomingView view(const FourierSignature& signature) const;
 
  private:
@@ -58,56 +59,58 @@ class HomingEncoder {
   bool horizon_;
 };
 
-/// True if the home vector has a direction: its length is at least its standard deviation, which is
-/// more than its residual alone would produce.
+/// True if the home vector has a reliable direction: its confidence is at least 0.5, so its length
+/// exceeds what its residual alone would produce.
 [[nodiscard]] inline bool has_home_direction(const HomeVector& found) noexcept {
   return found.length() > 0.0 && found.confidence >= 0.5;
 }
 
 /// Result of comparing an observation with a homing goal.
 struct HomingResult {
-  /// True if observation and goal match better than chance (`chance_match`); noise and other places
-  /// do not. If false, there is no direction, and distance and turn are meaningless.
+  /// True if observation and goal match better than by chance (`chance_match`); false for noise and
+  /// other places. If false, there is no direction, and distance and turn are meaningless.
   bool known = false;
   /// Direction of the goal in the robot's current frame, counter-clockwise from straight ahead.
-  /// Empty if `known` is false, and at the goal itself (`has_home_direction`).
+  /// nullopt if `known` is false, and at the goal itself (`has_home_direction`).
   std::optional<double> direction_rad;
-  double distance_r = 0.0;  ///< in units of R, the typical distance of the surroundings
+  double distance_r = 0.0;  ///< in units of R, the typical distance of objects around
   double turn_rad = 0.0;    ///< rotation of the robot since it was at the goal
-  /// Probability that the direction is right within 45 degrees
+  /// Probability that the error of the direction is at most 45 degrees
   /// (`ChanceMatch::direction_probability`).
   double probability = 0.0;
   HomeVector vector;  ///< the whole result, also if `known` is false
 };
 
-/// Computes the direction back to a goal from one observation. The goal is a view of a memory, or
-/// an observation made there. The heading need not be known. Several threads may use one object.
-/// Cost: that of the encoding, of `home_vector`, and some milliseconds for `chance_match`.
+/// Computes the direction back to a goal from one observation. The goal is a view of a memory or an
+/// observation taken at the goal. Headings need not be known. Several threads may use one object
+/// concurrently. Cost: that of the encoding, of `home_vector`, and some milliseconds for
+/// `chance_match`.
 class HomingGuide {
  public:
   /// `goal`: name or id of a view of the memory file. Pictures come from the memory's own camera.
   /// Throws FileError, also when there is no such view. Reads no other view.
   HomingGuide(const std::filesystem::path& memory, const std::string& goal,
               const FourierHomingOptions& options = {});
-  /// `source`: layout of the pictures; empty: the memory's own. `components`, `horizon`: as
+  /// `source`: layout of the pictures; nullopt: that of the memory. `components`, `horizon`: as in
   /// `HomingEncoder`.
   HomingGuide(const MemoryFile& memory, const std::string& goal,
               const std::optional<PictureSource>& source, const FourierHomingOptions& options,
               int components = 0, bool horizon = false);
-  /// Needs no memory: both pictures have the layout `source`.
+  /// Uses a goal without a memory: the pictures of goal and observations have the layout `source`.
   HomingGuide(const Observation& goal, const PictureSource& source,
               const HomingViewOptions& views = {}, const FourierHomingOptions& options = {});
-  /// Takes a goal that another encoder made, for example of a picture with another layout.
+  /// Uses a goal view made by another encoder, for example from a picture with another layout.
   HomingGuide(HomingEncoder encoder, std::string goal_name, HomingView goal,
               const FourierHomingOptions& options = {});
 
-  /// Computes the direction to the goal. Throws as `HomingEncoder::panorama`, and ContractError
-  /// (FileError likewise) if the view has another number of rows than the goal.
+  /// Computes the direction to the goal. Throws like `HomingEncoder::panorama`, and ContractError
+  /// (FileError if the observation has a file) if the view has another number of rows than the
+  /// goal.
   [[nodiscard]] HomingResult home(const Observation& observation) const;
 
   /// Returns the encoder that makes views of observations.
   [[nodiscard]] const HomingEncoder& encoder() const noexcept { return encoder_; }
-  /// Returns the goal's name in messages: the name of its view or observation.
+  /// Returns the goal's name for messages: the name of its view or observation.
   [[nodiscard]] const std::string& goal_name() const noexcept { return goal_name_; }
   /// Returns the goal's view, with which observations are compared.
   [[nodiscard]] const HomingView& goal() const noexcept { return goal_; }

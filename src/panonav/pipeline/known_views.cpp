@@ -19,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns a text that changes with a name, a pose, a file's size or time, or the layout of the
-/// images.
+/// Returns a hash of the recording's names, poses, stamps, file sizes and times, and of the layout
+/// of its images.
 std::string compute_fingerprint(const Dataset& recording, const MemoryFile& memory) {
   RecordBytes bytes;
   MemoryHeader read_as = memory.header();
@@ -64,7 +64,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
     if (!view) continue;
     known.push_back(&entry);
     const auto& info = views.info(*view);
-    // A map may have given the view its pose.
+    // Accepts a pose that the recording does not have, as it may come from a map.
     if ((entry.pose && info.pose != entry.pose) || info.stamp_s != entry.stamp_s) {
       throw_different_view(memory.path(), entry.file,
                            "a view with another pose or stamp under the name");
@@ -101,7 +101,7 @@ void forget_recordings(MemoryFile& memory) {
 }
 
 bool is_same_picture(const PackedSignature& a, const PackedSignature& b) {
-  constexpr int clear_magnitude = 8;  // the phase of a magnitude near 0 is rounding itself
+  constexpr int clear_magnitude = 8;  // below it, phases are dominated by rounding
   for (std::size_t i = 0; i < a.magnitudes.size(); ++i) {
     if (std::abs(a.magnitudes[i] - b.magnitudes[i]) > 1) return false;
     if (a.magnitudes[i] < clear_magnitude) continue;

@@ -13,27 +13,28 @@
 namespace panonav {
 
 /// Checks that views with the same name in recording and memory are the same view, so that two
-/// recordings with the same file names are not mixed. Compares poses and stamps of all known views.
-/// Compares images too, unless names, poses, sizes and modification times of all files are those of
-/// a recording that was memorised. Throws FileError at the first view that differs or whose image
-/// cannot be read. Cost: reading size and time of each file; for a changed or copied recording,
-/// that of memorising the known views. `compared` receives their number from time to time.
+/// recordings with the same file names are not mixed. Compares the poses and stamps of all such
+/// (known) views. Also compares their images, unless names, poses, sizes and modification times of
+/// all files equal those of a recording memorised before. Throws FileError at the first view that
+/// differs or whose image cannot be read. Cost: reading size and time of each file; for a changed
+/// or copied recording, encoding the known views. `compared` receives the number of images compared
+/// since its last call.
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
                        const std::function<void(std::size_t)>& compared = {});
 
-/// Records in the memory that its views with names of this recording come from this recording, now
-/// and in future.
+/// Stores in the memory that its views with names of this recording come from this recording, so
+/// that `check_known_views` need not compare images.
 void remember_recording(const Dataset& recording, MemoryFile& memory);
 
-/// Marks all recordings as unknown: after a removal, views of that name may come from another
-/// recording.
+/// Marks all recordings as unknown. Call it after removing views, since later views of the same
+/// names may come from another recording.
 void forget_recordings(MemoryFile& memory);
 
-/// True if the signatures differ only by rounding, which varies between processors.
+/// True if the signatures differ at most by rounding errors, which vary between processors.
 [[nodiscard]] bool is_same_picture(const PackedSignature& a, const PackedSignature& b);
 
-/// Throws the FileError for a name that the memory holds with another view.
+/// Throws a FileError: the memory has a different view with this name.
 [[noreturn]] void throw_different_view(const std::filesystem::path& memory, const std::string& name,
                                        const std::string& what);
 

@@ -17,7 +17,8 @@ namespace panonav {
 namespace {
 
 constexpr const char* parameter_name = "learnt models";
-/// Version of the learning, raised when its results change, so that older models are not used.
+/// Version of the learning method; raised when its results change, so that older models are
+/// ignored.
 constexpr std::string_view learning_version = "4";
 
 // Visits the members of each model in the order in which they are stored.
@@ -25,7 +26,7 @@ template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, PlaceModel>
 void visit_members(Model& m, const Visit& visit) {
   visit(m.threshold), visit(m.learnt), visit(m.sampled_views), visit(m.neighbouring);
-  visit(m.arbitrary), visit(m.mirrored), visit(m.beside);
+  visit(m.arbitrary), visit(m.mirrored), visit(m.nearest_view_difference);
 }
 template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, PositionModel>
@@ -63,7 +64,7 @@ class Writer {
   mutable std::string text_;
 };
 
-/// Reads models word by word; fails from the first wrong word on.
+/// Reads models word by word; `ok` is false from the first wrong word on.
 class Reader {
  public:
   explicit Reader(const std::string& text) : words_(split_words(text)) {}
@@ -97,7 +98,7 @@ class Reader {
   mutable bool ok_ = true;
 };
 
-/// Returns a text that changes with the views, their signatures and their poses.
+/// Returns a hash of the views, their signatures and their poses.
 std::string compute_fingerprint(const VisualMemory& memory) {
   RecordBytes scratch;
   std::uint64_t hash = checksum({}, memory.shape().size());
@@ -117,7 +118,8 @@ std::string compute_fingerprint(const VisualMemory& memory) {
   return to_hex_digits(hash);
 }
 
-/// Reads stored models; nullopt if they are of other views than `memory`, unless it is null.
+/// Reads stored models; nullopt if there are none, or if they were not learnt from the views of
+/// `memory` (null: not checked).
 std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemory* memory) {
   const auto text = file.parameter(parameter_name);
   if (!text) return std::nullopt;

@@ -4,10 +4,10 @@
 
 namespace panonav {
 
-/// Learns from the file's views what localisation and tracking need (whether a place is known,
-/// positions between views, how views differ with distance), and stores it in the file with a
-/// fingerprint of the views. Does nothing if the file has current models. Call it after views or
-/// poses have changed. Cost: loading, and up to some seconds of learning.
+/// Learns the models for localisation and tracking from the file's views (whether a place is known,
+/// positions between views, how views differ with distance). Stores them in the file with a
+/// fingerprint of the views. Does nothing if the stored models are current. Call it after changing
+/// views or poses. Cost: loading the views, and up to a few seconds of learning.
 void learn_and_store_models(MemoryFile& file);
 
 }  // namespace panonav

@@ -16,8 +16,8 @@ std::string make_parameter_name(const std::string& name) {
   return "route." + name;
 }
 
-/// Chooses a cylinder no higher than the line needs, sampled as finely as a usual camera samples
-/// the horizon.
+/// Chooses a cylinder with only the rows needed for the line, and with four columns for each column
+/// of the line, at most 4096.
 PanoramaShape choose_line_panorama_shape(const PictureSource& pictures, const RouteSource& route) {
   if (pictures.kind == PictureKind::panorama) return {};
   constexpr int rows = 5;

@@ -17,23 +17,22 @@ namespace panonav {
 /// memory stores it with the route.
 struct RouteSource {
   HorizonScanlineOptions line;  ///< columns and band of the lines
-  /// First and last row that show the horizon, counted from 0 at the top; for panoramas whose
-  /// elevations are not known.
+  /// First and last row that show the horizon, counted from 0 at the top; only for panoramas of
+  /// unknown elevations.
   std::optional<std::pair<int, int>> horizon_rows;
-  bool from_odometry =
-      false;  ///< true: poses are in the frame of the odometry, not of the data set
+  bool from_odometry = false;  ///< true: poses are in the odometry's frame, not the data set's
   friend bool operator==(const RouteSource&, const RouteSource&) = default;
 };
 
-/// Reads the source of the route `name`. Throws FileError if the stored text is not one that
-/// `store_route_source` wrote.
+/// Reads the source of the route `name`. Throws FileError unless the stored text was written by
+/// `store_route_source`.
 [[nodiscard]] RouteSource read_route_source(const MemoryFile& memory, const std::string& name,
                                             int columns);
 /// Stores the source in the memory, under the route's name. Throws FileError.
 void store_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source);
 
-/// Makes horizon scanlines of observations in the form of a route. Several threads may use one
-/// object.
+/// Makes horizon scanlines of observations in the same form as a route's lines. Several threads may
+/// use one object concurrently.
 class LineEncoder {
  public:
   /// Throws ContractError on horizon rows for pictures whose elevations are known.
@@ -54,7 +53,8 @@ class LineEncoder {
 [[nodiscard]] std::string find_route_name(const MemoryFile& memory,
                                           const std::optional<std::string>& name);
 
-/// Loads the route. Throws FileError if it has fewer than two lines and so cannot be followed.
+/// Loads the route. Throws FileError if it has fewer than two lines, since such a route cannot be
+/// followed.
 [[nodiscard]] RoutePanorama load_route_to_follow(const MemoryFile& memory, const std::string& name);
 
 }  // namespace panonav

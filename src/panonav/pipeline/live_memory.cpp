@@ -23,12 +23,12 @@ namespace panonav {
 
 namespace {
 
-/// A writer that was killed may have left a memory without views.
+/// True if the file has views. A writer that was killed may have left a file without any.
 bool holds_views(Memoriser& memoriser) {
   return memoriser.file() != nullptr && !memoriser.file()->views().empty();
 }
 
-/// Stores views on a thread of its own.
+/// Stores views on a separate thread.
 class Storer {
  public:
   /// `has_views`: the memory holds views already.
@@ -130,11 +130,11 @@ struct LiveMemory::Implementation {
     }
     if (exists && (!options.add || holds_views(*memoriser))) recogniser = make_recogniser();
     if (memoriser && !options.in_step) {
-      storer.emplace(*memoriser, recogniser != nullptr);  // it alone uses the file now
+      storer.emplace(*memoriser, recogniser != nullptr);  // now only `storer` uses the file
     }
   }
 
-  /// True if enough views have headings for updates; other memories only grow.
+  /// True if enough views have headings for updates; other memories are not updated.
   [[nodiscard]] bool can_be_updated() {
     return memoriser->file()->info().views_with_heading >=
            static_cast<std::uint64_t>(ObservationModel::min_views);
@@ -149,8 +149,8 @@ struct LiveMemory::Implementation {
     return std::make_unique<PlaceRecogniser>(path, recogniser_options);
   }
 
-  /// Learns from all views on another thread once at least 16 and a fifth of them are new, and uses
-  /// models learnt before until they are ready.
+  /// Starts learning from all views on another thread when at least 16 and a fifth of them are new.
+  /// Until the new models are ready, the earlier ones are used.
   void refresh() {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;
@@ -174,17 +174,17 @@ struct LiveMemory::Implementation {
 
   std::filesystem::path path;
   LiveMemoryOptions options;
-  std::optional<Memoriser> memoriser;  // the thread of `storer` uses it, where there is one
+  std::optional<Memoriser> memoriser;  // used by the thread of `storer`, if there is one
   std::optional<Storer> storer;
-  std::optional<MemoryUpdater> updater;  // of the views that were there at first
+  std::optional<MemoryUpdater> updater;  // of the views that existed at the start
   std::unique_ptr<PlaceRecogniser> recogniser;
-  std::optional<Panorama> panorama;  // of the observation `answered`
+  std::optional<Panorama> panorama;  // of the observation named `answered`
   std::string answered;
   /// Views that the recogniser has not learnt from.
   std::vector<std::pair<ReferenceInfo, PackedSignature>> added;
   std::optional<double> last_added_s;
   std::size_t added_since_start = 0;
-  std::future<std::unique_ptr<PlaceRecogniser>> next;  // its thread reads the members above
+  std::future<std::unique_ptr<PlaceRecogniser>> next;  // its thread reads members above
 };
 
 LiveMemory::LiveMemory(std::filesystem::path memory, const LiveMemoryOptions& options)
@@ -199,7 +199,7 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   Answer answer;
   self.panorama.reset();
   if (self.recogniser) {
-    // Unwraps once, for the answer and for learning.
+    // Unwraps only once; both answering and adding use the panorama.
     const auto before = std::chrono::steady_clock::now();
     self.panorama = self.recogniser->encoder().panorama(observation);
     answer.unwrapping = std::chrono::steady_clock::now() - before;

@@ -12,28 +12,28 @@
 
 namespace panonav {
 
-/// Options for the answers and changes of a live memory. Without `add` and `update` the file is
-/// only read.
+/// Options for the answers and changes of a live memory. Without `add` and `update`, the file is
+/// not changed.
 struct LiveMemoryOptions {
   bool add = false;  ///< Add the views of places that the memory does not know.
-  /// Keep the views of known places up to date (`MemoryUpdater`) by observations with odometry.
-  /// Where views are added, too, a memory with few positions and headings only grows.
+  /// Update the views of known places (`MemoryUpdater`) by observations with odometry. Together
+  /// with `add`, a memory of too few views with headings is not updated.
   bool update = false;
-  MemoryUpdateOptions update_options;  ///< of views at known places
-  /// Minimum time between two added views. Until the memory has learnt from a view, the following
-  /// images look as new as that one did. Applies to observations with stamps.
+  MemoryUpdateOptions update_options;  ///< options for updating known places
+  /// Minimum time between two added views, because the images directly after an added view still
+  /// seem new until the memory has learnt from it. Applies to observations with stamps.
   double min_interval_s = 0.5;
-  /// Store views, and learn models from them, before the next observation is answered, so that the
-  /// same observations give the same bits. Otherwise both happen concurrently on threads of lower
-  /// priority.
+  /// Store views and learn models before the next observation is answered, so that the same
+  /// observations give the same bits. Otherwise storing and learning run concurrently on threads of
+  /// lower priority.
   bool in_step = false;
-  MemoriserOptions memoriser;  ///< of views that are added; its source is that of all pictures
-  LocaliserOptions localiser;  ///< of the answers
-  /// Compute also the area where the robot may be (`PlaceRecogniserOptions::areas`); not with
-  /// `add`.
+  MemoriserOptions memoriser;  ///< options for added views; its source applies to all pictures
+  LocaliserOptions localiser;  ///< options for localising
+  /// Also compute areas in which the robot may be (`PlaceRecogniserOptions::areas`); not together
+  /// with `add`.
   std::optional<LocalisationAccuracy> areas;
-  /// Hold a large memory on a server, too (`PlaceRecogniserOptions::max_held_views`). A memory that
-  /// is added to or updated is always held.
+  /// Hold the whole memory in RAM even if it is large and on a server
+  /// (`PlaceRecogniserOptions::max_held_views`). Always true with `add` or `update`.
   bool hold = false;
 };
 
@@ -41,12 +41,12 @@ struct LiveMemoryOptions {
 ///   panonav::LiveMemory memory("walk.panonav", {.add = true, .memoriser = {.source = source}});
 ///   while (auto observation = source.next()) use(memory.answer(*observation));
 ///   memory.finish();
-/// A view that was added is found from the next observation on. What is learnt of all views (models
-/// of places and positions) is learnt again whenever a quarter of them is new.
+/// An added view can be found from the next observation on. The models of places and positions are
+/// learnt again when at least a fifth of the views is new.
 class LiveMemory {
  public:
-  /// Throws as `Memoriser`, `MemoryUpdater` and `PlaceRecogniser`; FileError when there is no file
-  /// and nothing is to be added; ContractError on areas of a memory that is added to.
+  /// Throws like `Memoriser`, `MemoryUpdater` and `PlaceRecogniser`; FileError if there is no file
+  /// and `add` is false; ContractError on `areas` together with `add`.
   explicit LiveMemory(std::filesystem::path memory, const LiveMemoryOptions& options = {});
   ~LiveMemory();
   /// A moved-from object may only be destroyed or assigned to.
@@ -55,22 +55,24 @@ class LiveMemory {
 
   /// Holds the answer to an observation.
   struct Answer {
-    /// Place; empty while there is no memory: a new one begins with `Memoriser::scale_views` views.
+    /// Place; nullopt while there is no memory. A new memory exists from `Memoriser::scale_views`
+    /// views on.
     std::optional<Place> place;
-    /// True if the place was new; then `add` adds the observation as a view.
+    /// True if the place is new, so that the caller should `add` the observation.
     bool is_new = false;
     std::chrono::steady_clock::duration unwrapping{};  ///< how long it took
   };
-  /// Localises an observation. Does not write: `add` does. Throws as `PlaceRecogniser::localise`.
+  /// Localises an observation; only `add` writes to the memory. Throws as
+  /// `PlaceRecogniser::localise`.
   [[nodiscard]] Answer answer(const Observation& observation);
-  /// Adds the observation that was answered last if its place was new. Its name must be unique.
-  /// With `in_step` the view is on the disk on return, but for the first ones of a new file; else
-  /// soon after: while `max_waiting` views wait for a slow disk, no observation is new. Throws as
-  /// `Memoriser::add`, also about views of earlier calls.
+  /// Adds an observation as a view; call it after `answer` if `Answer::is_new`. The name must be
+  /// unique. With `in_step`, the view is on the disk on return, except the first views of a new
+  /// file; otherwise soon afterwards. While `max_waiting` views wait for a slow disk, no
+  /// observation is new. Throws like `Memoriser::add`, also for views of earlier calls.
   void add(Observation observation);
-  static constexpr std::size_t max_waiting = 8;  ///< Views that wait for the disk at most.
-  /// Returns the panorama of the last answered observation, until it is added; empty while there is
-  /// no memory.
+  static constexpr std::size_t max_waiting = 8;  ///< Largest number of waiting views.
+  /// Returns the panorama of the last answered observation; nullopt after it was added, and while
+  /// there is no memory.
   [[nodiscard]] const std::optional<Panorama>& panorama() const noexcept;
 
   /// Returns the present recogniser; null while there is no memory. Valid until the next `answer`.
@@ -79,9 +81,10 @@ class LiveMemory {
   [[nodiscard]] std::size_t views() const noexcept;
   /// Returns the number of views added since the start, waiting ones included.
   [[nodiscard]] std::size_t added() const noexcept;
-  /// Writes waiting views, updates the views that the run has shown to have changed, and stores the
-  /// models; does nothing if nothing was added and no place was certain. `what`: name of the run in
-  /// the history. Returns the changes of the update; empty without one. Throws as `add`.
+  /// Writes waiting views, updates views of places whose appearance has changed during the run, and
+  /// stores the models. Does nothing if no view was added and no place was certain. `what`: name of
+  /// the run in the history. Returns the changes of the update; nullopt without an update. Throws
+  /// like `add`.
   std::optional<MemoryUpdater::Changes> finish(const std::string& what = "update");
 
  private:

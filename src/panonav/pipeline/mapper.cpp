@@ -33,7 +33,8 @@ std::size_t find_largest_component(const TopologicalMap& map) {
 Mapper::Mapper(const std::filesystem::path& memory, const MapperOptions& options)
     : Mapper(MemoryFile::open(memory, Access::read_write), std::nullopt, options) {}
 
-// The nodes have a memory of their own, as the file may hold views that are still to come.
+// Keeps the nodes in a separate memory, because the file may already hold views of later
+// observations.
 Mapper::Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
                const MapperOptions& options)
     : options_(options),

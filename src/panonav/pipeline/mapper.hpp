@@ -28,36 +28,36 @@ struct MapperOptions {
   bool thumbnails = true;          ///< keep small pictures of the views
 };
 
-/// Maps observations in the order in which they were taken: views that become nodes are appended to
-/// a memory file, and the map is stored there as "map". Views that the file knows by name are not
-/// appended again; their ids must ascend in the order of the observations. Appended views stay,
-/// whatever happens later. `docs/equations.md` and `TopologicalMapper` describe the method. One
-/// thread at a time, except `encode`.
+/// Maps observations in the order in which they were taken: appends the views that become nodes to
+/// a memory file, and stores the map there as "map". Does not append views whose names the file
+/// already has; their ids must ascend in the order of the observations. Appended views remain even
+/// if a later call fails. `docs/equations.md` and `TopologicalMapper` describe the method. Only
+/// `encode` may be called from several threads concurrently.
 class Mapper {
  public:
   /// Result of mapping.
   struct Result {
     TopologicalMap map;                     ///< all nodes and edges
     std::vector<std::size_t> observations;  ///< for each node, the index of its observation
-    std::size_t skipped = 0;                ///< observations that differed too little from a node
+    std::size_t skipped = 0;                ///< number of observations too similar to a node
     double scale_m = 0.0;                   ///< metres per unit of visual displacement
-    bool wheels = false;     ///< true: all observations had odometry, and motions come from it
+    bool wheels = false;     ///< true: motions come from odometry, which all observations had
     double mapping_s = 0.0;  ///< time of the mapping alone, without decoding and file access
   };
 
   /// An encoded observation that is not in the map yet.
   struct EncodedView {
-    FourierSignature signature;           ///< not packed, for the odometry
+    FourierSignature signature;           ///< unpacked, as visual odometry needs it
     ReferenceInfo info;                   ///< name, pose and stamp, as the memory keeps them
     std::optional<Pose2> odometry;        ///< absolute, in its own frame; empty: unknown
-    std::vector<std::uint8_t> thumbnail;  ///< a PNG; empty where none is kept
+    std::vector<std::uint8_t> thumbnail;  ///< PNG file; empty if thumbnails are not kept
   };
 
   /// Pictures come from the memory's own camera. Throws FileError as `MemoryFile::open`,
   /// OptionError.
   explicit Mapper(const std::filesystem::path& memory, const MapperOptions& options = {});
-  /// Takes a file open for writing. `source`: layout of the images; empty: that of the memory.
-  /// Throws ContractError as `ViewEncoder`, OptionError.
+  /// Uses a file that is open for writing. `source`: layout of the images; nullopt: that of the
+  /// memory. Throws ContractError like `ViewEncoder`; OptionError.
   Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
          const MapperOptions& options = {});
   Mapper(const Mapper&) = delete;
@@ -81,9 +81,9 @@ class Mapper {
   /// map. More observations may follow. Throws FileError.
   Result finish();
 
-  /// Returns the present map, for display; `finish` still moves nodes. Cost: a copy.
+  /// Returns a copy of the present map, for display; `finish` will still move nodes.
   [[nodiscard]] TopologicalMap current_map() const { return mapper_.map(); }
-  /// Returns the file that views are appended to.
+  /// Returns the file to which views are appended.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
   /// Returns the encoder that makes views of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
@@ -101,7 +101,7 @@ class Mapper {
   bool any_pose_ = false;
 };
 
-/// Returns the number of the component with the most nodes; of several, the first.
+/// Returns the component with the largest number of nodes; of ties the first one.
 [[nodiscard]] std::size_t find_largest_component(const TopologicalMap& map);
 
 }  // namespace panonav

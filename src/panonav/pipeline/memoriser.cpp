@@ -114,7 +114,7 @@ void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
   if (waiting_.size() >= scale_views) make_file(executor);
 }
 
-// If one of the first images has another size, the most frequent size decides.
+// Makes the header; if the first images differ in size, uses only those of the most frequent size.
 MemoryHeader Memoriser::make_header_from_waiting(Executor& executor) const {
   const auto first = std::span(waiting_).first(std::min(scale_views, waiting_.size()));
   const auto header_of = [&](std::span<const Observation> some) {
@@ -197,7 +197,7 @@ void Memoriser::require_same_view(const Observation& observation, const PackedSi
                                   ViewId view) {
   const VisualMemory there = file_->load(std::array{view});
   const ReferenceInfo& info = there.info(view);
-  // A map may have given the view its pose.
+  // Accepts a pose that the observation does not have, as it may come from a map.
   if ((observation.pose && info.pose != observation.pose) || info.stamp_s != observation.stamp_s) {
     throw_different_view(path_, observation.name,
                          "a view with another pose or stamp under the name");

@@ -21,31 +21,32 @@ struct MemoriserOptions {
   SignatureOptions signature;          ///< of a new file
   PreprocessingOptions preprocessing;  ///< of a new file
   bool thumbnails = true;              ///< keep small pictures of the views for people
-  /// Store local features, which tell apart places 1 to 2 m apart (about 4 kB a view); not stored
-  /// if elevations are unknown.
+  /// Store local features (about 4 kB for each view), which distinguish places 1 to 2 m apart. Not
+  /// stored if elevations are unknown.
   bool features = true;
-  /// Receives each observation that is left out because its image does not fit the others, for
-  /// example by its size; empty: `add` throws instead.
+  /// Callback for each observation that is left out because its image does not fit the others, for
+  /// example in size; empty: `add` throws instead.
   std::function<void(const Observation&, const Error&)> left_out;
 };
 
-/// Makes the header of a new memory: sizes from the first observation, the full scale from all
-/// given ones. Throws ContractError on options that do not fit the images, FileError if an image
-/// has no structure.
+/// Makes the header of a new memory: takes the sizes from the first observation, and the full scale
+/// from all observations in `first`. Throws ContractError on options that do not fit the images,
+/// FileError if an image has no structure.
 [[nodiscard]] MemoryHeader make_memory_header(std::span<const Observation> first,
                                               const PictureSource& source,
                                               const SignatureOptions& signature,
                                               const PreprocessingOptions& preprocessing,
                                               Executor& executor);
 
-/// Makes the header of a new memory from the first images of a recording, so that nothing about
-/// light or scene must be known beforehand. Throws FileError also on images that cannot be read.
+/// Makes the header of a new memory from the first images of a recording, so that light and scene
+/// need not be known. Throws like `make_memory_header`, and FileError on images that cannot be
+/// read.
 [[nodiscard]] MemoryHeader make_header_from_recording(const Dataset& recording,
                                                       const SignatureOptions& signature,
                                                       const PreprocessingOptions& preprocessing,
                                                       Executor& executor);
 
-/// Appends observations to a memory file, which is made where there is none:
+/// Appends observations to a memory file, which is created if it does not exist:
 ///   panonav::Memoriser memoriser("office.panonav", {.source = source});
 ///   memoriser.add(observation);
 ///   memoriser.finish();
@@ -54,16 +55,16 @@ struct MemoriserOptions {
 /// threads. One thread at a time.
 class Memoriser {
  public:
-  /// Observations that decide the full scale of a new memory.
+  /// Number of observations from which the full scale of a new memory is computed.
   static constexpr std::size_t scale_views = 32;
 
-  /// Throws FileError as `MemoryFile::open`, ContractError as `ViewEncoder`, and for a new file
-  /// without a source.
+  /// Throws FileError like `MemoryFile::open`; ContractError like `ViewEncoder`, and if a new file
+  /// has no source.
   explicit Memoriser(const std::filesystem::path& memory, MemoriserOptions options = {});
 
   /// Adds an observation; its name becomes the view's. An observation with a known name must have
   /// the same pose, stamp and picture, and is not stored again. Throws ContractError on an empty
-  /// name, FileError on another view under a known name, and as `ViewEncoder::panorama`.
+  /// name; FileError if the name belongs to a different view; else like `ViewEncoder::panorama`.
   void add(Observation observation);
   /// Adds observations: encodes them on all threads and stores them in one transaction. If one is
   /// rejected, those before it are stored.
@@ -74,15 +75,15 @@ class Memoriser {
     std::size_t appended = 0;      ///< views added to the file
     std::size_t known_before = 0;  ///< observations that were in the file already
   };
-  /// Writes observations that wait for a new file's full scale, and stores the models learnt of the
-  /// views (`learn_and_store_models`). More may be added afterwards. Throws FileError;
-  /// ContractError when nothing was ever added.
+  /// Writes observations that wait for a new file's full scale, and learns and stores the models
+  /// (`learn_and_store_models`). More observations may be added afterwards. Throws FileError;
+  /// ContractError if a new file got no observation.
   Counts finish();
   Counts finish(Executor& executor);  ///< Finishes on all threads.
 
   /// Returns the file; null while a new file waits for its full scale.
   [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
-  /// Returns the encoder that makes views of pictures; null as `file()`.
+  /// Returns the encoder that makes views of pictures; null if `file()` is null.
   [[nodiscard]] const ViewEncoder* encoder() const noexcept {
     return encoder_ ? &*encoder_ : nullptr;
   }

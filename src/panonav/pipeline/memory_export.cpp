@@ -25,7 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// True if the name can be a file name in the folder and no file or folder of the export has it.
+/// True if the name is a valid relative file name and does not collide with another file of the
+/// export.
 bool is_file_name(const std::string& name) {
   constexpr std::array<std::string_view, 8> own{"dataset.toml", "poses.csv",      "images.csv",
                                                 "views.csv",    "signatures.npy", "memorise.toml",
@@ -133,7 +134,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   dataset.folder = out;
   dataset.source.layout = {.forward_column = picture_forward_column(header.panorama_columns),
                            .elevations = header.elevations};
-  // A thumbnail sampled too coarsely for the highest component would alias it.
+  // A thumbnail with fewer than two columns per period of the highest component would alias.
   const bool large_enough = thumbnail_columns(header) >= 2 * header.shape.components;
   std::vector<std::string> files = choose_picture_names(views);
   std::vector<ViewId> ids;
@@ -158,7 +159,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   write_file(out / "views.csv", std::string_view(format_view_table(views, files)));
   write_file(out / "signatures.npy", make_npy_array(memory.load(ids)));
   OptionText options;
-  options.text = "[signature]\ncomponents = ";  // rows and columns are those of the pictures
+  options.text = "[signature]\ncomponents = ";  // rows and columns come from the pictures
   options.text.append(std::to_string(header.shape.components)).append("\n");
   options.section("preprocessing", header.preprocessing);
   write_file(out / "memorise.toml", std::string_view(options.text));

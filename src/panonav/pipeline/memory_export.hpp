@@ -8,15 +8,15 @@
 
 namespace panonav {
 
-/// Contents of an export of a memory.
+/// Describes the contents of an exported memory.
 struct MemoryExport {
-  std::size_t views = 0;  ///< number in views.csv and signatures.npy
+  std::size_t views = 0;  ///< number of views in views.csv and signatures.npy
   /// Number of views whose thumbnail became an image of the data set; 0: no data set was written.
   std::size_t pictures = 0;
-  /// Number of these whose name cannot be a file name; their images have other names.
+  /// Number of exported images with other names than their views, which cannot be file names.
   std::size_t renamed = 0;
-  /// True if the data set has positions: all of its images have one. Otherwise positions are only
-  /// in views.csv.
+  /// True if the data set has positions, which requires one for each image. Otherwise positions are
+  /// only in views.csv.
   bool positions = false;
   bool headings = false;  ///< like `positions`; false without them
   bool stamps = false;    ///< like `positions`
@@ -25,11 +25,11 @@ struct MemoryExport {
 };
 
 /// Writes views, poses, thumbnails and signatures into a new folder (docs/formats.md, section
-/// "Export of a memory"), which appears whole or not at all. Thumbnails with all components of a
-/// signature become the pictures of a data set, enlarged to the size of the memory's panoramas,
-/// from which `memorise` makes a memory of the same shape. `advance` is called after each view.
-/// Throws FileError when something but an empty folder is there, when the memory holds no view, and
-/// when a file cannot be written.
+/// "Export of a memory"), completely or not at all. If thumbnails are large enough for all
+/// components of a signature, writes them as pictures of a data set, enlarged to the size of the
+/// memory's panoramas; `memorise` can make a memory of the same shape from them. Calls `advance`
+/// after each view. Throws FileError if the folder exists and is not empty, if the memory has no
+/// view, or if a file cannot be written.
 MemoryExport export_memory(const MemoryFile& memory, const std::filesystem::path& folder,
                            const std::function<void()>& advance = {});
 

@@ -27,15 +27,15 @@ namespace {
 namespace fs = std::filesystem;
 
 using Bytes = std::vector<std::uint8_t>;
-using NewIds = std::map<ViewId, ViewId>;  // in the new memory, by that in the old
+using NewIds = std::map<ViewId, ViewId>;  // id in the new memory, by id in the old one
 
 std::optional<Pose2> get_complete_pose(const ReferenceInfo& info) {
   if (!info.pose || !info.pose->heading_rad) return std::nullopt;
   return Pose2{info.pose->x_m, info.pose->y_m, *info.pose->heading_rad};
 }
 
-/// Returns the map of the file's views, or makes one from their poses. The largest connected
-/// component becomes number 0.
+/// Returns the file's map, or makes one from the views' poses if there is none. The largest
+/// connected component becomes number 0.
 TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& views) {
   TopologicalMap map = file.map(map_name).value_or(TopologicalMap{});
   if (map.nodes.empty()) {
@@ -58,7 +58,8 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
       ++node.component;
     }
   }
-  // Given poses, as from a recording, are better than those that the map estimated.
+  // Poses from a recording are more accurate than those estimated by the map, so they replace the
+  // map's.
   std::size_t nodes = 0;
   std::size_t positions = 0;
   std::size_t poses = 0;
@@ -111,8 +112,8 @@ TopologicalMap replace_ids(const TopologicalMap& map, const NewIds& ids) {
   return result;
 }
 
-/// Appends a map whose nodes are in frames of their own. Nodes that both maps have keep their place
-/// and connect nothing.
+/// Appends a map whose poses are in separate frames, as separate components. Leaves out nodes that
+/// `map` already has, and their edges.
 void append_disconnected(TopologicalMap& map, const TopologicalMap& more) {
   std::size_t next = 0;
   for (const TopologicalMap::Node& node : map.nodes) next = std::max(next, node.component + 1);
@@ -148,7 +149,7 @@ void require_comparable(const MemoryFile& first, const MemoryFile& second) {
   require_same("preprocessing", a.preprocessing == b.preprocessing);
 }
 
-/// Returns the name itself if it is free, else prefixed by the name of its file.
+/// Returns `name` if it is free, else the name prefixed by that of its file.
 template <class IsTaken>
 std::string make_free_name(const std::string& name, const MemoryFile& from,
                            const IsTaken& is_taken) {
@@ -159,9 +160,9 @@ std::string make_free_name(const std::string& name, const MemoryFile& from,
   return new_name;
 }
 
-/// Files of a memory that is being made: next to its target, or, where that is on a server, in the
-/// folder of temporary files. A locked file reserves their names, so that two processes never use
-/// the same. Files that a killed process left next to a target are removed by the next one.
+/// Files of a memory that is being written: next to its target, or in the folder of temporary files
+/// if the target is on a server. A locked file reserves their names, so that no two processes use
+/// the same. Removes files that a killed process has left next to the target.
 class UnfinishedMemory {
  public:
   explicit UnfinishedMemory(const fs::path& target)
@@ -177,7 +178,7 @@ class UnfinishedMemory {
  private:
   static fs::path name_files(const fs::path& target) {
     if (!is_server_address(target)) return target.string() + ".unfinished";
-    std::random_device device;  // others may make files there, too
+    std::random_device device;  // other processes may use the same folder
     const std::uint64_t number = (std::uint64_t{device()} << 32U) | device();
     return fs::temp_directory_path() / ("merged." + to_hex_digits(number, 16));
   }
@@ -279,7 +280,8 @@ class Merge {
     file.link(links);
   }
 
-  /// Sets the poses of the second memory's views; those of the first keep their frame.
+  /// Sets the poses of the second memory's views in the frame of the first, whose poses are kept
+  /// unless the pose graph has moved them.
   void set_poses(MemoryFile& file, const TopologicalMap& map) {
     std::set<ViewId> of_first;
     for (const auto& both : ids_[0]) of_first.insert(both.second);
@@ -298,7 +300,7 @@ class Merge {
       file.set_pose(view, there);
     }
     if (!result_.alignment) return;
-    // Poses that the pose graph moved.
+    // Sets the poses of the joined component, as optimised by the pose graph.
     const std::size_t joined = map.nodes.front().component;
     for (const TopologicalMap::Node& node : map.nodes) {
       if (node.component != joined) continue;

@@ -12,29 +12,31 @@ namespace panonav {
 
 /// Result of `merge_memories`.
 struct MergedMemory {
-  std::size_t views = 0;   ///< of the new memory
-  std::size_t shared = 0;  ///< views in both memories, stored once
+  std::size_t views = 0;   ///< number of views of the new memory
+  std::size_t shared = 0;  ///< number of views that both memories have, stored once
   std::size_t renamed =
-      0;  ///< renamed views and routes of the second, whose names the first uses for others
-  /// Pose of the second in the frame of the first; empty if no common place was found.
+      0;  ///< number of views and routes of the second that were renamed because of name conflicts
+  /// Pose of the second memory's frame in the frame of the first; nullopt if no common place was
+  /// found.
   std::optional<SessionAlignment> alignment;
   std::size_t connected_components = 0;  ///< of the new map
-  /// Number of views of the second that lost their positions, which are in a frame of their own.
+  /// Number of views of the second memory whose positions were dropped, because their frame could
+  /// not be related to that of the first.
   std::size_t without_position = 0;
 };
 
-/// Makes one memory of two sessions or robots in one place: finds common places by appearance
-/// (`align_sessions`) and moves the second into the frame of the first's poses (`join_sessions`).
-/// Only the largest connected component of each map moves. Without common places both stay apart,
-/// and the second loses its positions.
+/// Merges the memories of two sessions or robots in one environment: finds common places by
+/// appearance (`align_sessions`) and transforms the second into the frame of the first's poses
+/// (`join_sessions`). Moves only their largest connected components. Without common places
+/// the two stay unconnected, and the second loses its positions.
 ///
-/// A view with the same name and picture in both is stored once, as in the first; other used
-/// names of the second become "STEM/NAME". `memory` appears whole or not at all. `advance` is
-/// called for each view written.
+/// A view with the same name and picture in both is stored once, as in the first. Other names of
+/// the second that the first already uses become "STEM/NAME". Writes `memory` completely or not at
+/// all.
 ///
-/// Throws FileError: unreadable or unwritable files, something at `memory`, positions without
-/// headings; ContractError: other shape, preprocessing or elevations; OptionError. Holds both
-/// memories. Cost: `align_sessions`, and writing all views twice.
+/// Throws FileError on files that cannot be read or written, if `memory` exists, and on positions
+/// without headings; ContractError if shape, preprocessing or elevations differ; OptionError. Holds
+/// both memories. Cost: `align_sessions`, and writing all views twice.
 MergedMemory merge_memories(const std::filesystem::path& first, const std::filesystem::path& second,
                             const std::filesystem::path& memory,
                             const SessionAlignmentOptions& alignment = {},

@@ -34,7 +34,7 @@ std::string to_parameter(const MemoryUpdate::Use& use) {
   return text;
 }
 
-// Parses a stored use; returns an empty one for an unknown version.
+// Parses stored statistics; returns empty ones for an unknown version.
 MemoryUpdate::Use parse_memory_use(const std::optional<std::string>& text) {
   MemoryUpdate::Use use;
   if (!text) return use;
@@ -97,7 +97,7 @@ struct MemoryUpdater::Implementation {
   ViewEncoder encoder;
   ColumnRanking ranking;
   MemoryUpdate update;
-  std::map<std::size_t, NewView> kept;  // by their numbers in the run
+  std::map<std::size_t, NewView> kept;  // by number of the observation in the run
   std::size_t observations = 0;
   bool finished = false;
 
@@ -158,7 +158,7 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
   dropped.insert(dropped.end(), planned.forgotten.begin(), planned.forgotten.end());
   self.file.change(
       [&] {
-        // Another process may have removed some meanwhile.
+        // Skips views that another process has removed meanwhile.
         const std::vector<ViewId> there = self.file.views();
         std::erase_if(dropped,
                       [&](ViewId view) { return !std::ranges::binary_search(there, view); });

@@ -16,9 +16,9 @@ namespace panonav {
 ///   panonav::MemoryUpdater updater("office.panonav");
 ///   updater.observe(observation, panorama, recogniser.localise(observation));
 ///   updater.finish("update from monday");
-/// All changes of a run are one transaction, which `MemoryFile::undo` takes back. A run in which
-/// the robot's place was never certain leaves the file as it was. Holds the memory as
-/// localisation does, and 10 kB a picture of at most 128 pictures and of those that are added.
+/// All changes of a run are one transaction, which `MemoryFile::undo` reverts. If the robot's place
+/// was never certain, the file stays unchanged. Holds the whole memory in RAM, and 10 kB for each
+/// of at most 128 pictures and each added one.
 class MemoryUpdater {
  public:
   /// Throws FileError if the file cannot be written or has too few views with positions and
@@ -30,28 +30,27 @@ class MemoryUpdater {
   MemoryUpdater(MemoryUpdater&&) noexcept;
   MemoryUpdater& operator=(MemoryUpdater&&) noexcept;
 
-  /// Adds the next observation with its panorama, which has the memory's shape, and the memory's
-  /// answer. Observations without odometry are ignored. Throws ContractError on another shape and
-  /// after `finish`.
+  /// Adds the next observation with its panorama, which must have the memory's shape, and its place
+  /// by the recogniser. Ignores observations without odometry. Throws ContractError on another
+  /// shape and after `finish`.
   void observe(const Observation& observation, const Panorama& panorama, const Place& place);
-  /// True if the last observation is near enough to one with a certain place that the update will
-  /// place it by odometry.
+  /// True if the last observation is so near to an earlier one with a certain place that the update
+  /// will locate it by odometry.
   [[nodiscard]] bool is_near_known_place() const;
 
   /// Changes that a run made to its memory.
   struct Changes {
     std::size_t observations = 0;  ///< observations with odometry
     std::size_t certain =
-        0;  ///< of these, those whose place was certain and differed from the last certain one
-    std::size_t reinforced = 0;  ///< views of the memory that matched what the robot observed
+        0;  ///< observations whose place was certain, without repeated ones at one place
+    std::size_t reinforced = 0;  ///< views of the memory that matched an observation at their place
     std::size_t added = 0;       ///< views added from this run
     std::size_t replaced = 0;    ///< views removed in exchange for added ones
-    std::size_t forgotten = 0;   ///< views removed because they had not matched for long
-    std::size_t views = 0;       ///< views of the memory afterwards
+    std::size_t forgotten = 0;   ///< views removed because they failed to match in many runs
+    std::size_t views = 0;       ///< number of views of the memory afterwards
   };
   /// Changes the file and learns its models again, in one transaction. `what`: name of the run in
-  /// the history. Throws FileError and then leaves the file unchanged; ContractError on a second
-  /// call.
+  /// the history. Throws FileError, with the file unchanged; ContractError on a second call.
   Changes finish(const std::string& what);
 
  private:

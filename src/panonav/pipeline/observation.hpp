@@ -17,37 +17,37 @@
 
 namespace panonav {
 
-/// An image of a robot's camera with all that is known about that moment. Folders, videos, live
-/// cameras and recordings all become observations, and everything in `pipeline` takes them one at a
-/// time.
+/// An image of a robot's camera, with everything known about the moment at which it was taken.
+/// Folders, videos, live cameras and recordings deliver observations; all classes in `pipeline`
+/// process them one by one.
 struct Observation {
   // NOLINTNEXTLINE(google-explicit-constructor): a picture alone is an observation
-  /// Makes an observation of a picture as the camera delivered it, and nothing else known.
+  /// Makes an observation of a camera picture without any other data.
   Observation(Image image) : picture(std::move(image)) {}
   // NOLINTNEXTLINE(google-explicit-constructor)
-  /// Makes an observation of a panoramic cylinder, and nothing else known.
+  /// Makes an observation of a panoramic cylinder without any other data.
   Observation(Panorama panorama) : picture(std::move(panorama)) {}
 
-  /// Picture as the camera delivered it, or a panoramic cylinder.
+  /// The picture as delivered by the camera, or a panoramic cylinder.
   std::variant<Image, Panorama> picture;
-  /// The PNG or JPEG that a live picture was decoded from, to be passed on; may be empty.
+  /// PNG or JPEG file from which a live picture was decoded, to be forwarded; may be empty.
   std::vector<std::uint8_t> encoded;
   std::string name;  ///< name of the view in a memory, and in messages
-  /// File of the image, if any; errors about the image are then FileErrors that name it.
+  /// File of the image, if any. Errors about the image are then FileErrors with this file's name.
   std::filesystem::path file;
-  std::optional<double> stamp_s;  ///< time of exposure, seconds; must ascend where time matters
+  std::optional<double> stamp_s;  ///< time of exposure in seconds; must ascend if it is used
   /// Absolute pose in the frame of the odometry, which drifts relative to the world.
   std::optional<Pose2> odometry;
-  /// Pose in the world frame, from a survey or a simulation. Memories store it; the pose of a query
-  /// is never used to estimate its own place.
+  /// Pose in the world frame, from a survey or a simulation. Stored with memorised views; never
+  /// used to localise the observation itself.
   std::optional<ReferencePose> pose;
-  /// Tilt measured by an inertial sensor, which panoramas compensate. If the elevations of the
-  /// image are unknown, more than half a degree throws ContractError.
+  /// Tilt measured by an inertial sensor, which unwrapping compensates. Encoding throws
+  /// ContractError if the tilt exceeds half a degree and the elevations of the image are unknown.
   std::optional<Tilt> tilt;
 };
 
-/// Returns `make()`. If the image was read from a file, a ContractError becomes a FileError that
-/// names it.
+/// Returns `make()`. If the image was read from a file, converts a ContractError into a FileError
+/// with the file's name.
 template <class Make>
 auto rethrow_with_file_name(const Observation& observation, const Make& make) {
   try {

@@ -13,19 +13,19 @@
 
 namespace panonav {
 
-/// Reads the picture of an entry, and returns it with the entry's data; several threads may read at
-/// a time. Throws FileError on a picture that is missing or damaged.
+/// Reads the picture of an entry, and returns it with the entry's data. Several threads may call it
+/// concurrently. Throws FileError on a picture that is missing or damaged.
 [[nodiscard]] Observation read_observation(const DatasetEntry& entry);
 
 /// Returns the poses of all entries in the frame of the data set. If the data set has no headings,
-/// they are computed from the path: the tangent fitted to the positions within 0.3 m of path on
-/// either side. Empty without positions.
+/// computes them from the path, as the tangent fitted to the positions within 0.3 m of path on each
+/// side. Empty if an entry has no position.
 [[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
-/// Returns the odometry of all entries; empty without odometry.
+/// Returns the odometry of all entries; empty if an entry has none.
 [[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
 
-/// Calls `make(i)` for 0 .. count - 1 on all threads, and `use(i, made)` in order on this one. An
-/// exception of `make` is thrown after all earlier results were used.
+/// Calls `make(i)` for 0 .. count - 1 on all threads, and `use(i, result)` in ascending order on
+/// the calling thread. Rethrows an `Error` of `make` after all earlier results were used.
 template <class Make, class Use>
 void process_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
   constexpr std::size_t batch = 32;
@@ -47,20 +47,20 @@ void process_in_order(std::size_t count, Executor& executor, const Make& make, c
   }
 }
 
-/// Source of a robot's observations, in the order in which they were made: a data set, a folder, a
-/// video, a camera.
+/// Source of a robot's observations in the order in which they were taken: a data set, folder,
+/// video or camera.
 class ObservationSource {
  public:
   virtual ~ObservationSource() = default;
   /// Returns the kind and layout of all images.
   [[nodiscard]] virtual const PictureSource& pictures() const noexcept = 0;
-  /// Returns the next observation; empty at the end. Throws FileError on a picture that cannot be
+  /// Returns the next observation; nullopt at the end. Throws FileError on a picture that cannot be
   /// read; the next call continues after it.
   [[nodiscard]] virtual std::optional<Observation> next() = 0;
 };
 
-/// Observations of a data set, a folder or a single picture. Up to `decoded_ahead` pictures are
-/// decoded in advance and held, on all threads of the executor, which must outlive *this.
+/// Observations of a data set, a folder or a single picture. Decodes up to `decoded_ahead` pictures
+/// in advance, on all threads of the executor, which must outlive *this.
 class DatasetObservations final : public ObservationSource {
  public:
   static constexpr std::size_t decoded_ahead = 16;  ///< pictures held at most

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns the first names, joined, and the number of further ones.
+/// Returns the first eight names, separated by commas, and the number of further ones.
 std::string join_names(const std::vector<std::string>& names) {
   constexpr std::size_t max_listed = 8;
   std::string text;
@@ -45,8 +45,8 @@ void add_warning_of_skipped_files(Dataset& opened) {
   }
 }
 
-/// Returns the size of the first image; nullopt if it cannot be read, as reading its pixels will
-/// report the reason.
+/// Returns the size of the first image; nullopt if it cannot be read. The error is reported later,
+/// when the image is read.
 std::optional<ImageSize> read_first_picture_size(const Dataset& dataset) {
   const DatasetEntry& first = dataset.entries.front();
   try {
@@ -56,11 +56,11 @@ std::optional<ImageSize> read_first_picture_size(const Dataset& dataset) {
   }
 }
 
-/// Warns of an elevation band that is far too low for the rows of its images: probably radians in
-/// place of degrees. A data set of a few rows, as a route's may be, rightly has a low band.
+/// Warns of an elevation band that is far too narrow for the number of rows: probably given in
+/// radians instead of degrees. A data set with few rows, such as a route's, may have a narrow band.
 void add_warning_of_low_band(Dataset& opened) {
   constexpr double min_band_deg = 5.0;  // pi radians, taken for degrees, are less
-  constexpr double max_stretch = 8.0;   // of pixels; radians stretch them 57 times
+  constexpr double max_stretch = 8.0;   // of pixels vertically; radians give 57
   const PictureLayout& layout = opened.source.layout;
   const auto& band = layout.kept_elevations ? layout.kept_elevations : layout.elevations;
   if (!band) return;
@@ -78,7 +78,7 @@ void add_warning_of_low_band(Dataset& opened) {
 /// Warns of panoramas twice as wide as high: such an image most probably shows the whole sphere,
 /// since as a panorama of square pixels it would reach from pole to pole.
 void add_warning_of_wrong_kind(Dataset& opened) {
-  constexpr double max_band_deg = 170.0;  // from here on the band is nearly the sphere's
+  constexpr double max_band_deg = 170.0;  // from here on the band is nearly the whole sphere
   if (opened.source.kind != PictureKind::panorama) return;
   const auto& band = opened.source.layout.elevations;
   if (band && band->top_rad - band->bottom_rad < radians(max_band_deg)) return;
@@ -101,7 +101,7 @@ void reject_topics(const fs::path& path, const InputOptions::Topics& topics) {
   }
 }
 
-/// Throws FileError on a kind of file that is known but not read by this program.
+/// Throws FileError on a recording or video for which this program has no reader.
 void reject_unregistered_kind(const fs::path& path) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kinds{{
       {".mcap", "recording"},

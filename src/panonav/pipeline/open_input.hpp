@@ -10,14 +10,14 @@ namespace panonav {
 [[nodiscard]] bool has_dataset_file(const std::filesystem::path& folder);
 
 /// Opens a data set (a folder with dataset.toml), a folder of pictures, one picture, or what a
-/// registered reader recognises (`register_dataset_reader`), such as a video. Its warnings name
-/// what was left out, an elevation band that looks like radians, and pictures that look as if they
-/// were of another kind than stated.
+/// registered reader recognises (`register_dataset_reader`), such as a video. The warnings of the
+/// result list skipped files, an elevation band that is probably in radians, and pictures that are
+/// probably of another kind than stated.
 ///
-/// Messages name the members of the options, such as 'source' and the option recursive. Throws
-/// OptionError where one does not fit the input; FileError: no such file, unknown layout of the
-/// pictures, a kind for which no reader is registered, and as `read_dataset` and the readers. Cost:
-/// that of the reader; at most the size of the first picture is read.
+/// Messages mention options by name, such as 'source' and the option recursive. Throws OptionError
+/// if an option does not fit the input; FileError if there is no such file, the layout of the
+/// pictures is unknown or no reader is registered for this kind, and like `read_dataset` and the
+/// readers. Cost: that of the reader; of the pictures, reads at most the size of the first one.
 [[nodiscard]] Dataset open_input(const std::filesystem::path& path,
                                  const InputOptions& options = {});
 

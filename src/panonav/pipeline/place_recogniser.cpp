@@ -23,14 +23,15 @@ namespace panonav {
 
 namespace {
 
-/// Computes the parts of a query for one observation, each at most once and on first use. Both
-/// arguments must outlive it.
+/// Computes signature and features of one observation; unwraps the panorama at most once, on first
+/// use. Encoder and observation must outlive *this.
 class ObservationQuery {
  public:
   ObservationQuery(const ViewEncoder& encoder, const Observation& observation)
       : encoder_(encoder), observation_(observation) {}
 
-  /// `by_features`: the panorama is needed anyway.
+  /// Returns the packed signature. `by_features`: features are needed too, so it uses their
+  /// panorama.
   [[nodiscard]] PackedSignature signature(bool by_features) {
     return by_features ? encoder_.packed(panorama()) : encoder_.packed(observation_);
   }
@@ -92,10 +93,11 @@ struct PlaceRecogniser::Implementation {
     learn_from_index(file);
   }
 
-  // True if stored models apply, which were learnt over all components.
+  // True if stored models can be used: they were learnt with all components.
   [[nodiscard]] bool can_use_kept_models() const { return options.localiser.components == 0; }
 
-  /// Returns the features of the memory, cached; empty if it has none.
+  /// Returns a cached source of the memory's features; empty if the memory has none. Features of
+  /// views after `last_view` are ignored.
   FeatureSource get_or_create_features(const MemoryFile& file, std::optional<ViewId> last_view) {
     if (!file.header().elevations || !file.has_features()) return {};
     if (!features) features = std::make_shared<FeatureCache>(file, last_view);
@@ -123,9 +125,9 @@ struct PlaceRecogniser::Implementation {
     publish(std::move(localiser), source);
   }
 
-  /// Finds the models of a memory that is not held: of a small one by learning from all views; of a
-  /// large one those that the file keeps, else the current ones, else those learnt from a part of
-  /// the views.
+  /// Returns models of a memory that is not held. A small memory uses current stored models or
+  /// learns from all views. A large one uses the models stored last, else those in use, else learns
+  /// from a part of the views.
   [[nodiscard]] LearntModels find_models(const MemoryFile& file, ViewIndex& index,
                                          std::span<const ViewId> views,
                                          std::span<const ViewId> drawn,
@@ -169,7 +171,7 @@ struct PlaceRecogniser::Implementation {
   std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
   std::shared_ptr<FeatureCache> features;  // null: the memory has none
-  std::optional<LearntModels> models;      // what was learnt last
+  std::optional<LearntModels> models;      // learnt or loaded last
   mutable std::mutex mutex;                // of `current`
   std::shared_ptr<const Localiser> current;
 };

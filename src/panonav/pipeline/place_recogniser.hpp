@@ -24,14 +24,14 @@ struct SearchCounters;
 /// Options of a place recogniser.
 struct PlaceRecogniserOptions {
   LocaliserOptions localiser;  ///< number of views compared and listed
-  /// Layout of the pictures; empty: that of the memory's own.
+  /// Layout of the pictures; nullopt: that of the memory.
   std::optional<PictureSource> source;
-  /// Compute also the area where the robot may be, component by component. This holds the
-  /// memory, as areas are computed from the positions of all views.
+  /// Also compute the areas in which the robot may be (`localise_hierarchically`). The memory is
+  /// then held in RAM, as areas depend on the positions of all views.
   std::optional<LocalisationAccuracy> areas;
-  /// Largest number of views for which a memory on a server is held. Larger ones are searched on
-  /// the server: 350 bytes a view instead of 2700, but more time for each image (docs/scale.md).
-  /// Files are always held.
+  /// Largest number of views of a memory on a server that is held in RAM. Larger memories are
+  /// searched on the server, which takes more time for each image but 350 instead of 2700 bytes of
+  /// RAM for each view (docs/scale.md). Memory files are always held.
   std::size_t max_held_views = 200'000;
   /// Largest number of views from which models are learnt in a memory that is not held.
   std::size_t max_learnt_views = 20'000;
@@ -41,20 +41,21 @@ struct PlaceRecogniserOptions {
 ///   panonav::PlaceRecogniser recogniser("office.panonav");
 ///   auto place = recogniser.localise(panonav::read_image("view.jpg"));
 ///   if (place.known) std::cout << place.position->x_m << ' ' << place.position->y_m << '\n';
-/// (`position` is empty only for memories whose views have no poses.) Models that no longer fit the
-/// views of the file (`learn_and_store_models`) are learnt again, which takes seconds in a large
-/// memory. Several threads may use one object.
+/// (`position` is empty only for memories whose views have no poses.) If the stored models are not
+/// those of the present views (`learn_and_store_models`), learns new ones, which takes seconds for
+/// a large memory. Several threads may use one object concurrently.
 ///
-/// Holds the whole memory, or of a large one on a server only an index: the answers are the same
-/// bits but for `bytes_read`. A memory that is not held and has more than `max_learnt_views` uses
-/// the models that were kept last, or else learns from whole areas with that many views.
+/// Holds the whole memory, or an index of a large memory on a server: the results are the same
+/// except `bytes_read`. A memory that is not held and has more than
+/// `max_learnt_views` uses the models stored last, or learns from whole areas that contain about
+/// this number of views.
 class PlaceRecogniser {
  public:
-  /// Throws FileError on a file that is missing, damaged or without views, ContractError on options
-  /// that do not fit it.
+  /// Throws FileError if the file is missing, damaged or has no views; ContractError if the options
+  /// do not fit the memory.
   explicit PlaceRecogniser(const std::filesystem::path& memory,
                            const PlaceRecogniserOptions& options = {});
-  /// Uses an open file or memory on a server; its views are held.
+  /// Uses an open file or memory on a server and holds its views in RAM.
   explicit PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options = {});
   /// Uses a memory that is not held, through its index.
   PlaceRecogniser(std::unique_ptr<IndexedMemory> index, const std::filesystem::path& memory,
@@ -64,29 +65,29 @@ class PlaceRecogniser {
   PlaceRecogniser(PlaceRecogniser&&) noexcept;
   PlaceRecogniser& operator=(PlaceRecogniser&&) noexcept;
 
-  /// Finds the place of an observation. Views with names in `excluded_names` are ignored. Throws as
-  /// `ViewEncoder::panorama`; if the memory is not held, FileError while its server cannot be
-  /// reached. Cost: that of `Localiser::localise` and 0.1 ms for a mirror image.
+  /// Finds the place of an observation. Ignores views with names in `excluded_names`. Throws like
+  /// `ViewEncoder::panorama`; if the memory is not held, FileError if its server cannot be reached.
+  /// Cost: that of `Localiser::localise`, and 0.1 ms if a mirror image is needed.
   [[nodiscard]] Place localise(const Observation& observation,
                                std::span<const std::string> excluded_names = {}) const;
 
-  [[nodiscard]] bool is_held() const noexcept;  ///< False: it is searched on its server.
+  [[nodiscard]] bool is_held() const noexcept;  ///< False: the server is searched.
   [[nodiscard]] std::size_t size() const;       ///< Returns the number of views that can be found.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Returns the encoder.
 
-  /// Adds a view that can be found from now on; models learn from it only in a new PlaceRecogniser.
-  /// The file is not changed. No other thread may use *this meanwhile. Throws ContractError as
-  /// `VisualMemory::append`, and if the memory is not held.
+  /// Adds a view that can be found from now on, without changing the file or the models. No other
+  /// thread may use *this meanwhile. Throws ContractError like `VisualMemory::append`, and if the
+  /// memory is not held.
   void append(const ReferenceInfo& info, const PackedSignature& signature);
   /// Returns the held views. Throws ContractError if the memory is not held.
   [[nodiscard]] const VisualMemory& memory() const;
-  /// Returns the localiser, which compares views; `localise` adds areas. Throws ContractError where
-  /// the memory is not held.
+  /// Returns the localiser, whose places have no areas. Throws ContractError if the memory is not
+  /// held.
   [[nodiscard]] const Localiser& localiser() const;
 
-  /// Updates the index of a memory that is not held to views that were added and removed since, and
-  /// the models learnt from them (`IndexedMemory::refresh`). Other threads may localise meanwhile,
-  /// but only one may refresh. Returns true if anything changed.
+  /// If the memory is not held, updates the index (`IndexedMemory::refresh`) and the models after
+  /// other programs added or removed views. Other threads may localise meanwhile, but only one may
+  /// refresh. Returns true if anything changed.
   bool refresh();
   [[nodiscard]] std::uint64_t index_bytes() const;       ///< Returns 0 if the memory is held.
   [[nodiscard]] SearchCounters search_counters() const;  ///< Returns zeros if the memory is held.

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::array<std::string_view, 4> origin_names{"map", "lattice", "links", "arrangement"};
 
-/// Loads the graph of this origin; empty if the file has none.
+/// Loads the graph of this origin; nullopt if the file does not have it.
 std::optional<NavigationGraph> load_graph(RobotNavigatorOptions::GraphOrigin origin,
                                           const MemoryFileViews& source, Executor& executor) {
   const MemoryFile& file = source.file();
@@ -66,8 +66,8 @@ NavigationGraph load_requested_graph(
   }
 }
 
-/// Returns the route and the views near it, by their poses: both must have been recorded with the
-/// poses of one data set.
+/// Returns the route with the views near it. Route and views must have been recorded with the poses
+/// of the same data set.
 KnownRoute load_known_route(const MemoryFileViews& source, const std::string& name,
                             const KnownRouteOptions& options) {
   const MemoryFile& file = source.file();
@@ -184,7 +184,7 @@ RobotNavigator::Step RobotNavigator::step(const Observation& observation, RobotR
     const double advance_m = last_.decision.advance_m;
     const double direction_rad = last_.decision.direction_rad;
     target_ = {advance_m * std::cos(direction_rad), advance_m * std::sin(direction_rad)};
-    // Twice the expected time: wheels may slip.
+    // Allows twice the expected time, since wheels may slip.
     time_left_s_ = 2.0 * (std::numbers::pi / base.turn_rad_s + advance_m / base.speed_m_s) + 1.0;
   }
   last_.velocity = {};

@@ -25,41 +25,41 @@ struct RobotNavigatorOptions {
     map,          ///< map of a `Mapper`: edges are its motions
     lattice,      ///< map of the verb `arrange`: directions come from the phases of views
     links,        ///< links of the memory, with lengths
-    arrangement,  ///< computed by arranging the views, if there is none of the others
+    arrangement,  ///< computed by arranging the views; if no other exists
   };
 
   NavigatorOptions navigator;        ///< options of decisions
   PlannerOptions planner;            ///< options of path planning
   BaseOptions base;                  ///< drive of the robot, and limits of its velocity commands
-  std::optional<GraphOrigin> edges;  ///< source of the edges; empty: the first that the memory has
-  /// Name of a recorded route of the memory, which the robot follows where its path coincides with
-  /// it.
+  std::optional<GraphOrigin> edges;  ///< nullopt: the first origin that the memory has
+  /// Name of a recorded route of the memory. The robot follows the route where the planned path
+  /// coincides with it.
   std::optional<std::string> route;
   KnownRouteOptions known_route;  ///< how the route is followed
 };
 /// Returns "map", "lattice", "links" or "arrangement".
 [[nodiscard]] std::string_view name_of(RobotNavigatorOptions::GraphOrigin origin);
-/// Returns the origin of that name; empty if there is none.
+/// Returns the origin with this name; nullopt if there is none.
 [[nodiscard]] std::optional<RobotNavigatorOptions::GraphOrigin> parse_graph_origin(
     std::string_view name);
 
-/// Drives a robot to a remembered view: takes an image, returns a velocity. Views are read from the
-/// memory file when needed: those of the current area and its surroundings are held, of the rest
-/// only the graph. Making the graph needs the views of all nodes of a map, or all views for an
-/// arrangement; these are released afterwards. One thread at a time.
+/// Drives a robot to a memorised view: takes an image, returns a velocity. Reads views from the
+/// memory file when needed; holds the whole graph, but only the views in and around the current
+/// area. Making the graph temporarily loads the views of all nodes of a map, or all views for an
+/// arrangement. One thread at a time.
 class RobotNavigator {
  public:
   /// The robot's next motion after an observation.
   struct Step {
-    NavigationDecision decision;  ///< the last one
+    NavigationDecision decision;  ///< the latest decision
     Velocity velocity;            ///< for the next period of the base (`BaseOptions::period_s`)
     bool decided =
         false;  ///< true: this observation led to a new decision; false: the previous one continues
   };
 
-  /// `goal`: name or id of a view. `source`: layout of the images; empty: that of the memory.
-  /// Throws FileError if the memory has no views or lacks the edges or route of the options, or if
-  /// no edge leads to the goal; OptionError.
+  /// `goal`: name or id of a view. `source`: layout of the images; nullopt: that of the memory.
+  /// Throws FileError if the memory has no views, if it does not have the edges or the route of the
+  /// options, or if no edge leads to the goal; OptionError.
   RobotNavigator(const std::filesystem::path& memory, const std::string& goal,
                  const RobotNavigatorOptions& options = {},
                  const std::optional<PictureSource>& source = std::nullopt,
@@ -71,9 +71,9 @@ class RobotNavigator {
   /// constructor.
   void set_goal(const std::string& goal);
 
-  /// Returns the next motion; call it once in each period of the base. The image is evaluated only
-  /// for a new decision: when the previous step is done, by odometry or else as commanded, or when
-  /// `report` says that something stopped it. Throws as `ViewEncoder::signature` and
+  /// Returns the next motion; call it once in each period of the base. Evaluates the image only for
+  /// a new decision: when the last step is completed (by odometry, or by the commanded velocities),
+  /// or when `report` indicates an obstacle. Throws like `ViewEncoder::signature` and
   /// `Navigator::observe`.
   [[nodiscard]] Step step(const Observation& observation, RobotReport report = {});
 
@@ -84,15 +84,15 @@ class RobotNavigator {
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return planner().graph(); }
   /// Returns the planner, which knows the path and the blocked edges.
   [[nodiscard]] const AreaPlanner& planner() const noexcept { return navigator_->planner(); }
-  /// Returns the file that views are read from.
+  /// Returns the file from which views are read.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
   /// Reads name, pose and stamp of a view from the file.
   [[nodiscard]] ReferenceInfo info(ViewId view) const;
-  /// Returns the navigator, for programs that observe and drive themselves.
+  /// Returns the navigator, for programs that compute observations and velocities themselves.
   [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
   /// Returns the encoder that makes queries of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
-  /// Returns how the lines of the followed route are made; null without a route.
+  /// Returns how the scanlines of the followed route are made; null without a route.
   [[nodiscard]] const RouteSource* route() const noexcept {
     return route_source_ ? &*route_source_ : nullptr;
   }
@@ -111,8 +111,8 @@ class RobotNavigator {
   std::optional<Navigator> navigator_;
   // State of the current step.
   Step last_;
-  Point2 target_;                  // in the current robot frame
-  double time_left_s_ = 0.0;       // until the step counts as done
+  Point2 target_;                  // end of the step in the current robot frame
+  double time_left_s_ = 0.0;       // after which the step ends in any case
   Pose2 moved_;                    // motion since the decision
   std::optional<Pose2> odometry_;  // of the last observation
 };

@@ -24,14 +24,15 @@ RouteDriver::RouteDriver(const MemoryFile& memory, const std::optional<PictureSo
 }
 
 void RouteDriver::plan_path_from(Point2 place) {
-  // A route whose end is this near to its beginning is driven from its beginning.
+  // Largest distance between the robot and a passage of the route. A robot at the end of a closed
+  // route therefore starts at its beginning.
   constexpr double reach_m = 0.5;
   const auto passes = find_passes(poses(), place, reach_m);
   const auto pass = std::ranges::min_element(passes, {}, [&](const auto& each) {
     return options_.resume_m ? std::abs(each.along_m - *options_.resume_m) : each.along_m;
   });
   start_m_ = pass == passes.end() ? project_onto_route(poses(), place).along_m : pass->along_m;
-  // Even at the very end of the route a path needs some length.
+  // Smallest length of a path, needed if the robot is already at the route's end.
   constexpr double min_way_m = 0.01;
   const double from_m = std::min(start_m_, std::max(0.0, length_m_ - min_way_m));
   path_.emplace(route_segment(poses(), from_m, length_m_), options_.path);

@@ -16,19 +16,19 @@ struct RouteDriverOptions {
   PathFollowerOptions path;       ///< how closely the robot keeps to the path
   BaseOptions base;               ///< drive of the robot, and limits of its velocities
   /// Distance along the route at which an earlier drive ended. If the route passes the robot's
-  /// place several times, the drive continues at the pass nearest to that distance; empty: at the
-  /// first pass.
+  /// position several times, the drive starts at the passage nearest to this distance; nullopt: at
+  /// the first passage.
   std::optional<double> resume_m;
 };
 
 /// Repeats a recorded route [Y03]: takes an image with its odometry, returns a velocity. The robot
-/// drives from its place (if it is on the route several times, from the first) to the end, by pure
-/// pursuit of the positions of its lines (`PathFollower`). One thread at a time.
+/// drives from its position on the route to the end, by pure pursuit of the positions of the
+/// route's lines (`PathFollower`). One thread at a time.
 class RouteDriver {
  public:
   /// State of a repeated route.
   enum class State {
-    searching,  ///< the robot stands: its place is not known yet
+    searching,  ///< the robot stands still, as its position is not yet known
     driving,    ///< the robot is on its way to the end of the route
     arrived,    ///< at the end of the route
     lost,       ///< not found on the route, or without a fix for so long that odometry alone is
@@ -39,14 +39,14 @@ class RouteDriver {
   struct Step {
     State state = State::searching;  ///< after this observation
     Velocity velocity;               ///< for the next period of the base; 0 unless driving
-    std::optional<RouteFix> fix;     ///< empty: the robot drives by odometry
+    std::optional<RouteFix> fix;     ///< nullopt: the robot drives by odometry
     double along_m = 0.0;            ///< distance along the route
     double length_m = 0.0;           ///< length of the route
   };
 
   /// Longest distance that the robot drives by odometry without a fix.
   static constexpr double max_blind_m = 1.0;
-  /// Number of pictures without a fix after which a robot that stands is lost.
+  /// Number of pictures without a fix after which a searching robot is lost.
   static constexpr int max_searches = 10;
 
   /// Throws as `RouteFollower`, and OptionError.
@@ -54,13 +54,14 @@ class RouteDriver {
               const RouteDriverOptions& options = {});
 
   /// Returns the next motion; call it once in each period of the base until the robot has arrived
-  /// or is lost. `other_estimate`: pose of the robot in the frame of the route by another method
-  /// (`Tracker`); as long as it agrees with the odometry since the last fix, the robot is not lost.
-  /// Throws as `LineEncoder::line`, ContractError on an observation without odometry.
+  /// or is lost. `other_estimate`: pose of the robot in the route's frame by another method
+  /// (`Tracker`). While it agrees with the pose by odometry since the last fix, the robot may drive
+  /// without a fix. Throws as `LineEncoder::line`, ContractError on an observation without
+  /// odometry.
   [[nodiscard]] Step step(const Observation& observation,
                           const std::optional<Pose2>& other_estimate = std::nullopt);
 
-  /// Returns the follower, which finds the robot relative to the route.
+  /// Returns the follower, which locates the robot relative to the route.
   [[nodiscard]] const RouteFollower& follower() const noexcept { return follower_; }
 
  private:
@@ -69,10 +70,10 @@ class RouteDriver {
 
   RouteDriverOptions options_;
   RouteFollower follower_;
-  std::optional<PathFollower> path_;  // from the robot's first place onwards
+  std::optional<PathFollower> path_;  // from the robot's first position to the end
   double start_m_ = 0.0;              // along the route
   double length_m_ = 0.0;
-  std::optional<Pose2> odometry_;  // of the step before
+  std::optional<Pose2> odometry_;  // of the last step
   double blind_m_ = 0.0;           // driven since the last fix
   int searches_ = 0;
 };

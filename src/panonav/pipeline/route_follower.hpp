@@ -15,30 +15,31 @@ namespace panonav {
 
 /// Options for following a route.
 struct RouteFollowerOptions {
-  std::optional<std::string> name;  ///< of the route; empty: the only one
+  std::optional<std::string> name;  ///< name of the route; nullopt: the only one
   RouteTrackerOptions tracker;      ///< search range, and thresholds for accepting a fit
   RouteFitOptions fit;              ///< how lines are fitted
   bool use_odometry =
-      true;  ///< use odometry where observations have it; otherwise each is located alone
+      true;  ///< use odometry if available; false: each observation is located separately
 };
 
-/// Locates a robot relative to a recorded route [Y03], observation by observation. Odometry, if
-/// there is any, predicts the place. If the prediction fails, the robot is searched around it, then
-/// on the whole route. One thread at a time, except `encode`.
+/// Locates a robot relative to a recorded route [Y03], observation by observation. Predicts its
+/// position by odometry, if available. If the prediction fails, searches around it, then on the
+/// whole route. One thread at a time, except `encode`.
 class RouteFollower {
  public:
   /// The robot's position relative to the route.
   struct Step {
     std::vector<float> line;                          ///< pixels of the observation's line
-    std::optional<RouteFix> fix;                      ///< empty: the robot is not on this route
+    std::optional<RouteFix> fix;                      ///< nullopt: not found on the route
     std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene differs from the route's
   };
 
-  /// Pictures come from the memory's own camera. Throws FileError, also when there is no such
-  /// route, several and none is named, or it has fewer than two lines; OptionError.
+  /// Pictures come from the memory's own camera. Throws FileError, also if there is no such route,
+  /// if there are several and `options.name` is not set, or if the route has fewer than two lines;
+  /// OptionError.
   explicit RouteFollower(const std::filesystem::path& memory,
                          const RouteFollowerOptions& options = {});
-  /// `source`: layout of the pictures; empty: the memory's own.
+  /// `source`: layout of the pictures; nullopt: that of the memory.
   RouteFollower(const MemoryFile& memory, const std::optional<PictureSource>& source,
                 const RouteFollowerOptions& options = {});
 
@@ -47,7 +48,7 @@ class RouteFollower {
   [[nodiscard]] std::vector<float> encode(const Observation& observation) const {
     return encoder_.line(observation);
   }
-  /// Locates the robot by the next line, which `encode` made, and the odometry of its observation,
+  /// Locates the robot by the next line (made by `encode`) and by the odometry of its observation,
   /// if any.
   [[nodiscard]] Step step(std::vector<float> line, const std::optional<Pose2>& odometry);
   /// Encodes the next observation and locates the robot. Throws as `encode`.
@@ -70,7 +71,7 @@ class RouteFollower {
   LineEncoder encoder_;
   RouteTracker tracker_;
   RouteChanges changes_;
-  std::optional<Pose2> odometry_;  // of the step before
+  std::optional<Pose2> odometry_;  // of the last step
 };
 
 }  // namespace panonav

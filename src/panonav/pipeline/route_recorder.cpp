@@ -10,14 +10,15 @@ namespace panonav {
 namespace {
 
 constexpr std::size_t lines_at_once = 64;
-/// Largest gap between the end of a route and a line that continues it; chosen.
+/// Largest gap between the end of a route and the line that continues it (chosen).
 constexpr double max_gap_m = 1.0;
 
 std::string describe_route(const MemoryFile& file, const std::string& name) {
   return "the route '" + name + "' in " + file.path().string();
 }
 
-/// Lines can only be continued with the same camera and in the same frame.
+/// Returns how to make the lines. An existing route must be continued with the same line options
+/// and in the same frame.
 RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& options) {
   require(options.every_m >= 0.0, "every_m", options.every_m, ">= 0");
   RouteSource source{.line = options.line.value_or(HorizonScanlineOptions{}),
@@ -71,7 +72,7 @@ std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
   const auto route = file_.route(options_.name);
   if (!route || last_) return 0;
   const std::span<const Pose2> known = route->poses();
-  // Equal to the distance within which `RoutePanorama::append` leaves lines out.
+  // Uses the distance within which `RoutePanorama::append` leaves out lines.
   const auto same_place = [](const Pose2& a, const Pose2& b) {
     return distance(a.position(), b.position()) < RoutePanorama::min_step_m;
   };
@@ -90,7 +91,7 @@ std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
 }
 
 bool RouteRecorder::is_due(const std::optional<Pose2>& last, const Pose2& next, double every_m) {
-  // Allows for robots that drive slightly less or more than every_m between images.
+  // Tolerates robots that drive slightly less than `every_m` between images.
   return !last || distance(last->position(), next.position()) >= 0.999 * every_m;
 }
 

@@ -26,7 +26,8 @@ void require_positions(const MemoryFile& file, std::size_t posed) {
                       "'x_m' and 'y_m'");
 }
 
-// Stored models were learnt with the default seed, and the filter's seed is that of learning too.
+// True if the filter's seed, which is also the seed of learning, is the default one with which
+// stored models were learnt.
 bool can_use_stored_models(const TrackerOptions& options) {
   return options.filter.seed == LearningOptions{}.seed;
 }
@@ -48,8 +49,9 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& m
   }
 }
 
-/// Returns the model of a memory that is not held: of a small one as if it were held; of a large
-/// one the model stored last, else one learnt from a part of the views.
+/// Returns the model of a memory that is not held. A small memory uses the current stored model or
+/// learns from all views. A large one uses the model stored last, else learns from a part of the
+/// views.
 ObservationModel find_model(const MemoryFile& file, const IndexedMemory& memory,
                             const TrackerOptions& options) {
   const std::vector<ViewId> views = memory.views();
@@ -107,7 +109,7 @@ struct Tracker::Implementation {
   std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
   MonteCarloLocaliser localiser;
-  std::optional<Pose2> odometry;  ///< the last one
+  std::optional<Pose2> odometry;  ///< of the last call of `move_to`
 };
 
 Tracker::Tracker(const std::filesystem::path& memory, const TrackerOptions& options)

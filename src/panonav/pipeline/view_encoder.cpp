@@ -49,7 +49,7 @@ bool is_same_band(const std::optional<ElevationBand>& a, const std::optional<Ele
 
 constexpr std::string_view as_remembered = ", as in the views of the memory";
 
-/// Returns the number of pixels, in each direction, that become one pixel of the thumbnail.
+/// Returns the number of columns (and rows) averaged to one pixel of the thumbnail.
 int compute_thumbnail_step(int columns) {
   constexpr int max_columns = 256;
   return (columns + max_columns - 1) / max_columns;

@@ -10,14 +10,14 @@
 
 namespace panonav {
 
-/// Data of a view besides its signature.
+/// Data of a view except its signature and its image.
 struct ViewRecord {
   ViewId view;             ///< its id in the file
   ReferenceInfo info;      ///< name, pose and stamp
-  std::size_t links = 0;   ///< to other views of the file
-  bool thumbnail = false;  ///< a picture is stored with it
-  /// Connected component in the map called `map`, else in the file's first map; empty without a
-  /// map, and for views that are not in it.
+  std::size_t links = 0;   ///< number of links to other views of the file
+  bool thumbnail = false;  ///< true: a thumbnail is stored with the view
+  /// Number of the connected component in the map named "map", else in the file's first map;
+  /// nullopt without a map, and for views that are not in the map.
   std::optional<std::size_t> component;
   friend bool operator==(const ViewRecord&, const ViewRecord&) = default;
 };
@@ -26,14 +26,14 @@ struct ViewRecord {
 /// `MemoryFile::load`.
 [[nodiscard]] std::vector<ViewRecord> list_views(const MemoryFile& file);
 
-/// Returns the table of views (docs/formats.md, section "Tables of views"): a header and one line
-/// for each view. `pictures`: empty, or for each view the file that holds its image; empty if none
-/// does.
+/// Returns the table of views as CSV (docs/formats.md, section "Tables of views"): a header and one
+/// line for each view. `pictures`: empty, or the name of each view's image file (empty string: no
+/// image).
 [[nodiscard]] std::string format_view_table(std::span<const ViewRecord> views,
                                             std::span<const std::string> pictures = {});
 
-/// Returns the view that a user names: by name first, else by id. Throws FileError that names the
-/// file if there is no such view.
+/// Returns the view with this name, or else with this id. Throws FileError if there is no such
+/// view.
 [[nodiscard]] ViewId find_view_by_name_or_id(const MemoryFile& file, const std::string& name_or_id);
 
 }  // namespace panonav

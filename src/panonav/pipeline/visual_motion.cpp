@@ -13,7 +13,8 @@ namespace panonav {
 
 namespace {
 
-/// Estimates the scale from pairs of neighbours whose positions the memory knows.
+/// Estimates the scale in metres per unit of visual displacement, from nearest pairs of views with
+/// positions.
 double compute_scale(const VisualMemory& memory, const VisualOdometryOptions& options) {
   std::vector<ViewId> posed;
   for (const ViewId view : memory.views()) {

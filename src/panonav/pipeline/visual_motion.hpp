@@ -16,9 +16,9 @@ namespace panonav {
 [[nodiscard]] OdometryNoise visual_odometry_noise();
 /// Makes visual odometry whose scale is calibrated by views of the memory with known positions.
 [[nodiscard]] VisualOdometry visual_odometry(const VisualMemory& memory);
-/// Fills the odometry of all entries by `VisualOdometry`, with the scale calibrated by the memory.
-/// Returns a message with the number of steps that could not be estimated, at which the robot seems
-/// to stand, and the scale. Throws FileError on an image that cannot be read.
+/// Sets the odometry of all entries by `VisualOdometry`, with the scale calibrated by the memory.
+/// Returns a message with the scale and the number of steps that could not be estimated, which are
+/// set to no motion. Throws FileError on an image that cannot be read.
 [[nodiscard]] std::string add_visual_odometry(Dataset& run, const VisualMemory& memory,
                                               const ViewEncoder& encoder, Executor& executor);
 

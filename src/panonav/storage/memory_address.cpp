@@ -14,7 +14,7 @@ namespace panonav {
 
 namespace {
 
-// The one table of the process, by the beginnings of addresses: "postgresql://".
+// The schemes of this process, by the beginnings of addresses, such as "postgresql://".
 struct RegisteredSchemes {
   std::mutex mutex;
   std::map<std::string, std::shared_ptr<const MemoryScheme>, std::less<>> schemes;

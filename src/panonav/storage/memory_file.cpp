@@ -20,7 +20,8 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Links have no direction; a < b makes a pair unique.
+// Sorts the ends of a link so that a < b: links have no direction, and each pair must be stored
+// only once.
 Link order_ends(Link link) {
   if (link.b < link.a) std::swap(link.a, link.b);
   return link;
@@ -38,7 +39,7 @@ void require_view(const NewView& view, SignatureShape shape) {
   validate(view.info);
 }
 
-// Throws the ContractError for a `kind` ("map", "route") of a name that the file does not have.
+// Throws the ContractError for the name of a `kind` ("map", "route") that the file does not have.
 [[noreturn]] void throw_unknown_name(const char* kind, std::string_view name) {
   throw ContractError(kind, std::string(name), "a " + std::string(kind) + " of the memory file");
 }
@@ -50,7 +51,7 @@ std::string make_parameter_key(std::string_view name) {
 }  // namespace
 
 struct MemoryFile::Implementation {
-  /// Returns what `work(tables)` returns, within a transaction that is committed when it is done.
+  /// Runs `work(tables)` in a writing transaction, commits it and returns the result of `work`.
   template <class Work>
   auto write(const Work& work) {
     const auto transaction = tables->transaction(MemoryTables::Kind::writing);
@@ -63,8 +64,8 @@ struct MemoryFile::Implementation {
       return result;
     }
   }
-  /// Returns what `work(tables)` returns within a transaction that only reads: it sees one state of
-  /// the memory.
+  /// Runs `work(tables)` in a reading transaction, which shows one state of the memory, and returns
+  /// its result.
   template <class Work>
   auto read(const Work& work) {
     const auto transaction = tables->transaction(MemoryTables::Kind::reading);
@@ -74,7 +75,8 @@ struct MemoryFile::Implementation {
   [[nodiscard]] VisualMemory make_empty_memory() const {
     return {header.shape, header.full_scale, header.elevations};
   }
-  /// Appends a row to a memory. Throws DamageError as `checked`, and on a row that repeats another.
+  /// Appends a row to a memory. Throws DamageError as `checked`, and for a row that repeats
+  /// another.
   void append_row(const ViewRow& row, VisualMemory& memory) {
     const auto signature = tables->checked(row, header.shape, scratch).signature;
     unpack_signature(signature, header.shape, packed);
@@ -91,14 +93,14 @@ struct MemoryFile::Implementation {
     if (!memory.contains(link.a) || !memory.contains(link.b)) tables->fail_incomplete(link);
     memory.link(link);
   }
-  /// Returns the attachment; nullopt also if it was left out as bad.
+  /// Returns the attachment of a view; nullopt if there is none, or if it was left out as bad.
   [[nodiscard]] std::optional<Bytes> read_attachment(ViewAttachment table, ViewId view) const {
     std::optional<Bytes> bytes;
-    // The view itself stays: whoever may add could otherwise hide it by a bad attachment.
+    // The view itself is kept; otherwise anyone who may add attachments could hide it by a bad one.
     tables->accept_row(std::nullopt, [&] { bytes = tables->read_checked_bytes(table, view); });
     return bytes;
   }
-  /// Throws as `throw_unknown_view`.
+  /// Changes name, pose or stamp of a view. Throws as `throw_unknown_view`.
   void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change) {
     write([&](MemoryTables&) {
       std::optional<ReferenceInfo> info;
@@ -112,11 +114,11 @@ struct MemoryFile::Implementation {
     });
   }
 
-  std::filesystem::path address;  ///< as it was opened; it may hold a password
+  std::filesystem::path address;  ///< as passed to `open`; may contain a password
   std::unique_ptr<MemoryTables> tables;
   MemoryHeader header;
-  RecordBytes scratch = {};     ///< kept, as every view needs it
-  PackedSignature packed = {};  ///< likewise
+  RecordBytes scratch = {};     ///< buffer, reused for every view
+  PackedSignature packed = {};  ///< the same
 };
 
 MemoryFile::MemoryFile(std::unique_ptr<Implementation> implementation)
@@ -147,7 +149,7 @@ void MemoryFile::copy_to(const std::filesystem::path& path) const {
         if (key.starts_with("parameter.")) to.write_setting(key, value);
       }
       std::set<ViewId> copied;
-      constexpr std::size_t views_per_part = 1000;  // some megabytes
+      constexpr std::size_t views_per_part = 1000;  // a few megabytes
       for_each_batch(views(), views_per_part, [&](std::span<const ViewId> ids) {
         const VisualMemory memory = load(ids);
         std::vector<NewView> part;
@@ -382,7 +384,7 @@ void MemoryFile::rename_route(std::string_view name, std::string_view new_name) 
       throw_used_name("route", new_name, path());
     }
     panonav::rename_route(tables, name, new_name);
-    // The source of its lines is renamed with it.
+    // The parameter with the source of its lines is renamed, too.
     const std::string from = "route." + std::string(name);
     if (const auto lines = parameter(from)) {
       set_parameter("route." + std::string(new_name), *lines);

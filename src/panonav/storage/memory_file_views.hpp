@@ -9,13 +9,12 @@
 
 namespace panonav {
 
-/// Reads views of a memory file when they are needed: a robot holds a part of a large memory. The
-/// file is opened for reading only; while others change it, each `load` reads its present state. A
-/// view whose bytes are damaged is refused when it is loaded, not before. One object belongs to one
-/// thread at a time.
+/// Loads views of a memory file on demand, so that a robot can hold only a part of a large memory.
+/// The file is opened read-only; if others change it, each `load` reads its present state. A
+/// damaged view is refused only when it is loaded. Only one thread at a time may use an object.
 class MemoryFileViews final : public ViewSource {
  public:
-  /// Opens the file and reads the ids, no view. Throws FileError as `MemoryFile::open`.
+  /// Opens the file and reads the ids of its views. Throws FileError as `MemoryFile::open`.
   explicit MemoryFileViews(const std::filesystem::path& path)
       : file_(MemoryFile::open(path, Access::read_only)), views_(file_.views()) {}
 

@@ -32,7 +32,7 @@ void require_band(const std::optional<ElevationBand>& band, std::string_view fie
   }
 }
 
-// Limits of picture files, larger than any from which a picture of the memory could be made.
+// Checks the limits of picture files, which no picture of a memory can exceed.
 void require_picture_size(int rows, int columns, std::string_view rows_name,
                           std::string_view columns_name) {
   constexpr int max_side = 32768;
@@ -46,7 +46,7 @@ void require_picture_size(int rows, int columns, std::string_view rows_name,
   }
 }
 
-// Doubles as little-endian bytes.
+// Converts doubles to little-endian bytes.
 std::vector<std::uint8_t> to_bytes(const std::vector<double>& values) {
   std::vector<std::uint8_t> bytes;
   for (const double value : values) {
@@ -63,7 +63,7 @@ std::vector<double> to_doubles(const std::vector<std::uint8_t>& bytes) {
   return values;
 }
 
-// One bit a pixel, rows one after the other, the first pixel in the lowest bit.
+// Packs a mask with one bit for each pixel, row by row, the first pixel in the lowest bit.
 std::vector<std::uint8_t> to_bits(const Image& mask) {
   std::vector<std::uint8_t> bits((mask.pixels().size() + 7) / 8);
   for (std::size_t i = 0; i < mask.pixels().size(); ++i) {
@@ -84,7 +84,7 @@ Image to_mask(const std::vector<std::uint8_t>& bits, ImageSize size) {
   return mask;
 }
 
-// Passes options to the members `field` and `choice` of `Fields`.
+// Passes each option to the member function `field` or `choice` of `Fields`.
 template <class Fields>
 class OptionFields : public OptionVisitor {
  public:
@@ -144,8 +144,8 @@ class SettingsWriter final : public OptionFields<SettingsWriter> {
   Settings settings;
 };
 
-// Reads the output of SettingsWriter, and records which settings were never read. Every option must
-// exist: a changed default must not change the meaning of a file.
+// Reads settings that SettingsWriter wrote, and records which were read. Every option must be
+// present, so that a changed default cannot change the meaning of a file.
 class SettingsReader final : public OptionFields<SettingsReader> {
  public:
   explicit SettingsReader(const Settings& settings) : settings_(settings) {}
@@ -234,8 +234,8 @@ class SettingsReader final : public OptionFields<SettingsReader> {
   std::set<std::string> used_;
 };
 
-// The one list from which settings are written and read: `Fields` is a SettingsWriter with a const
-// camera, or a SettingsReader.
+// Lists the settings of a camera once for writing and reading: `Fields` is a SettingsWriter with a
+// const camera, or a SettingsReader.
 template <class Fields, class AnyCamera>
 void visit_camera(Fields& fields, AnyCamera& camera) {
   const std::string prefix = "source.camera.";
@@ -286,7 +286,7 @@ void require_camera(const Camera& camera) {
 
 void validate(const MemoryHeader& header) {
   require_picture_size(header.shape.rows, header.panorama_columns, "rows", "panorama_columns");
-  // The memory checks shape and scale itself.
+  // The constructor of the memory checks shape and scale.
   static_cast<void>(VisualMemory(header.shape, header.full_scale, header.elevations));
   require(header.panorama_columns / 2 >= header.shape.components, "panorama_columns",
           header.panorama_columns, ">= 2 x components");

@@ -12,7 +12,8 @@
 
 namespace panonav::fleet {
 
-/// The area of each view, by its id, for comparison with a changed area. Four bytes a view.
+/// Stores the area of each view by the view's id, to find the views of changed areas. Memory: four
+/// bytes for each view.
 class AreasOfViews {
  public:
   void set(ViewId view, const std::optional<MemoryArea>& area) {
@@ -57,7 +58,7 @@ class AreasOfViews {
     }
     return views;
   }
-  std::vector<std::uint32_t> numbers_;  // by id
+  std::vector<std::uint32_t> numbers_;  // area numbers by view id
   std::map<MemoryArea, std::uint32_t> areas_;
 };
 

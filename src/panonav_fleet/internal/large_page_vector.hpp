@@ -11,9 +11,8 @@
 
 namespace panonav::fleet {
 
-/// Allocates on borders of large pages, requested from the system: scattered reads then cost no
-/// look-up of small pages. Directly from the system, as a heap keeps gaps between blocks on such
-/// borders.
+/// Allocates memory on large pages (2 MiB), so that scattered reads cause fewer TLB misses. It
+/// requests pages from the system itself, because a heap would leave gaps between aligned blocks.
 template <class T>
 struct LargePageAllocator {
   static constexpr std::size_t page = std::size_t{2} << 20U;

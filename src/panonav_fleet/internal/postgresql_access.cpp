@@ -1,4 +1,4 @@
-// Making and finding memories on a server.
+// Creates, finds and opens memories on a PostgreSQL server.
 
 #include <chrono>
 #include <utility>

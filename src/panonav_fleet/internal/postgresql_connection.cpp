@@ -92,7 +92,7 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
                     "postgresql://USER@HOST:PORT/DATABASE?memory=NAME, special characters as %40");
   }
   PQconninfoFree(parsed);
-  // Parameters of the address replace these.
+  // Parameters in the address override these defaults.
   const std::array<const char*, 9> keys{
       "connect_timeout",           "tcp_user_timeout", "keepalives_idle",
       "keepalives_interval",       "keepalives_count", "dbname",
@@ -117,15 +117,16 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
                         std::to_string(PQserverVersion(connection_.get()) / 10000) +
                         "; allowed: 15 and newer");
   }
-  // Statements must mean the same whatever the server's settings are, and acknowledged changes must
-  // be on its disk.
+  // These settings make statements mean the same on every server, and ensure that acknowledged
+  // changes are on its disk.
   execute("SET search_path = pg_catalog; SET lock_timeout = '" + seconds +
           "s'; SET bytea_output = hex; "
           "SET extra_float_digits = 1; SET standard_conforming_strings = on; "
           "SELECT set_config('synchronous_commit', 'on', false) "
           "WHERE current_setting('synchronous_commit') = 'off'");
-  // A robot that lost its network during a change holds the memory's lock until the server knows.
-  // Not every system has all of these settings; one message, as a network may be slow.
+  // If a robot loses its network during a change, its session holds the lock of the memory until
+  // the server notices; these settings make it notice soon. Servers may lack some of them. One
+  // message sets all, because a network may be slow.
   try_execute(
       "DO $$ DECLARE wanted text[]; BEGIN FOREACH wanted SLICE 1 IN ARRAY ARRAY["
       "['tcp_keepalives_idle', '10'], ['tcp_keepalives_interval', '5'], "
@@ -310,7 +311,7 @@ void PostgresqlConnection::copy_in(const std::string& sql, std::string_view byte
       discard_results();
       fail(nullptr);
     }
-    // libpq would keep all that the network does not take.
+    // Sends now, because libpq would buffer all that the network does not accept.
     flush();
   }
   int ended = 0;
@@ -403,7 +404,7 @@ void PostgresqlConnection::try_cancel() noexcept {
 void PostgresqlConnection::try_execute(const char* sql) noexcept {
   try {
     PQclear(exchange(sql, nullptr));
-  } catch (const FileError&) {  // NOLINT(bugprone-empty-catch): as promised
+  } catch (const FileError&) {  // NOLINT(bugprone-empty-catch): errors are ignored
   }
 }
 

@@ -16,8 +16,8 @@ struct pg_result;
 
 namespace panonav::fleet {
 
-/// Values for the places $1, $2, ... of a statement, in order, in PostgreSQL's binary form. They
-/// never become part of the statement's text.
+/// Values of the parameters $1, $2, ... of a statement, in order, in PostgreSQL's binary form. They
+/// are sent apart from the text of the statement, so they cannot change what it does.
 class PostgresqlValues {
  public:
   PostgresqlValues& add(std::int64_t value);
@@ -26,10 +26,10 @@ class PostgresqlValues {
   PostgresqlValues& add(std::span<const std::uint8_t> bytes);
   PostgresqlValues& add(std::span<const std::int64_t> values);
   PostgresqlValues& add(std::span<const std::string> texts);
-  /// Adds a missing text.
+  /// Adds a null of type text.
   PostgresqlValues& add_null();
 
-  /// The values in the form of libpq; valid while these values are.
+  /// The values in the form of libpq; valid as long as the PostgresqlValues.
   struct Bound {
     std::vector<unsigned> types;
     std::vector<const char*> data;
@@ -44,13 +44,13 @@ class PostgresqlValues {
     std::string bytes;
   };
   Value& next(unsigned type);
-  /// Adds the head of an array value; its elements follow in the returned bytes.
+  /// Begins an array value and returns its bytes, to which its elements are then appended.
   std::string& begin_array(unsigned type, unsigned element_type, std::size_t count);
   std::vector<Value> values_;
 };
 
-/// The rows that a statement answered. Fields are read as what they are; a null throws FileError
-/// where the function returns no optional.
+/// The rows that a statement returned. Accessors throw FileError on a value of another size, and on
+/// a null unless they return an optional.
 class PostgresqlRows {
  public:
   [[nodiscard]] int size() const;
@@ -73,34 +73,35 @@ class PostgresqlRows {
   std::unique_ptr<pg_result, Clear> result_;
 };
 
-/// A connection to a PostgreSQL server. Whatever the server refuses, a lost connection, and a
-/// server that is silent for `reply_timeout` are thrown as a FileError of one line, without a
-/// password.
+/// A connection to a PostgreSQL server. Functions throw FileError of one line, without a password,
+/// if the server refuses a statement, the connection is lost, or the server is silent for
+/// `reply_timeout`.
 class PostgresqlConnection {
  public:
-  /// Throws FileError: no such server, wrong password, no such database, older than version 15.
+  /// Connects to the server. Throws FileError if there is no such server or database, the password
+  /// is wrong, or its version is older than 15.
   explicit PostgresqlConnection(const ServerAddress& address);
 
-  /// Statements of ours without values, separated by semicolons.
+  /// Executes constant statements without values, separated by semicolons.
   void execute(const std::string& sql);
-  /// Executes a statement, with values if there are any. Returns false if a unique constraint
-  /// forbids it.
+  /// Executes a statement, with values if there are any. Returns false if a unique constraint is
+  /// violated.
   [[nodiscard]] bool execute_unless_duplicate(const std::string& sql,
                                               const PostgresqlValues* values = nullptr);
   PostgresqlRows run(const std::string& sql, const PostgresqlValues& values = {});
-  /// Passes the rows to `take` one after the other, without holding all of them.
+  /// Executes a statement and passes its rows to `take` one at a time, without holding all of them.
   void stream(const std::string& sql, const PostgresqlValues& values,
               const std::function<void(const PostgresqlRows&)>& take);
-  /// A COPY ... FROM STDIN with these bytes.
+  /// Executes a COPY ... FROM STDIN with these bytes.
   void copy_in(const std::string& sql, std::string_view bytes);
-  /// A COPY ... TO STDOUT in the binary form: the fields of one row after the other, empty for
-  /// null.
+  /// Executes a COPY ... TO STDOUT in binary form and passes the fields of each row to `take`;
+  /// `nullopt` for null.
   void copy_out(const std::string& sql, int fields,
                 const std::function<void(std::span<const std::optional<std::string_view>>)>& take);
-  /// Waits outside of a transaction until the server sends a notification and returns its payload;
-  /// empty if none arrived within the time.
+  /// Waits, outside of a transaction, for a notification of the server and returns its payload;
+  /// `nullopt` if none arrives within the time.
   [[nodiscard]] std::optional<std::string> wait_for_notification(double seconds);
-  /// Rolls back the transaction if the connection still works.
+  /// Executes a statement, such as ROLLBACK, and ignores errors.
   void try_execute(const char* sql) noexcept;
 
   [[nodiscard]] bool is_in_transaction() const noexcept;
@@ -112,29 +113,30 @@ class PostgresqlConnection {
   struct Close {
     void operator()(pg_conn* connection) const noexcept;
   };
-  /// Waits until the server sends something, or if `is_sending`, takes something. False if the
-  /// connection is lost: the next call of libpq says why. After the time-out shuts the connection
-  /// and throws FileError.
+  /// Waits until the server sends something or, if `is_sending`, accepts more bytes. Returns false
+  /// if the connection is lost; the next call of libpq then reports why. After `reply_timeout` it
+  /// closes the connection and throws FileError.
   [[nodiscard]] bool wait_for_server(bool is_sending) const;
-  /// Sends the bytes that libpq still buffers. False if the connection is lost.
+  /// Sends the bytes that libpq still buffers. Returns false if the connection is lost.
   bool flush() const;
   void send(const std::string& sql, const PostgresqlValues* values) const;
   /// Returns the next result of the sent statement; null after the last.
   [[nodiscard]] pg_result* next_result() const;
-  /// Same as PQgetCopyData, but waits: the size of `sent`, -1 at the end, -2 on a fault.
+  /// Waits for the next bytes of a COPY and returns as PQgetCopyData: the size of `sent`, -1 at the
+  /// end, -2 on an error.
   [[nodiscard]] int next_copy_data(char*& sent) const;
   [[nodiscard]] pg_result* exchange(const std::string& sql, const PostgresqlValues* values);
   PostgresqlRows checked(pg_result* result);
   [[noreturn]] void fail(const pg_result* result) const;
   [[nodiscard]] std::string message() const;
   void discard_results() noexcept;
-  /// Asks the server to end the statement that runs.
+  /// Asks the server to cancel the running statement.
   void try_cancel() noexcept;
   std::filesystem::path printable_address_;
   std::unique_ptr<pg_conn, Close> connection_;
 };
 
-/// Numbers as PostgreSQL sends them: the most significant byte first.
+/// Appends a number in the byte order of PostgreSQL: most significant byte first.
 void append_big_endian(std::string& bytes, std::uint64_t value, int size);
 /// Reads a number of up to eight bytes.
 [[nodiscard]] std::uint64_t read_big_endian(std::string_view bytes);
@@ -142,18 +144,18 @@ void append_big_endian(std::string& bytes, std::uint64_t value, int size);
 /// Rows in COPY's binary form, for `copy_in`.
 class CopyRows {
  public:
-  /// The next row, which has as many fields as are added before the next one begins.
+  /// Begins a row; exactly `fields` fields must then be added.
   CopyRows& begin_row(int fields);
   CopyRows& add(std::int64_t value);
   CopyRows& add(const std::optional<double>& value);
   CopyRows& add(std::string_view text);
   CopyRows& add(std::span<const std::uint8_t> bytes);
   CopyRows& add_null();
-  /// All rows; none may be added after it.
+  /// Ends the data and returns it; no rows may be added afterwards.
   [[nodiscard]] std::string_view finish();
 
  private:
-  std::string bytes_{"PGCOPY\n\377\r\n\0\0\0\0\0\0\0\0\0", 19};  // flags, nothing more
+  std::string bytes_{"PGCOPY\n\377\r\n\0\0\0\0\0\0\0\0\0", 19};  // no flags, no extension
 };
 
 }  // namespace panonav::fleet

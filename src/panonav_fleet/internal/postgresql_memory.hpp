@@ -12,7 +12,8 @@
 
 namespace panonav::fleet {
 
-/// name, x_m, y_m, heading_rad, stamp_s: the next values of a statement, or fields of a row.
+/// Adds name, x_m, y_m, heading_rad and stamp_s as the next values of a statement or fields of a
+/// row.
 template <class Fields>
 void add_info(Fields& fields, const ReferenceInfo& info) {
   const auto& pose = info.pose;
@@ -23,7 +24,7 @@ void add_info(Fields& fields, const ReferenceInfo& info) {
       .add(info.stamp_s);
 }
 
-/// Reads the same fields from a row, from column `first` on.
+/// Reads the fields of `add_info` from a row, beginning at column `first`.
 [[nodiscard]] inline ReferenceInfo read_info(const PostgresqlRows& rows, int row, int first) {
   ReferenceInfo info;
   info.name = rows.text(row, first);
@@ -40,7 +41,7 @@ void add_info(Fields& fields, const ReferenceInfo& info) {
   return numbers;
 }
 
-/// Accesses the rows of one memory on a server through a connection of its own.
+/// Accesses the rows of one memory on a server through its own connection.
 class PostgresqlTables final : public MemoryTables {
  public:
   using Values = PostgresqlValues;
@@ -103,25 +104,25 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
 
   void run_with_undo(const std::function<void()>& changes, const std::string& what) override;
-  /// One change at most.
+  /// Returns at most one change, the last.
   [[nodiscard]] std::vector<MemoryFile::KeptChange> history() override;
   void undo() override;
 
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
   [[nodiscard]] MemoryFile::Info info() override;
 
-  /// Ends the transaction in which the memory was made.
+  /// Commits the transaction in which the memory was created.
   void commit_creation() { connection_.execute("COMMIT"); }
 
   /// Returns the connection, for statements that only servers have (server_exchange.hpp).
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
   [[nodiscard]] std::int64_t memory_id() const noexcept { return memory_; }
-  /// Returns the changed areas as text for a notification, and forgets them; empty for many areas,
-  /// and where views without a position were changed.
+  /// Returns the areas changed since the last call as text for a notification, and clears them.
+  /// Empty if there are many, or if views without a position were changed.
   [[nodiscard]] std::string consume_changed_areas();
-  /// Returns the number of this connection, which views that it adds refer to.
+  /// Returns the id of this connection's session, to which the views that it adds refer.
   std::int64_t get_or_create_session();
-  /// Notes a change at a position for the notification of the transaction.
+  /// Records a change at a position for the notification of the transaction.
   void note_changed_area(const std::optional<double>& x_m, const std::optional<double>& y_m) {
     if (x_m && y_m) {
       areas_.insert(to_memory_area(*x_m, *y_m));
@@ -158,9 +159,9 @@ class PostgresqlTables final : public MemoryTables {
   std::int64_t memory_;
   std::string channel_;
   std::optional<std::int64_t> session_;
-  bool has_incoming_ = false;            // the table of views on their way
-  std::set<MemoryArea> areas_;           // that the transaction changes
-  bool changes_unplaced_views_ = false;  // it also changes views without a position
+  bool has_incoming_ = false;            // temporary table exists
+  std::set<MemoryArea> areas_;           // changed by the transaction
+  bool changes_unplaced_views_ = false;  // by the transaction
 };
 
 struct FoundMemory {
@@ -168,8 +169,8 @@ struct FoundMemory {
   std::string channel;
 };
 
-/// A connection to a database of memories. With `make_schema` the schema is made where there is
-/// none. Throws FileError on a schema of another version.
+/// Result of `connect_to_memories`, which creates a missing schema if `make_schema`, and throws
+/// FileError on a schema of another version.
 struct MemoriesConnection {
   PostgresqlConnection connection;
   bool has_schema = false;
@@ -179,9 +180,9 @@ struct MemoriesConnection {
 [[nodiscard]] std::optional<FoundMemory> find_memory(MemoriesConnection& memories,
                                                      const ServerAddress& address);
 [[noreturn]] void throw_missing_memory(const ServerAddress& address);
-/// Makes an empty memory on the server and, with enough rights, the schema and the roles where
-/// there are none (docs/scale.md); `fill` is run in the same transaction. Throws FileError when
-/// there is a memory of that name.
+/// Creates an empty memory on the server and, with enough rights, a missing schema and its roles
+/// (docs/scale.md); `fill` runs in the same transaction. Throws FileError if a memory of that name
+/// exists.
 void create_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
                               const std::function<void(MemoryTables&)>& fill);
 

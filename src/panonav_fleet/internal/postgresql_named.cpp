@@ -1,4 +1,4 @@
-// Maps, routes, the last change and counts of a memory on a server.
+// Stores maps, routes and the last change of a memory on a server, and counts its rows.
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
@@ -132,7 +132,7 @@ void PostgresqlTables::undo() {
   }
 }
 
-// The server manages its pages itself.
+// Checks only ids and rows, because the server itself manages its pages.
 std::set<ViewId> PostgresqlTables::verify_structure(const Check& check) {
   std::set<ViewId> views;
   check([&] { static_cast<void>(last_id()); });

@@ -9,7 +9,7 @@ namespace panonav::fleet {
 
 namespace {
 
-// "PNAV" in the upper half: no other program locks that number.
+// The upper 32 bits spell "PNAV", so that no other program uses this lock.
 constexpr const char* lock_schema = "SELECT pg_advisory_xact_lock(5786634408840658944)";
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/position_bound.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav_fleet/internal/postgresql_memory.hpp"
@@ -32,8 +33,9 @@ class PostgresqlTables::ServerTransaction final : public MemoryTables::Transacti
       if (open_) connection.execute("SAVEPOINT part");
       return;
     }
-    // One writes at a time, so that ids have no gaps and ascend as views become visible.
-    constexpr std::int64_t locks = 5786634408840658944;  // as for the schema, which is number 0
+    // Only one client writes at a time, so that ids have no gaps and ascend in the order in which
+    // views become visible.
+    constexpr std::int64_t locks = 5786634408840658944;  // lock number 0 is that of the schema
     try {
       connection.execute(writes_ ? "BEGIN; SELECT pg_advisory_xact_lock(" +
                                        std::to_string(locks + tables_.memory_) + ")"
@@ -197,7 +199,7 @@ std::uint32_t PostgresqlTables::last_id() {
   return static_cast<std::uint32_t>(last);
 }
 
-// Views say which connection added them.
+// Each view refers to the session of the connection that added it.
 std::int64_t PostgresqlTables::get_or_create_session() {
   if (session_) return *session_;
   const std::string insert_robot = "INSERT INTO panonav.robots(fleet, name) SELECT fleet, " +
@@ -217,8 +219,8 @@ std::int64_t PostgresqlTables::get_or_create_session() {
   return *session_;
 }
 
-// COPY ignores row-level security, so new views are first brought to a table of the connection's
-// own.
+// COPY cannot insert into tables with row-level security, so new views go to a temporary table
+// first.
 void PostgresqlTables::make_incoming_table_if_needed() {
   if (has_incoming_) return;
   connection_.execute(
@@ -360,7 +362,7 @@ void PostgresqlTables::read_available_views(std::span<const ViewId> views,
                      [&](const Rows& rows) { consume(read_view_row(rows)); });
 }
 
-// COPY takes a third of the time of inserting rows by statements.
+// Reads by COPY, which is faster than a statement that returns rows.
 void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
                                        const Consume<MagnitudesRow>& consume) {
   const std::string sql = "COPY (SELECT id, x_m, y_m, substr(signature, 1, " +
@@ -387,7 +389,7 @@ void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t by
 }
 
 std::optional<ViewId> PostgresqlTables::find(std::string_view name) {
-  // The server refuses such texts as parameters; no view there has them as a name.
+  // The server refuses such texts as parameters, and no view there can have such a name.
   if (!is_utf8(name) || name.find('\0') != std::string_view::npos) return std::nullopt;
   const Rows rows = run("SELECT id FROM panonav.views WHERE memory = $1 AND name = $2", name);
   return rows.size() == 0 ? std::nullopt : std::optional(read_view_id(rows, 0, 0));
@@ -398,7 +400,7 @@ std::vector<std::string> PostgresqlTables::names() {
 }
 
 std::vector<ViewId> PostgresqlTables::views() {
-  std::vector<ViewId> views;  // by COPY, as they may be many
+  std::vector<ViewId> views;  // read by COPY: there may be many
   connection_.copy_out("COPY (SELECT id FROM panonav.views WHERE memory = " +
                            std::to_string(memory_) + " ORDER BY id) TO STDOUT (FORMAT binary)",
                        1, [&](std::span<const std::optional<std::string_view>> fields) {
@@ -451,7 +453,8 @@ std::optional<StoredBytes> PostgresqlTables::bytes(ViewAttachment table, ViewId 
 void PostgresqlTables::write_links(std::span<const Link> links) {
   std::vector<std::int64_t> a, b, kinds, checksums;
   std::set<std::pair<ViewId, ViewId>> written;
-  // The last of several links of the same two views counts; one statement accepts a pair only once.
+  // Only the last of several links between the same two views is written, because one statement may
+  // change a row only once.
   for (std::size_t i = links.size(); i-- > 0;) {
     const Link& link = links[i];
     if (!written.emplace(link.a, link.b).second) continue;

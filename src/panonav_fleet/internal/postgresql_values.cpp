@@ -10,7 +10,7 @@ namespace panonav::fleet {
 
 namespace {
 
-// Numbers of PostgreSQL's own types, which never change.
+// Numbers of PostgreSQL's built-in types, which never change.
 constexpr unsigned bytea_type = 17, int8_type = 20, text_type = 25, float8_type = 701,
                    int8_array_type = 1016, text_array_type = 1009;
 
@@ -35,7 +35,8 @@ PostgresqlValues::Value& PostgresqlValues::next(unsigned type) {
 std::string& PostgresqlValues::begin_array(unsigned type, unsigned element_type,
                                            std::size_t count) {
   std::string& bytes = next(type).bytes;
-  // Dimensions, whether there are nulls, the type, then the size and first index of the dimension.
+  // Number of dimensions, 1 if there are nulls, element type; then size and first index of the
+  // dimension.
   append_big_endian(bytes, count == 0 ? 0 : 1, 4);
   append_big_endian(bytes, 0, 4);
   append_big_endian(bytes, element_type, 4);
@@ -54,7 +55,8 @@ PostgresqlValues& PostgresqlValues::add(std::int64_t value) {
 PostgresqlValues& PostgresqlValues::add(const std::optional<double>& value) {
   Value& field = next(float8_type);
   field.null = !value;
-  // Checksums do not know the sign of zero, as SQLite does not keep it.
+  // Adding 0 turns -0 into 0: SQLite does not keep the sign of zero, so the checksums do not have
+  // it either.
   if (value) append_big_endian(field.bytes, std::bit_cast<std::uint64_t>(*value + 0.0), 8);
   return *this;
 }

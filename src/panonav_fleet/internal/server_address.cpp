@@ -11,8 +11,8 @@ namespace panonav::fleet {
 
 namespace {
 
-// False if a part of a password could be taken for a host, port or database, which libpq names in
-// its messages.
+// False if libpq could take a part of an unescaped password for a host, port or database, which it
+// shows in its messages.
 bool has_escaped_password(std::string_view address) {
   const std::string_view rest = address.substr(address.find("://") + 3);
   const std::string_view authority = rest.substr(0, rest.find_first_of("/?#"));
@@ -20,7 +20,7 @@ bool has_escaped_password(std::string_view address) {
   const std::string_view user = authority.substr(0, at == std::string_view::npos ? 0 : at);
   const std::string_view hosts = authority.substr(at == std::string_view::npos ? 0 : at + 1);
   if (user.find('@') != std::string_view::npos) return false;
-  // Further on an @ is good in the value of a parameter alone.
+  // Behind the authority an @ is allowed only in the value of a parameter.
   const std::string_view below = rest.substr(authority.size());
   if (below.find('@') < std::min(below.find('='), below.size())) return false;
   for (std::size_t colon = hosts.find(':'); colon < hosts.size();) {

@@ -15,10 +15,10 @@ struct ServerAddress {
   std::optional<std::string> robot;
 };
 
-/// True if it begins as the address of a PostgreSQL server.
+/// True if the path begins as the address of a PostgreSQL server.
 [[nodiscard]] bool is_postgresql_address(const std::filesystem::path& memory);
 
-/// Throws FileError unless the address names a memory.
+/// Parses an address; throws FileError unless it is valid and names a memory.
 [[nodiscard]] ServerAddress parse_server_address(const std::filesystem::path& memory);
 
 }  // namespace panonav::fleet

@@ -13,9 +13,9 @@ namespace {
 
 using Numbers = std::span<const std::int64_t>;
 
-// The rows of a memory that a file keeps, as v; $1 is the memory, $2 and $3 are the areas' columns
-// and rows. Bare columns are compared with bare numbers: row-level security lets an index be used
-// only where nothing but such comparisons, which cannot fail, sees the rows.
+// Returns SQL for the rows of a memory that a file keeps, as v; $1 is the memory, $2 and $3 are
+// columns and rows of the areas. With row-level security PostgreSQL uses an index only for
+// comparisons that cannot fail, so bare columns are compared with bare numbers.
 std::string kept_views_sql(const KeptAreas& areas) {
   if (!areas) return "panonav.views v WHERE v.memory = $1";
   return "(SELECT (10 * c)::float8 left_m, (10 * c + 10)::float8 right_m, (10 * r)::float8 "
@@ -81,7 +81,7 @@ PostgresqlValues ServerExchange::values() const {
   return values;
 }
 
-// The columns are those of `server_view_fields`.
+// Reads a row whose columns are those of `server_view_fields`.
 ServerView ServerExchange::read_server_view(const PostgresqlRows& rows, int row) const {
   return {read_view_id(rows, row, 0), read_info(rows, row, 1), rows.integer(row, 6)};
 }
@@ -427,7 +427,8 @@ std::vector<ViewId> ServerExchange::submit_removals(
 
 std::size_t ServerExchange::submit_links(std::span<const Link> added,
                                          std::span<const ChangedLink> changed) {
-  // a, b, kind, checksum; a, b, former kind, kind, checksum; a, b
+  // Added links: a, b, kind, checksum; changed links: a, b, former kind, kind, checksum; removed
+  // links: a, b.
   std::array<std::vector<std::int64_t>, 11> columns;
   const auto kind_of = [](Link::Kind kind) { return std::int64_t{static_cast<int>(kind)}; };
   for (const Link& link : added) {

@@ -17,13 +17,13 @@
 
 namespace panonav::fleet {
 
-/// The last version of a file's view that a server accepted.
+/// The last version of a view of a file that a server accepted.
 struct Upload {
   ViewId view;                 ///< in the file
   std::int64_t signature = 0;  ///< `signature_checksum`
   ViewId server_view;
-  std::int64_t local_checksum = 0, server_checksum = 0;  ///< of both rows at that time
-  std::int64_t sent = 0;                                 ///< number of the synchronisation
+  std::int64_t local_checksum = 0, server_checksum = 0;  ///< checksums of both rows at that time
+  std::int64_t sent = 0;                                 ///< number of the sending synchronisation
 };
 
 /// A view on a server without its signature.
@@ -41,7 +41,7 @@ struct FullServerView {
 };
 
 /// Summary of the rows whose ids share all but the lowest `block_bits` bits: their number and the
-/// exclusive or of their checksums. Where two summaries are equal, so are the rows.
+/// exclusive or of their checksums. Two blocks with equal summaries have equal rows.
 struct Block {
   std::int64_t rows = 0;
   std::int64_t checksums = 0;
@@ -55,20 +55,21 @@ inline void add_to_block(Blocks& blocks, ViewId id, std::int64_t checksum) {
   block.checksums ^= checksum;
 }
 
-/// The part of a memory on a server that a file keeps; nullopt: all of it.
+/// The areas of a server's memory that a file keeps; nullopt: all of them.
 using KeptAreas = std::optional<std::vector<MemoryArea>>;
 
 /// Links of a server's memory.
 struct ServerLinks {
   std::vector<Link> accepted;
-  std::set<std::pair<ViewId, ViewId>> left_out;  ///< ends of bad rows, whose kind is not known
+  std::set<std::pair<ViewId, ViewId>> left_out;  ///< ends of damaged rows
 };
 
-/// Exchanges many rows with a server in few messages, for a synchronisation. All functions throw
-/// FileError as `MemoryTables` does, and are called within transactions of `tables()`.
+/// Exchanges many rows with a server in few messages, for a synchronisation. Functions throw
+/// FileError as `MemoryTables` does. Call them within transactions of `tables()`, unless stated
+/// otherwise.
 class ServerExchange {
  public:
-  /// Returns nullptr when there is no such memory. Throws FileError as `connect_to_memories`.
+  /// Connects to a memory; nullptr if there is none. Throws FileError as `connect_to_memories`.
   [[nodiscard]] static std::unique_ptr<ServerExchange> connect(const ServerAddress& address);
 
   [[nodiscard]] PostgresqlTables& tables() noexcept { return tables_; }
@@ -82,14 +83,14 @@ class ServerExchange {
     std::int64_t last_view = 0;
   };
   [[nodiscard]] State read_state();
-  /// Returns uploads of these views of the file by ascending id on the server; of several of one
-  /// view the last counts.
+  /// Returns the uploads of these views of the file, by ascending id on the server. If a view has
+  /// several, the last is valid.
   [[nodiscard]] std::vector<Upload> read_uploads(const std::string& file,
                                                  std::span<const ViewId> views);
   [[nodiscard]] std::vector<ServerView> find_views_by_name(std::span<const std::string> names);
-  /// Reads those of the views that exist.
+  /// Reads names, poses, stamps and checksums of those of the views that exist.
   [[nodiscard]] std::vector<ServerView> read_infos(std::span<const ViewId> views);
-  /// Likewise.
+  /// Reads the checksums of those of the views that exist.
   [[nodiscard]] std::map<ViewId, std::int64_t> read_checksums(std::span<const ViewId> views);
   [[nodiscard]] Blocks compute_view_blocks(const KeptAreas& areas);
   [[nodiscard]] std::map<ViewId, std::int64_t> read_checksums_in_blocks(
@@ -100,41 +101,43 @@ class ServerExchange {
   /// Computes `signature_checksum` of those of the views that exist.
   [[nodiscard]] std::map<ViewId, std::int64_t> read_signature_checksums(
       std::span<const ViewId> views);
-  /// Reads those of the views that exist and are no bad rows (`MemoryTables::accept_row`), with
+  /// Reads those of the views that exist and are not damaged (`MemoryTables::accept_row`), with
   /// thumbnails and features, in one message.
   [[nodiscard]] std::vector<FullServerView> read_full_views(std::span<const ViewId> views,
                                                             SignatureShape shape);
 
-  // The following functions are one statement each, outside of transactions, so that no other
-  // client waits for this one's network.
+  // Each of the following functions is one statement outside of transactions, so that no other
+  // client waits for the network of this one.
 
-  /// Returns the same as `read_uploads`, once no writer is active.
+  /// Returns the same as `read_uploads`, after waiting until no writer is active.
   [[nodiscard]] std::vector<Upload> read_settled_uploads(const std::string& file,
                                                          std::span<const ViewId> views);
-  /// Copies views to a table of this connection, numbered by their index in `views`, and notes
-  /// their areas for the notification of `submit_views`.
+  /// Copies views to a temporary table, numbered by their index in `views`, and records their areas
+  /// for the notification of `submit_views`.
   void stage_views(std::span<const NewView> views);
-  /// Reserves ids for views; returns the last id before them.
+  /// Reserves `count` ids for views; returns the last id before them.
   [[nodiscard]] std::uint32_t reserve_ids(std::size_t count);
   struct Staged {
-    std::size_t number = 0;  ///< of the staged view
+    std::size_t number = 0;  ///< index of the staged view
     Upload upload;           ///< its `server_view` is a reserved id
     std::int64_t thumbnail_checksum = 0, features_checksum = 0;
   };
-  /// Adds staged views except those that were accepted before and still exist, and those whose name
-  /// another view has. Returns the uploads of the file's views that exist, by ascending id.
+  /// Adds the staged views, except those that were accepted before and still exist, and those whose
+  /// name is used by another view. Returns the uploads of the file's views that exist, by ascending
+  /// id.
   [[nodiscard]] std::vector<Upload> submit_views(const std::string& file, std::int64_t sent,
                                                  std::span<const Staged> views);
   struct ChangedView {
     Upload upload;
     ReferenceInfo info;
-    std::int64_t former_checksum = 0;  ///< as the file knows it
+    std::int64_t former_checksum = 0;  ///< of the server's row, as known to the file
   };
-  /// Changes names, poses and stamps of views that no other robot changed first. Returns the
-  /// accepted uploads.
+  /// Changes names, poses and stamps of views, unless another robot has changed a view first.
+  /// Returns the accepted uploads.
   [[nodiscard]] std::vector<Upload> submit_changes(const std::string& file, std::int64_t sent,
                                                    std::span<const ChangedView> views);
-  /// Removes views that still have these checksums, with all that belongs to them. Returns which.
+  /// Removes views that still have these checksums, with all that belongs to them. Returns the
+  /// removed ones.
   [[nodiscard]] std::vector<ViewId> submit_removals(
       const std::map<ViewId, std::int64_t>& checksums);
   struct ChangedLink {
@@ -142,7 +145,7 @@ class ServerExchange {
     std::optional<Link::Kind> new_kind;  ///< nullopt: the link is removed
   };
   /// Adds links between existing views that have none, and changes or removes links that still have
-  /// the former kind. Returns how many.
+  /// the former kind. Returns the number of links that were added, changed or removed.
   std::size_t submit_links(std::span<const Link> added, std::span<const ChangedLink> changed);
 
  private:
@@ -154,7 +157,8 @@ class ServerExchange {
   [[nodiscard]] std::vector<Upload> to_uploads(const PostgresqlRows& rows) const;
   [[nodiscard]] ServerView read_server_view(const PostgresqlRows& rows, int row) const;
   [[nodiscard]] std::vector<ServerView> read_server_views(const PostgresqlRows& rows) const;
-  /// Returns the view of the first row, checked; bad attachments are left out. Throws DamageError.
+  /// Parses and checks the view of the first row; damaged attachments are left out. Throws
+  /// DamageError if the view itself is damaged.
   [[nodiscard]] FullServerView read_full_view(const PostgresqlRows& rows, SignatureShape shape,
                                               RecordBytes& scratch);
   [[nodiscard]] std::map<ViewId, std::int64_t> to_checksums(const PostgresqlRows& rows) const;

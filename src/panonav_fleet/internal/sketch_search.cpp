@@ -14,15 +14,15 @@ namespace panonav::fleet {
 
 namespace {
 
-/// A view between levels of the search.
+/// A candidate of the search with its present lower bound.
 struct SketchedView {
   std::uint32_t bound = 0;
-  std::uint32_t segment = 0;  // its number
+  std::uint32_t segment = 0;  // index of the segment
   std::uint32_t row = 0;
   ViewId view;
 };
 
-/// Buffers that a thread needs to search one segment after the other.
+/// Buffers of a thread, reused for one segment after the other.
 struct SegmentScratch {
   explicit SegmentScratch(const SegmentLayout& layout)
       : room(layout),
@@ -86,7 +86,7 @@ class SketchSearch {
                                                   mask_.data(), compared_bytes_)});
   }
 
-  /// Compares these in full; none is compared twice.
+  /// Reads and compares candidates in full, except those that were compared before.
   void read(std::span<const SketchedView> candidates) {
     std::vector<ViewId> unread;
     for (const SketchedView& candidate : candidates) {
@@ -121,7 +121,7 @@ class SketchSearch {
     return segment.compute_cell_bounds(layout_, kernels_, query_, scratch.tables, limit, first,
                                        count, scratch.bounds, scratch.indices);
   }
-  /// Into scratch.level_bounds.
+  /// Writes the lower bounds of rows at a level to scratch.level_bounds.
   void bounds_at(const SketchSegment& segment, int level, std::span<const std::uint32_t> rows,
                  SegmentScratch& scratch) const {
     scratch.bytes_read += rows.size() * layout_.dimensions(level);
@@ -129,8 +129,8 @@ class SketchSearch {
                       scratch.level_bounds.data());
   }
 
-  /// Calls body(segment number, place in the order, scratch, chunk) for those of the order from
-  /// `begin` to `end`, on the threads of the executor; each chunk has that many segments.
+  /// Calls body(segment number, index in the order, scratch, chunk number) for the segments `begin`
+  /// to `end` of the order on the threads of the executor, in chunks of `chunk` segments.
   template <class Body>
   void for_segments(std::size_t begin, std::size_t end, std::size_t chunk, const Body& body) {
     std::vector<std::uint64_t> bytes((end - begin + chunk - 1) / chunk);
@@ -145,7 +145,8 @@ class SketchSearch {
     for (const std::uint64_t of_chunk : bytes) result_.bytes_read += of_chunk;
   }
 
-  /// Bounds of candidates, which are put in the order of their rows.
+  /// Replaces the bounds of candidates by those of a finer level; sorts the candidates by segment
+  /// and row.
   void refine(std::vector<SketchedView>& candidates, int level) {
     std::ranges::sort(candidates, {}, [](const SketchedView& candidate) {
       return std::pair(candidate.segment, candidate.row);
@@ -168,8 +169,8 @@ class SketchSearch {
     result_.bytes_read += scratch.bytes_read;
   }
 
-  /// Finds a first limit for the `top` views, from the segments with the best samples. Views of
-  /// nearby places are adjacent in a segment.
+  /// Finds a first limit of the dissimilarity for the `top` views in the segments with the best
+  /// samples. Samples suffice because views of nearby places are adjacent in a segment.
   void find_limit() {
     if (segments_.empty()) return;
     for (std::size_t i = 0; i < segments_.size(); ++i) {
@@ -222,14 +223,14 @@ class SketchSearch {
     return min_bound;
   }
 
-  /// Finds the best views of a segment by their cells.
+  /// Finds the best views of a segment by the bounds of their cells.
   void collect_best(std::uint32_t number, SegmentScratch& scratch,
                     std::vector<SketchedView>& best) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
     sketches.make_tables(layout_, kernels_, query_, scratch.tables);
     cells(sketches, 0, 0, sketches.blocks(), scratch);
-    // Finds the smallest limit that enough of the bounds keep to.
+    // Finds the smallest limit that enough of the bounds do not exceed.
     std::array<std::size_t, 256> counts{};
     for (std::size_t row = 0; row < sketches.rows(); ++row) ++counts[scratch.bounds[row]];
     std::size_t limit = 0;
@@ -243,7 +244,7 @@ class SketchSearch {
     }
   }
 
-  /// The median bound of some views.
+  /// Returns the median lower bound of the first views of a segment.
   std::uint32_t estimate_median_bound(const SketchSegment& segment) {
     std::vector<std::uint32_t> rows;
     for (std::uint32_t row = 0; row < std::min<std::size_t>(64, segment.rows()); ++row) {
@@ -257,7 +258,7 @@ class SketchSearch {
     return *middle;
   }
 
-  /// All segments, in rounds that grow: after each the limit may sink.
+  /// Searches all segments in rounds of growing size, because the limit may fall after each round.
   void scan() {
     constexpr std::size_t chunk = 16;
     std::vector<SketchedView> waiting;
@@ -279,14 +280,14 @@ class SketchSearch {
     while (!waiting.empty()) read_batch(waiting);
   }
 
-  /// Collects the views of a segment whose bounds are within the limit.
+  /// Collects the views of a segment whose bounds do not exceed the limit, level by level.
   void collect_within(std::uint32_t number, std::uint32_t limit, SegmentScratch& scratch,
                       std::vector<SketchedView>& found) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
     sketches.make_tables(layout_, kernels_, query_, scratch.tables);
     const auto passed = cells(sketches, limit, 0, sketches.blocks(), scratch);
-    // Filters in place: kept entries are before the current one.
+    // Filters in place: kept entries are written before the current one.
     const std::span<std::uint32_t> rows(scratch.indices.data(), passed.size());
     std::size_t kept = 0;
     for (const std::uint32_t row : rows) {
@@ -309,8 +310,8 @@ class SketchSearch {
     }
   }
 
-  /// Reads the best candidates in growing batches, all if there are few, and drops those that can
-  /// no longer be among the nearest.
+  /// Reads the best candidates in batches that grow, and drops those that can no longer be among
+  /// the nearest.
   void read_batch(std::vector<SketchedView>& waiting) {
     const auto drop = [&] {
       std::erase_if(waiting, [this](const SketchedView& candidate) {
@@ -326,9 +327,9 @@ class SketchSearch {
     drop();
   }
 
-  static constexpr std::size_t first_segments = 16;  // in which the first limit is sought
-  static constexpr std::size_t sampled_every = 16;   // blocks of a segment
-  static constexpr std::size_t max_waiting = 256;    // candidates, before some are read in full
+  static constexpr std::size_t first_segments = 16;  // searched for the first limit
+  static constexpr std::size_t sampled_every = 16;   // one block in 16 is sampled
+  static constexpr std::size_t max_waiting = 256;    // candidates until a batch is read in full
 
   const SegmentLayout& layout_;
   std::span<const LiveSegment> segments_;
@@ -338,11 +339,11 @@ class SketchSearch {
   std::size_t top_;
   NearestMatches nearest_;
   SegmentQuery query_;
-  AlignedVector<std::uint8_t> magnitudes_, mask_;  // the mask is empty when all rows count
+  AlignedVector<std::uint8_t> magnitudes_, mask_;  // empty mask: all rows are compared
   std::size_t compared_bytes_ = 0;
   std::vector<ViewId> excluded_;                                // ascending
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> order_;  // least bound of a sample, number
-  std::vector<ViewId> compared_;                                // in full, ascending
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> order_;  // smallest sampled bound, segment
+  std::vector<ViewId> compared_;                                // views read in full, ascending
   std::size_t batch_size_ = 128;
   SearchResult result_;
 };

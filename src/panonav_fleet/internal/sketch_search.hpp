@@ -12,16 +12,16 @@
 
 namespace panonav::fleet {
 
-/// A segment and which of its views are there.
+/// A segment, and which of its views still exist.
 struct LiveSegment {
   std::shared_ptr<const SketchSegment> sketches;
-  std::vector<std::uint64_t> live;  // a bit for each row of its blocks
+  std::vector<std::uint64_t> live;  // one bit for each row of its blocks
   std::size_t count = 0;
   [[nodiscard]] bool has(std::size_t row) const { return (live[row / 64] >> (row % 64) & 1U) != 0; }
 };
 
-/// Searches segments for the `top` views nearest to a query, of which `components` are compared:
-/// what `ViewSketches::search` promises. The caller has checked query, mask and components.
+/// Searches segments for the `top` views nearest to a query as `ViewSketches::search`; `components`
+/// of them are compared. The caller must have checked query, mask and components.
 [[nodiscard]] SearchResult search_segments(const SegmentLayout& layout,
                                            std::span<const LiveSegment> segments,
                                            const PackedSignature& query, int components,

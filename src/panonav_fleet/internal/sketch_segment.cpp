@@ -17,8 +17,8 @@ std::size_t round_up(std::size_t count, std::size_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
 }
 
-/// Blocks of a component. Views differ most in their low components, because the spectra of
-/// pictures fall; the numbers make whole cache lines of 15 components.
+/// Returns the number of blocks of a component. Low components have more, because views differ most
+/// in them; with 15 components the sums fill whole cache lines.
 int choose_block_count(int level, int component, int components) {
   constexpr std::array usual{2, 4, 16};
   if (level == 2) return component == 0 ? 2 * usual[2] : usual[2];
@@ -107,7 +107,7 @@ SketchSegment::SketchSegment(const SegmentLayout& layout, std::span<const ViewId
                       sums.data() + row * layout.total());
   }
   const std::size_t padded = blocks() * kernels::cell_block;
-  // Views of the byte levels on whole cache lines.
+  // Sketches of levels 1 and 2 begin on cache lines.
   begins_[1] = round_up(padded * layout.dimensions(0) / 2, 64);
   begins_[2] = begins_[1] + padded * layout.dimensions(1);
   codes_.resize(begins_[2] + padded * layout.dimensions(2));
@@ -130,7 +130,7 @@ std::uint64_t SketchSegment::bytes() const noexcept {
   return bytes;
 }
 
-// Each code represents about the same number of views.
+// Chooses codes so that each represents about the same number of views.
 void SketchSegment::make_cells(const SegmentLayout& layout, const std::vector<std::int32_t>& sums) {
   constexpr unsigned max_bins = 1024;
   const std::size_t cells = layout.dimensions(0);
@@ -222,7 +222,7 @@ void SketchSegment::make_level(const SegmentLayout& layout, int level,
       const auto step = static_cast<std::int32_t>(scale.steps[group]);
       std::int32_t missed = 0;
       for (std::size_t d = group * sums_of_a_step; d < (group + 1) * sums_of_a_step; ++d) {
-        // Any code would be safe, so rounding of the float product does no harm.
+        // The bounds are correct for any code, so rounding of the float product does no harm.
         const std::int32_t above = of_row[d] - scale.offsets[d];
         const float scaled = static_cast<float>(above) * scale.inverse_steps[group] + 0.5F;
         const auto code = static_cast<std::int32_t>(std::min(scaled, 255.0F));
@@ -239,7 +239,7 @@ void SketchSegment::make_level(const SegmentLayout& layout, int level,
 void SegmentQuery::choose_unit(const SegmentLayout& layout, std::uint32_t largest) {
   constexpr std::uint32_t max_code = 254;
   unit = largest / max_code + 1;
-  // A little less than the inverse, so that no rounding makes an entry too large.
+  // Slightly less than the inverse, so that rounding never makes an entry too large.
   const float inverse = (1.0F - 1e-6F) / static_cast<float>(unit);
   factors.resize(layout.dimensions(0));
   for (std::size_t d = 0; d < factors.size(); ++d) {
@@ -268,7 +268,8 @@ std::span<const std::uint32_t> SketchSegment::compute_cell_bounds(
 SketchSegment::Encoded::Encoded(const SegmentLayout& layout)
     : values(layout.dimensions(2)), mask(layout.dimensions(2)) {}
 
-// All views are within the scale, so the query's excess over it is part of the distance.
+// The sums of all views are within the scale, so the part of the query's sum outside of it is part
+// of the distance.
 void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
                               const SegmentQuery& query, int level,
                               std::span<const std::uint32_t> rows, Encoded& room,

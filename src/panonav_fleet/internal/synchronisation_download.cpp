@@ -56,7 +56,7 @@ void Synchronisation::download() {
   std::vector<ServerView> changes;
   std::vector<ViewId> reused;
   classify_changed_views(changed, changes, reused);
-  // Bad rows are left out before a row is matched with another view.
+  // Damaged rows must be left out before a row is matched with another view.
   static_cast<void>(server_.read_full_views(reused, header_.shape));
   std::erase_if(reused, [this](ViewId id) { return server_.tables().is_left_out(id); });
   added.insert(added.end(), reused.begin(), reused.end());
@@ -178,7 +178,7 @@ bool Synchronisation::update_in_file(const std::vector<ServerView>& changes) {
     }
     accepted.push_back({view, &there, std::move(*row)});
   }
-  // Names that views give each other are free in between.
+  // Temporary names, because views may exchange their names.
   for (const Change& change : accepted) {
     if (change.row.info.name == change.target->info.name) continue;
     ReferenceInfo between = change.row.info;

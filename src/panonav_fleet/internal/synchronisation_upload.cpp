@@ -115,7 +115,7 @@ void Synchronisation::prepare_upload() {
   const auto writing = begin_file_change();
   for (const auto& [view, name] : names) {
     auto row = read_local_row(view);
-    if (!row || row->info.name != name) continue;  // for the next time
+    if (!row || row->info.name != name) continue;  // left for the next time
     if (const auto found = new_names.find(view); found != new_names.end()) {
       if (file_.find(found->second)) continue;
       row->info.name = found->second;
@@ -147,7 +147,7 @@ SynchronisedView Synchronisation::make_adopted_row(ViewId view, const LocalRow& 
   SynchronisedView next;
   next.server_view = server_view;
   next.local_checksum = local_checksums_.at(view);
-  // The server's info holds, as if it had changed since.
+  // If they differ, the server's name, pose and stamp are used, as if they had been changed later.
   next.server_checksum = info == row.info ? checksum : ~checksum;
   next.signature = signature_checksum(row.signature);
   ++report_.adopted;
@@ -240,8 +240,8 @@ void Synchronisation::upload_batch(const std::vector<ViewId>& ids,
                       attachment_checksum(id, view.thumbnail),
                       attachment_checksum(id, view.features)});
   }
-  // Views whose names were used just now are not among them: the next synchronisation finds other
-  // names.
+  // Views whose names were taken in the meantime are not in the result; the next synchronisation
+  // finds other names.
   for (const Upload& upload : server_.submit_views(state_.file, upload_number_, staged)) {
     SynchronisedView row = synchronised_.at(upload.view);
     if (upload.signature != row.signature) continue;
@@ -279,7 +279,7 @@ void Synchronisation::upload_changes() {
     }
     if (changes.empty()) return;
     const auto accepted = server_.submit_changes(state_.file, upload_number_, changes);
-    // If another robot was first, `download` brings its change.
+    // If another robot has changed a view first, `download` gets its change.
     for (const ViewId view : ids) {
       SynchronisedView row = synchronised_.at(view);
       row.sent.reset();
@@ -324,7 +324,7 @@ void Synchronisation::upload_removals() {
     const std::vector<ViewId> removed = remove_on_server(unchanged);
     report_.removed_on_server += removed.size();
     for (const ViewId id : server_ids) {
-      // One that was changed just now is for the next time.
+      // A view that another robot has just changed is left for the next synchronisation.
       if (unchanged.contains(id) && !std::ranges::binary_search(removed, id)) continue;
       forget_server_view(id);
     }
@@ -338,7 +338,7 @@ std::vector<ViewId> Synchronisation::remove_on_server(
   if (server_.tables().map_names().empty()) {
     removed = server_.submit_removals(checksums);
   } else {
-    // Maps are changed by this program: others wait for its link.
+    // This program also changes the maps, so other clients wait for its network.
     const auto writing = server_.tables().transaction(Kind::writing);
     std::vector<ViewId> ids;
     for (const auto& [id, checksum] : checksums) ids.push_back(id);

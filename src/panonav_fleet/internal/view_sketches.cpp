@@ -27,13 +27,14 @@ struct ViewSketches::Implementation {
       : layout(std::make_shared<const SegmentLayout>(shape)) {}
 
   std::shared_ptr<const SegmentLayout> layout;
-  std::vector<LiveSegment> segments;  // full ones, then the one that grows
-  /// Magnitudes of the last segment while it is not full: it is sketched again when views are
+  std::vector<LiveSegment> segments;  // full ones, then the growing one
+  /// Magnitudes of the last segment until it is full, because it is sketched again when views are
   /// added.
   std::shared_ptr<const std::vector<std::uint8_t>> growing;
   std::size_t size = 0;
 
-  /// The views of the segment that grows, with their magnitudes; none where all are full.
+  /// Appends the views of the growing segment with their magnitudes; nothing if all segments are
+  /// full.
   void add_growing(std::vector<ViewId>& ids, std::vector<std::uint8_t>& magnitudes) const {
     if (!growing) return;
     const LiveSegment& last = segments.back();
@@ -94,7 +95,7 @@ void ViewSketches::insert(std::span<const ViewId> views, std::span<const std::ui
   require(magnitudes.size() == views.size() * view_bytes, "number of magnitudes",
           static_cast<double>(magnitudes.size()), to_text(double(views.size() * view_bytes)));
   if (views.empty()) return;
-  // The views of the last segment come first.
+  // The views of the growing segment come first.
   std::vector<ViewId> ids;
   std::vector<std::uint8_t> bytes;
   own.add_growing(ids, bytes);

@@ -12,15 +12,15 @@
 
 namespace panonav::fleet {
 
-/// Sketches of views that are stored elsewhere, such as on a server: a search selects by them the
-/// few views that can be among the nearest, and reads only these in full (docs/search.md). For 80 x
-/// 15 they take 350 bytes a view in place of 2400. A copy shares the sketches with the original and
-/// costs little, so that one thread changes a copy while others search the original.
+/// Sketches of views that are stored elsewhere, such as on a server. By them a search selects the
+/// few views that can be among the nearest, and reads only these in full (docs/search.md). For the
+/// shape 80 x 15 they take 350 bytes a view instead of 2400. A copy shares the sketches and costs
+/// little, so that one thread can change a copy while others search the original.
 class ViewSketches {
  public:
-  /// Takes a view that was read and its magnitudes, component-major.
+  /// Receives a view that was read, with its magnitudes, component-major.
   using TakeView = std::function<void(ViewId view, std::span<const std::uint8_t> magnitudes)>;
-  /// Reads views in full, in any order; removed ones are left out.
+  /// Reads views in full and passes them to `take`, in any order; removed views are left out.
   using ReadViews = std::function<void(std::span<const ViewId> views, const TakeView& take)>;
 
   /// Throws ContractError as `VisualMemory`.
@@ -35,23 +35,24 @@ class ViewSketches {
 
   [[nodiscard]] SignatureShape shape() const noexcept;  ///< Rows and components of every view.
   [[nodiscard]] std::size_t size() const noexcept;      ///< Number of views.
-  [[nodiscard]] std::uint64_t bytes() const noexcept;   ///< That the sketches take.
+  [[nodiscard]] std::uint64_t bytes() const noexcept;   ///< Size of the sketches.
   [[nodiscard]] std::vector<ViewId> views() const;      ///< Ascending. Cost: a sort.
 
-  /// Adds views, none of which may be there already, with their magnitudes one view after the
-  /// other. Views that are added together should be of nearby places. Throws ContractError on
-  /// another number of magnitudes. Cost: some microseconds a view.
+  /// Adds new views with their magnitudes, one view after the other. Views that are added together
+  /// should be of nearby places: searches are faster then. Throws ContractError on another number
+  /// of magnitudes. Cost: some microseconds a view.
   void insert(std::span<const ViewId> views, std::span<const std::uint8_t> magnitudes);
-  /// Adds all views of the other, none of which may be there already. Throws ContractError on
+  /// Adds all views of `other`, none of which may be present already. Throws ContractError on
   /// another shape.
   void insert(const ViewSketches& other);
-  /// Takes out those of the views that are there. Cost: a pass over the ids.
+  /// Removes those of the views that are present. Cost: a pass over the ids.
   void erase(std::span<const ViewId> views);
 
-  /// The nearest views: exactly what `VisualMemory::search` finds in a memory of those of the views
-  /// that `read` knows. Calls `read` a few times, in a steady state: what it gave once must not be
-  /// removed within one search. `views_in_full` of the result are those read. The same on any
-  /// number of threads. Throws ContractError as `VisualMemory::search`, and what `read` throws.
+  /// Returns the nearest views, exactly those that `VisualMemory::search` finds in a memory of the
+  /// views that `read` can read. Calls `read` a few times; a view that it has passed on must not be
+  /// removed during the search. `views_in_full` of the result is the number of views that were
+  /// read. The result does not depend on the number of threads. Throws ContractError as
+  /// `VisualMemory::search`, and what `read` throws.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options,
                                     const SearchMask& mask, const ReadViews& read,
                                     Executor& executor) const;

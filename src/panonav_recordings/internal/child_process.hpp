@@ -7,21 +7,22 @@
 
 namespace panonav::recordings {
 
-/// A child process whose output is read through pipes; it is killed with the object. No shell sees
-/// the arguments.
+/// Runs a program as a child process and reads its output through pipes. The destructor kills it.
+/// Arguments are passed without a shell.
 class ChildProcess {
  public:
-  /// Finds arguments[0] in PATH. Standard input is empty. Throws Error when it cannot be started.
+  /// Starts the program `arguments[0]`, searched for in PATH, with an empty standard input. Throws
+  /// Error if it cannot be started.
   explicit ChildProcess(const std::vector<std::string>& arguments);
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
-  [[nodiscard]] int output() const noexcept { return output_; }  ///< its standard output
-  [[nodiscard]] int errors() const noexcept { return errors_; }  ///< its standard error
-  /// Ends it at once; another thread may call while one reads. Its pipes then end, too.
+  [[nodiscard]] int output() const noexcept { return output_; }  ///< descriptor of its stdout
+  [[nodiscard]] int errors() const noexcept { return errors_; }  ///< descriptor of its stderr
+  /// Kills the child at once, so that its pipes end. Another thread may be reading them meanwhile.
   void stop() const noexcept;
-  /// Waits for its end; -1 after a signal.
+  /// Waits for the child to end and returns its exit code; -1 if a signal ended it.
   int wait();
 
  private:

@@ -29,7 +29,8 @@ DecodedVideo::DecodedVideo(const std::vector<std::string>& input, const std::str
   std::vector<std::string> arguments{"ffmpeg",   "-nostdin",  "-hide_banner",
                                      "-nostats", "-loglevel", "level+info"};
   arguments.insert(arguments.end(), input.begin(), input.end());
-  // showinfo writes stamp and size of a picture to standard error before its bytes arrive.
+  // The filter showinfo writes stamp and size of a picture to standard error before its bytes
+  // arrive.
   const std::string filter = (chosen.empty() ? "" : "select='" + chosen + "',") +
                              std::string("format=rgb24,showinfo=checksum=0");
   for (const char* word : {"-map", "0:v:0", "-fps_mode", "passthrough", "-vf", filter.c_str(), "-f",
@@ -43,7 +44,8 @@ void DecodedVideo::parse_line(const std::string& line) {
   if (line.starts_with("[Parsed_showinfo")) {
     const auto at = line.find("] [info] n:");
     if (at == std::string::npos) return;
-    // "n: 0 pts: 512 pts_time:0.04 ... s:96x12 ...": the first of each name counts.
+    // A line reads "n: 0 pts: 512 pts_time:0.04 ... s:96x12 ..."; the first occurrence of a name is
+    // used.
     const auto read_field = [&](std::string_view name, auto& value) {
       const auto begin = line.find(name, at);
       if (begin == std::string::npos) return std::string_view();
@@ -91,7 +93,7 @@ DecodedVideo::Ready DecodedVideo::wait(bool for_picture,
   std::array<pollfd, 2> pipes{pollfd{for_picture ? child_->output() : -1, POLLIN, 0},
                               pollfd{messages_end_ ? -1 : child_->errors(), POLLIN, 0}};
   int ready = -1;
-  while (ready < 0) {  // a signal
+  while (ready < 0) {  // repeated if a signal interrupts it
     const auto left = until ? std::chrono::ceil<std::chrono::milliseconds>(*until - Clock::now())
                             : std::chrono::milliseconds(-1);
     ready =
@@ -126,7 +128,7 @@ std::optional<DecodedFrame> DecodedVideo::next(std::optional<std::chrono::millis
   auto pixels = frame.picture.pixels();
   std::size_t filled = 0;
   while (filled < pixels.size()) {
-    // Messages are read meanwhile: a full pipe would stop the program.
+    // Messages are read at the same time, because ffmpeg would block on a full pipe.
     const Ready ready = wait(true, until);
     if (ready.messages) read_messages();
     if (!ready.picture) continue;

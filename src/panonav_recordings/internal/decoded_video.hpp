@@ -15,31 +15,32 @@
 namespace panonav::recordings {
 
 struct DecodedFrame {
-  std::int64_t stamp = 0;  ///< in the unit of the stream
+  std::int64_t stamp = 0;  ///< in the time base of the stream
   double stamp_s = 0.0;
   Image picture;
 };
 
-/// `arguments` for ffmpeg or ffprobe. Throws FileError that names the package when there is no such
-/// program.
+/// Starts ffmpeg or ffprobe with these arguments; messages name `about`. Throws FileError that
+/// names the package to install if the program is missing.
 [[nodiscard]] std::unique_ptr<ChildProcess> start_ffmpeg(const std::vector<std::string>& arguments,
                                                          const std::string& about);
 
-/// Pictures of a file or an address, decoded one after the other by the program ffmpeg.
+/// Decodes the pictures of a file or an address one after the other with the program ffmpeg.
 class DecodedVideo {
  public:
-  /// `input`: ffmpeg's words up to the input. `chosen`: an expression of its filter `select`; empty
-  /// takes all pictures. Messages name `about`. Throws as `start_ffmpeg`.
+  /// `input` has the arguments of ffmpeg up to and including the input. `chosen` is an expression
+  /// for its filter `select`; an empty one selects all pictures. Messages name `about`. Throws as
+  /// `start_ffmpeg`.
   DecodedVideo(const std::vector<std::string>& input, const std::string& chosen, std::string about,
                const ImageLimits& limits);
 
-  /// Empty at the end. Throws FileError on pictures beyond the limits, and if there is no whole one
-  /// within `max_wait`; then the program is ended.
+  /// Returns the next picture; `nullopt` at the end. Throws FileError for pictures beyond the
+  /// limits, and if no complete picture comes within `max_wait`; the program is then killed.
   [[nodiscard]] std::optional<DecodedFrame> next(
       std::optional<std::chrono::milliseconds> max_wait = {});
-  /// Ends the program; `next`, which another thread may be in, then gives nothing more.
+  /// Kills the program; a `next` that another thread is in then returns `nullopt`.
   void stop() const noexcept { child_->stop(); }
-  /// Returns the last complaint of ffmpeg; empty without one.
+  /// Returns the last error message of ffmpeg; empty without one.
   [[nodiscard]] const std::string& last_error() const noexcept { return trouble_; }
 
  private:
@@ -48,10 +49,10 @@ class DecodedVideo {
     double stamp_s;
     ImageSize size;
   };
-  /// Reads from the pipe of messages; false at its end.
+  /// Reads from the pipe of ffmpeg's messages; false at its end.
   bool read_messages();
-  /// Waits until pictures (if `for_picture`) or messages have something, or ended; returns which.
-  /// Throws FileError when the time is over.
+  /// Pipes that `wait` found to have bytes or to have ended. `wait` watches the pipe of pictures
+  /// only if `for_picture`, and throws FileError after the time `until`.
   struct Ready {
     bool picture = false;
     bool messages = false;

@@ -121,7 +121,7 @@ class McapFile : public ChunkedFile {
   }
 
  private:
-  // Empty where its channel is not known.
+  // Parses the body of a message record; `nullopt` if its channel is unknown.
   [[nodiscard]] std::optional<RecordedMessage> message_in(
       std::span<const std::uint8_t> body) const {
     Fields fields(body);
@@ -161,23 +161,23 @@ class McapFile : public ChunkedFile {
 
   /// Position and checksum of the summary.
   struct Footer {
-    std::uint64_t at = 0;  ///< of the footer itself
+    std::uint64_t at = 0;  ///< position of the footer in the file
     std::uint64_t summary_at = 0;
     std::uint32_t sum = 0;  ///< checksum of the summary; 0: none
   };
   /// Counts of messages in the records of the summary.
   struct Summary {
     std::uint64_t indexed = 0;              ///< messages of all indexed chunks
-    std::optional<std::uint64_t> messages;  ///< of the whole file
+    std::optional<std::uint64_t> messages;  ///< number in the whole file, if stated
     std::vector<std::pair<std::uint16_t, std::uint64_t>> counts;  ///< messages by channel
     bool is_complete = true;
   };
 
-  // Returns true if the summary describes the whole file. Warns of faults in it; a file may also
-  // have none, or an incomplete one.
+  // Returns true if the summary describes the whole file. Warns if a summary is damaged; one that
+  // is missing or incomplete causes no warning here.
   bool read_summary() {
     const auto footer = read_footer();
-    if (!footer) return false;  // the pass over the file says what it lacks
+    if (!footer) return false;  // `scan` warns of what is missing
     Summary summary;
     const bool is_read = read_records(*footer, summary);
     if (is_read && !add_counts(summary)) return false;
@@ -187,7 +187,7 @@ class McapFile : public ChunkedFile {
     return false;
   }
 
-  // Empty where there is no footer, or no summary.
+  // Reads the footer; `nullopt` if there is none or it names no summary.
   std::optional<Footer> read_footer() {
     if (size() < mcap_magic.size() + footer_bytes) return std::nullopt;
     Footer footer{.at = size() - footer_bytes};
@@ -203,7 +203,7 @@ class McapFile : public ChunkedFile {
     return is_footer && footer.summary_at != 0 ? std::optional(footer) : std::nullopt;
   }
 
-  // False where the summary is damaged.
+  // Reads the records of the summary; false if it is damaged.
   bool read_records(const Footer& footer, Summary& summary) {
     const std::uint64_t start = footer.summary_at;
     if (start < mcap_magic.size() || start > footer.at || footer.at - start > limits_.chunk_bytes) {
@@ -267,7 +267,7 @@ class McapFile : public ChunkedFile {
     }
     return content.good() && list.good();
   }
-  /// Adds up the messages of each topic. False where the summary lacks some.
+  /// Adds up the messages of each topic. Returns false if the summary does not cover all messages.
   bool add_counts(const Summary& summary) {
     if (!summary.messages || summary.indexed != *summary.messages || !summary.is_complete ||
         lacks_schemas_) {
@@ -319,8 +319,8 @@ class McapFile : public ChunkedFile {
     warn_of_cut(at);
   }
 
-  std::unordered_map<std::uint16_t, std::uint32_t> channels_;  // their topics
-  std::unordered_map<std::uint16_t, std::string> schemas_;     // their names
+  std::unordered_map<std::uint16_t, std::uint32_t> channels_;  // topic numbers by channel id
+  std::unordered_map<std::uint16_t, std::string> schemas_;     // type names by schema id
   bool lacks_schemas_ = false;
 };
 

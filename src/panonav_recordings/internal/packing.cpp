@@ -16,7 +16,8 @@ namespace panonav::recordings {
 
 namespace {
 
-// Returns true if the stream ended within `to`, of which `filled` bytes were written.
+// Unpacks into `to` after its first `filled` bytes, and updates `filled`. Returns true if the
+// stream ended within `to`.
 bool unpack_lz4(std::span<const std::uint8_t> from, std::span<std::uint8_t> to,
                 std::size_t& filled) {
   LZ4F_dctx* raw = nullptr;
@@ -44,7 +45,8 @@ bool unpack_zstd(std::span<const std::uint8_t> from, std::span<std::uint8_t> to,
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(),
                                                                      ZSTD_freeDCtx);
   if (!context) throw std::bad_alloc();
-  // A window is memory too; the output is one contiguous buffer, which serves as the window.
+  // Limits the window, which takes memory too, to 128 MiB; the contiguous output buffer serves as
+  // window.
   ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax, 27);
   ZSTD_inBuffer in{from.data(), from.size(), 0};
   ZSTD_outBuffer out{to.data(), to.size(), 0};
@@ -116,7 +118,8 @@ Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size
 }
 
 Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes) {
-  // If the frame does not state its size, this is a number beyond all sizes.
+  // For a frame that does not state its size this is ZSTD_CONTENTSIZE_UNKNOWN, larger than any
+  // size.
   const auto stated_size = ZSTD_getFrameContentSize(packed.data(), packed.size());
   std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(stated_size, max_bytes));
   if (stated_size == ZSTD_CONTENTSIZE_UNKNOWN)
@@ -141,7 +144,7 @@ UnpackedFile unpack_file(const std::filesystem::path& packed, const std::filesys
   std::vector<char> read(std::size_t{128} << 10U);
   std::vector<char> made(read.size());
   UnpackedFile done;
-  std::size_t left = 1;  // of a frame
+  std::size_t left = 1;  // bytes that the decoder still expects of a frame; 0 at its end
   while (from.read(read.data(), static_cast<std::streamsize>(read.size())), from.gcount() > 0) {
     ZSTD_inBuffer in{read.data(), static_cast<std::size_t>(from.gcount()), 0};
     bool is_full = true;

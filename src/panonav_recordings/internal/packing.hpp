@@ -11,13 +11,13 @@
 
 namespace panonav::recordings {
 
-/// Compression of the bytes of a chunk; LZ4 and Zstandard as frames.
+/// Compression of a chunk; LZ4 and Zstandard data is in their frame formats.
 enum class Packing { none, lz4, zstd, bz2 };
 
 /// Finds the compression by its name in recordings: "" or "none", "lz4", "zstd", "bz2".
 [[nodiscard]] std::optional<Packing> find_packing(std::string_view name) noexcept;
 
-/// A buffer that is not cleared, so that memory is used only as it is filled.
+/// A buffer that is not zeroed, so that the system provides memory only for the filled part.
 struct Buffer {
   Buffer() = default;
   explicit Buffer(std::size_t bytes)
@@ -27,9 +27,9 @@ struct Buffer {
   std::size_t size = 0;
 };
 
-/// Unpacks `packed` to at most `max_bytes` bytes, and never more work than for one byte beyond
-/// them. `whole`: that was all of a complete stream. Else what came before the damage, the end of
-/// `packed`, or `max_bytes`.
+/// Result of `unpack`, which produces at most `max_bytes` bytes and stops there. `whole` is true if
+/// these are all bytes of a complete stream; otherwise `content` ends at the damage, at the end of
+/// `packed` or at `max_bytes`.
 struct Unpacked {
   Buffer content;
   bool whole = false;
@@ -37,20 +37,21 @@ struct Unpacked {
 [[nodiscard]] Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing,
                               std::size_t max_bytes);
 
-/// A Zstandard frame of a size that is not known, of at most `max_bytes` bytes.
+/// Unpacks a Zstandard frame of unknown size, to at most `max_bytes` bytes.
 [[nodiscard]] Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes);
 
-/// Unpacks the Zstandard frames of a file to another file, at most `max_bytes` bytes. Memory: two
-/// buffers of 128 KiB and the frames' window, at most 128 MiB.
+/// Result of `unpack_file`, which unpacks the Zstandard frames of a file to another file, at most
+/// `max_bytes` bytes. Memory: two buffers of 128 KiB and the window of a frame, at most 128 MiB.
 struct UnpackedFile {
-  std::uint64_t bytes = 0;  ///< written
-  bool whole = false;       ///< else the packed file is damaged or cut off behind them
-  bool too_long = false;    ///< more than `max_bytes`
+  std::uint64_t bytes = 0;  ///< written to the other file
+  bool whole = false;       ///< false: damaged or cut off after these bytes
+  bool too_long = false;    ///< the content is larger than `max_bytes`
 };
 [[nodiscard]] UnpackedFile unpack_file(const std::filesystem::path& packed,
                                        const std::filesystem::path& to, std::uint64_t max_bytes);
 
-/// Replaces `packed` by one LZ4 or Zstandard frame of the bytes, at the speed of a recorder.
+/// Replaces the content of `packed` by one LZ4 or Zstandard frame of the bytes, at the fastest
+/// level.
 void pack(std::span<const std::uint8_t> bytes, Packing packing, std::vector<std::uint8_t>& packed);
 
 }  // namespace panonav::recordings

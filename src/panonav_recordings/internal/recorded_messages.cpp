@@ -14,9 +14,9 @@ namespace {
 
 using MessageBytes = std::span<const std::uint8_t>;
 
-/// Bound the memory of a hostile recording: 80 bytes a message, 400 a picture.
+/// Limits of memory against hostile recordings: 80 bytes for each message and 400 for each picture.
 constexpr std::size_t max_samples = 10'000'000;
-constexpr std::size_t max_pictures = 1'000'000;  // nine hours of 30 a second
+constexpr std::size_t max_pictures = 1'000'000;  // nine hours at 30 Hz
 
 /// Sorts the messages of one pass into tracks.
 class MessageCollector {
@@ -163,7 +163,7 @@ class MessageCollector {
   const Recording& recording_;
   const TopicChoice& choice_;
   RecordedMessages made_;
-  std::size_t samples_ = 0;  ///< messages and transforms that are kept, but for pictures
+  std::size_t samples_ = 0;  ///< stored poses and transforms; pictures are not included
   std::size_t unreadable_ = 0;
   std::string first_error_;
 };

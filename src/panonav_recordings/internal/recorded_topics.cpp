@@ -32,7 +32,7 @@ bool is_pose_type(std::string_view type) {
   return type == ros::PoseStamped::type || type == ros::PointStamped::type;
 }
 
-/// True if a record of a run makes this topic of the pictures of its camera.
+/// True if our run recorder computes the pictures of this topic from those of the camera.
 bool is_derived_from_images(std::string_view topic) {
   return topic == "/panorama/compressed" || topic == "/best_match/compressed";
 }
@@ -116,7 +116,8 @@ class TopicChooser {
   [[nodiscard]] TopicChoice take() { return std::move(choice_); }
 
  private:
-  /// Returns the topics of one name and type; a topic may change its type within a recording.
+  /// Returns the numbers of the topics with a name and type; several if they differ in encoding or
+  /// in type.
   [[nodiscard]] TopicNumbers numbers_of(std::string_view name, IsType is_type) const {
     TopicNumbers found;
     const auto& topics = recording_.topics();
@@ -136,7 +137,7 @@ class TopicChooser {
     return names;
   }
 
-  /// Returns the topic that the caller named, which must be there.
+  /// Returns the numbers of the topics that the caller named. Throws FileError if there are none.
   [[nodiscard]] TopicNumbers find_named_topics(const std::string& name, IsType is_type,
                                                std::string_view types) const {
     TopicNumbers found = numbers_of(name, is_type);

@@ -17,22 +17,23 @@ namespace panonav::recordings {
 /// Role of the messages of a topic in a data set.
 enum class TopicRole { none, picture, odometry, transforms, tilt, truth };
 
-/// Which topics of a recording become the data set.
+/// Topics of a recording that are used for the data set.
 struct TopicChoice {
   std::vector<TopicRole> roles;       ///< of each topic of the recording
   std::vector<std::uint32_t> topics;  ///< those with a role
-  /// The frames between which transforms give odometry; `nullopt` where a topic does, or nothing.
+  /// The frames between which transforms give odometry; `nullopt` if a topic gives it, or nothing
+  /// does.
   std::optional<std::pair<std::string, std::string>> frames;
-  bool frames_are_named = false;      ///< by the caller, so that they must be there
-  std::vector<std::string> warnings;  ///< what is there and not used, a line each
+  bool frames_are_named = false;      ///< by the caller; missing ones are then an error
+  std::vector<std::string> warnings;  ///< about unused topics, one line each
 };
 
 /// True if messages of this topic are pictures that can be read.
 [[nodiscard]] bool has_pictures(const RecordedTopic& topic);
 
-/// Chooses topics by name, or else by type (`read_recording`); `source` is the layout of the
-/// pictures. Throws FileError, naming `path`, and ContractError on a topic of odometry together
-/// with frames.
+/// Chooses topics by the names given, otherwise by type (rules: `read_recording`); `source` is the
+/// layout of the pictures. Throws FileError that names `path`, and ContractError if both a topic of
+/// odometry and frames are named.
 [[nodiscard]] TopicChoice choose_topics(const Recording& recording,
                                         const std::filesystem::path& path,
                                         const InputOptions::Topics& names,

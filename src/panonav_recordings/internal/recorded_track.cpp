@@ -108,7 +108,7 @@ void TransformChain::connect() {
   while (frame != top_) {
     const auto link = links_.find(frame);
     if (link == links_.end()) return;
-    if (!chain.try_emplace(frame, link->second).second) return;  // a circle leads nowhere
+    if (!chain.try_emplace(frame, link->second).second) return;  // a cycle never reaches `top_`
     frame = link->second.parent;
   }
   links_ = std::move(chain);

@@ -25,11 +25,11 @@ class RecordedTrack {
   void keep_only_last() { samples_.erase(samples_.begin(), samples_.end() - 1); }
   [[nodiscard]] std::size_t size() const noexcept { return samples_.size(); }
   [[nodiscard]] bool has_stamps() const;
-  /// Puts them in order, by the header's stamp or by the log time. Of one time the last stays.
+  /// Sorts by header stamp or by log time. From poses of one time only the last is kept.
   void sort(bool by_log);
   [[nodiscard]] const ros::Pose& last() const { return samples_.back().pose; }
-  /// Interpolated, at either end extrapolated over one interval; empty in gaps of more than a
-  /// second, as a robot turns and brakes within one.
+  /// Returns the pose at a time, interpolated, or extrapolated by at most one interval beyond
+  /// either end; `nullopt` in gaps of more than a second, within which a robot can turn or brake.
   [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const;
 
  private:
@@ -41,21 +41,24 @@ class RecordedTrack {
   std::vector<Sample> samples_;
 };
 
-/// The transforms between two frames. Once these are connected, all others are forgotten.
+/// The transforms between two frames. Once a chain connects them, transforms of all other frames
+/// are dropped.
 class TransformChain {
  public:
-  /// Throws ContractError where both are the same.
+  /// Throws ContractError if both frames are the same.
   TransformChain(std::string_view top, std::string_view bottom);
 
   void add(const ros::TransformStamped& transform, std::int64_t log_ns, bool is_static);
   [[nodiscard]] bool connected() const noexcept { return connected_; }
-  /// Transforms that give a frame another parent than before, which are left out.
+  /// Returns the number of ignored transforms that give a frame another parent than an earlier
+  /// transform.
   [[nodiscard]] std::size_t other_parents() const noexcept { return other_parents_; }
   [[nodiscard]] bool has_stamps() const;
   void sort(bool by_log);
-  /// top_from_bottom, of a chain that is connected.
+  /// Returns top_from_bottom at a time; requires that the chain is connected.
   [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const;
-  /// Lists all frames, for messages about those that are not connected.
+  /// Lists all transforms as "parent -> child", for the error that no chain connects the two
+  /// frames.
   [[nodiscard]] std::string known() const;
 
  private:
@@ -68,7 +71,7 @@ class TransformChain {
   void connect();
 
   std::string top_, bottom_;
-  std::map<std::string, Link> links_;  // by child
+  std::map<std::string, Link> links_;  // by the name of the child frame
   bool connected_ = false;
   std::size_t other_parents_ = 0;
 };

@@ -83,7 +83,7 @@ std::uint32_t RecordingFile::topic_of(std::string_view name, std::string_view ty
   RecordedTopic topic;
   topic.name = name;
   topic.type = type;
-  // ROS 2 names the folder of its messages, ROS 1 does not.
+  // Types of ROS 2 have a folder "/msg/" in their name, types of ROS 1 do not.
   if (const auto folder = topic.type.find("/msg/"); folder != std::string::npos) {
     topic.type.erase(folder, 4);
   }
@@ -167,8 +167,9 @@ Buffer ChunkedFile::unpack_block(const Block& block) const {
          std::to_string(std::max(head.packed_bytes, head.unpacked_bytes)) +
          " bytes; allowed: up to " + std::to_string(limits_.chunk_bytes));
   }
-  // A few bytes may claim hundreds of megabytes, which cost seconds. 20,000 is the most that black
-  // images reach block by block (bzip2); the first bytes leave room for one of them alone.
+  // A hostile chunk of a few bytes may state a size of hundreds of megabytes, which takes seconds
+  // to unpack. 20,000 is the highest ratio of bzip2, reached by black images; `free_bytes` allows a
+  // small chunk any ratio.
   constexpr std::uint64_t free_bytes = 8U << 20U;
   constexpr std::uint64_t max_ratio = 20'000;
   const std::uint64_t max_bytes = free_bytes + max_ratio * head.packed_bytes;
@@ -201,7 +202,8 @@ Buffer ChunkedFile::unpack_block(const Block& block) const {
 
 std::shared_ptr<const Buffer> ChunkedFile::content(std::uint64_t block) const {
   if (block >= blocks_.size()) fail("has no block " + std::to_string(block));
-  // One thread unpacks at a time: others mostly want the same chunk, and memory stays bounded.
+  // Only one thread unpacks at a time: the others mostly want the same chunk, and memory stays
+  // limited.
   const std::lock_guard lock(cache_mutex_);
   const auto found =
       std::ranges::find(cache_, block, [](const auto& cached) { return cached.first; });

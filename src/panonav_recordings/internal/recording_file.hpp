@@ -27,8 +27,8 @@ struct RecordedMessage {
   std::shared_ptr<const Buffer> owner;
 };
 
-/// One file of a recording. Topics are those of the file. All of it but opening may be called by
-/// several threads at a time.
+/// One file of a recording. Topic numbers are those of the file. All const functions may be called
+/// from several threads.
 class RecordingFile {
  public:
   virtual ~RecordingFile() = default;
@@ -37,25 +37,25 @@ class RecordingFile {
   [[nodiscard]] std::vector<std::string> warnings() const;
   /// Returns the span of the messages' times of each block; nullopt for a block without messages.
   [[nodiscard]] virtual std::vector<std::optional<TimeSpan>> blocks() const = 0;
-  /// Appends the places of the messages of a block that are of the chosen topics and within the
-  /// span, in any order. Throws FileError beyond `max_places` places in all.
+  /// Appends the locations of the messages of a block that have a chosen topic and a time within
+  /// the span, in any order. Throws FileError if `places` then has more than `max_places` elements.
   virtual void list(std::size_t block, const std::vector<bool>& chosen_topics,
                     const TimeSpan& within, std::size_t max_places,
                     std::vector<MessageLocation>& places) const = 0;
   /// Throws FileError on damage.
   [[nodiscard]] virtual RecordedMessage read(const MessageLocation& place) const = 0;
-  /// Adds the line "PATH: what" to the warnings, once.
+  /// Adds the line "PATH: what" to the warnings, unless it is there already.
   void warn(std::string_view what) const;
   void warn(const FileError& error) const;
-  /// Messages name this file instead: what was opened is a copy of it.
+  /// Sets the path that messages name, for a file that is an unpacked copy of `name`.
   void call(const std::filesystem::path& name);
 
  protected:
   explicit RecordingFile(std::filesystem::path path) : path_(std::move(path)) {}
-  /// The topic of this name, type and encoding, which is made where there is none.
+  /// Returns the number of the topic of this name, type and encoding; adds it if there is none.
   std::uint32_t topic_of(std::string_view name, std::string_view type, std::string_view encoding);
   void forget_topics() noexcept;
-  /// Throws FileError when there are more places than allowed.
+  /// Throws FileError if there are more messages to list than allowed.
   void check_message_limit(std::size_t places, std::size_t max_places) const;
   [[noreturn]] void fail(std::string_view what) const;
 
@@ -69,8 +69,8 @@ class RecordingFile {
   mutable std::size_t suppressed_warnings_ = 0;
 };
 
-/// Little-endian fields of bytes that may end early: what is missing is 0 or empty, and `good` is
-/// false from then on.
+/// Reads little-endian fields one after the other. A field beyond the end reads as 0 or empty, and
+/// `good` is false from then on.
 class Fields {
  public:
   explicit Fields(std::span<const std::uint8_t> bytes) : left_(bytes) {}
@@ -81,7 +81,7 @@ class Fields {
     for (std::size_t i = 0; i < from.size(); ++i) value |= std::uint64_t{from[i]} << (8 * i);
     return static_cast<Number>(value);
   }
-  /// Bytes after their number, of 32 bits.
+  /// Reads a length of 32 bits, and then as many bytes.
   std::span<const std::uint8_t> prefixed() noexcept { return bytes(number<std::uint32_t>()); }
   std::string_view text() noexcept {
     const auto from = prefixed();
@@ -105,7 +105,7 @@ class Fields {
   bool good_ = true;
 };
 
-/// A file of chunks of records, each with an index behind it or none.
+/// A file whose messages are in chunks of records; an index may follow each chunk.
 class ChunkedFile : public RecordingFile {
  public:
   ~ChunkedFile() override;
@@ -120,22 +120,22 @@ class ChunkedFile : public RecordingFile {
   struct Entry {
     std::int64_t time_ns;
     std::uint32_t topic;
-    std::uint32_t offset;  ///< of the record in the block
+    std::uint32_t offset;  ///< position of the record within the block
   };
   struct Block {
-    std::uint64_t at = 0;     ///< of the chunk's record; of the first record of a loose block
-    std::uint64_t bytes = 0;  ///< of a loose block: messages beside one another outside of chunks
+    std::uint64_t at = 0;     ///< of the chunk's record, or of the first record of a loose block
+    std::uint64_t bytes = 0;  ///< only of a loose block: messages outside of chunks
     bool is_loose = false;
     bool is_cut = false;  ///< the file ends within the chunk
     std::optional<TimeSpan> time;
-    std::uint64_t index_at = 0;                 ///< of the index behind the chunk
-    std::uint64_t index_bytes = 0;              ///< 0: there is none
-    std::uint64_t messages = 0;                 ///< that the index has
-    std::optional<std::vector<Entry>> entries;  ///< of files without an index
+    std::uint64_t index_at = 0;                 ///< position of the index that follows the chunk
+    std::uint64_t index_bytes = 0;              ///< 0: no index
+    std::uint64_t messages = 0;                 ///< number of entries in the index
+    std::optional<std::vector<Entry>> entries;  ///< of blocks without an index
   };
   /// Header in front of a chunk's bytes.
   struct ChunkHead {
-    std::uint64_t at = 0;  ///< of the packed bytes
+    std::uint64_t at = 0;  ///< position of the packed bytes in the file
     std::uint64_t packed_bytes = 0;
     std::uint64_t unpacked_bytes = 0;
     Packing packing = Packing::none;
@@ -144,33 +144,34 @@ class ChunkedFile : public RecordingFile {
 
   ChunkedFile(std::filesystem::path path, const RecordingLimits& limits);
 
-  /// Throws a FileError on damage.
+  /// Reads the head of the chunk of a block. Throws FileError on damage.
   [[nodiscard]] virtual ChunkHead chunk_head(const Block& block) const = 0;
   /// Appends the entries of the index after the chunk. False if it is damaged.
   virtual bool list_index_entries(const Block& block, std::vector<Entry>& entries) const = 0;
-  /// The message whose record begins there, without owner; empty where none does.
+  /// Parses the message whose record begins at `offset`, without owner; `nullopt` if there is none.
   [[nodiscard]] virtual std::optional<RecordedMessage> message_at(
       std::span<const std::uint8_t> block, std::size_t offset) const = 0;
-  /// Notes the topics that unpacked records declare.
+  /// Adds the topics that unpacked records declare.
   virtual void declare(std::span<const std::uint8_t> block) = 0;
-  /// Appends the messages of unpacked records up to the first damaged one. Whether all were whole.
+  /// Appends the messages of unpacked records up to the first damaged one. Returns true if none was
+  /// damaged.
   virtual bool walk(std::span<const std::uint8_t> block, std::vector<Entry>& entries) const = 0;
 
-  /// Unpacks a chunk during a pass over the file, notes its topics and messages and makes a
-  /// block of it. `is_cut`: the file ends within the chunk; its beginning is kept. Warns of
-  /// damage.
+  /// Unpacks a chunk during a pass over the file, and adds its topics and a block with its
+  /// messages. `is_cut` is true if the file ends within the chunk, whose beginning is then used.
+  /// Warns of damage.
   void add_chunk(std::uint64_t at, bool is_cut);
-  /// A message outside of chunks, in the record of `bytes` bytes at `at`.
+  /// Adds a message outside of chunks, whose record has `bytes` bytes at `at`.
   void add_loose_message(std::uint64_t at, std::uint64_t bytes, std::int64_t time_ns,
                          std::uint32_t topic);
-  /// The file ends, or is damaged from there on.
+  /// Warns that the file ends, or is damaged, at this byte.
   void warn_of_cut(std::uint64_t at) const;
   /// The size of the file when it was opened.
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-  /// Reads `count` bytes of the file. Throws FileError where it lacks them.
+  /// Reads `count` bytes of the file. Throws FileError if the file ends before.
   [[nodiscard]] Buffer read_bytes_at(std::uint64_t at, std::uint64_t count) const;
-  /// Returns bytes for small records one after another, reading ahead; fewer at the end of the
-  /// file. They are valid until the next call.
+  /// Returns `max_bytes` bytes at a position, fewer at the end of the file; reads ahead, for passes
+  /// over many small records. They are valid until the next call.
   [[nodiscard]] std::span<const std::uint8_t> peek(std::uint64_t at, std::size_t max_bytes);
 
   RecordingLimits limits_;
@@ -191,7 +192,7 @@ class ChunkedFile : public RecordingFile {
   mutable std::list<std::pair<std::uint64_t, std::shared_ptr<const Buffer>>> cache_;
 };
 
-/// Their first bytes.
+/// First bytes of MCAP files and of ROS 1 bags.
 inline constexpr std::string_view mcap_magic = "\x89MCAP0\r\n";
 inline constexpr std::string_view bag_magic = "#ROSBAG V2.0\n";
 [[nodiscard]] bool begins_with(std::span<const std::uint8_t> bytes, std::string_view text) noexcept;

@@ -16,7 +16,7 @@ enum class BagRecord : std::uint8_t {
   connection = 7,
 };
 
-// Fields NAME=VALUE, each after its length.
+// Fields "NAME=VALUE" of a record's header, each preceded by its length.
 class BagFields {
  public:
   explicit BagFields(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -50,7 +50,7 @@ class BagFields {
   std::span<const std::uint8_t> bytes_;
 };
 
-// Seconds in the lower half, nanoseconds in the upper.
+// Converts a ROS 1 time, with seconds in the lower and nanoseconds in the upper 32 bits.
 std::int64_t bag_time_to_ns(std::uint64_t stamp) {
   constexpr std::int64_t second_ns = 1'000'000'000;
   return static_cast<std::int64_t>(stamp & 0xFFFF'FFFFU) * second_ns +
@@ -190,8 +190,8 @@ class BagFile : public ChunkedFile {
     connections_.emplace(*number, topic_of(header.text("topic"), data.text("type"), "ros1"));
   }
 
-  // Reads the index after the chunks: their connections and times. Returns false where it is
-  // damaged.
+  // Reads the index at the end of the bag: its connections, and times and counts of the chunks.
+  // Returns false if it is damaged.
   bool read_index(std::uint64_t index_at, std::uint32_t chunks) {
     if (index_at < bag_magic.size() || size() - index_at > limits_.chunk_bytes) return false;
     const Buffer bytes = read_bytes_at(index_at, size() - index_at);
@@ -249,7 +249,7 @@ class BagFile : public ChunkedFile {
       } else if (is_cut) {
         break;
       } else if (*kind == BagRecord::message) {
-        // A killed recorder leaves those of its last chunk so.
+        // A killed recorder leaves the messages of its last chunk outside of any chunk.
         if (const auto message = message_in(header, {})) {
           add_loose_message(at, data_at + data_bytes - at, message->time_ns, message->topic);
         }
@@ -263,7 +263,7 @@ class BagFile : public ChunkedFile {
     if (at != index_at) warn_of_cut(at);
   }
 
-  std::unordered_map<std::uint32_t, std::uint32_t> connections_;  // their topics
+  std::unordered_map<std::uint32_t, std::uint32_t> connections_;  // topic numbers by connection id
 };
 
 }  // namespace

@@ -17,7 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The file does not change meanwhile, unless a recorder has a log next to it.
+// Makes an SQLite URI of the file. It is immutable (no locks), unless a write-ahead log shows that
+// a recorder may still be writing.
 std::string make_uri(const fs::path& path) {
   std::string uri = "file:";
   constexpr char digits[] = "0123456789ABCDEF";
@@ -34,7 +35,8 @@ std::string make_uri(const fs::path& path) {
   return uri + (missing || log == 0 ? "?immutable=1" : "");
 }
 
-// A .db3 file: tables `topics` and `messages`. All messages are one block, whose offsets are ids.
+// A .db3 file with the tables `topics` and `messages`. All messages are one block, and `offset` is
+// the id of a message.
 class DatabaseFile : public RecordingFile {
  public:
   DatabaseFile(const fs::path& path, const RecordingLimits& limits) : RecordingFile(path) {
@@ -45,7 +47,8 @@ class DatabaseFile : public RecordingFile {
         nullptr);
     handle_.reset(handle);
     if (code != SQLITE_OK) throw_sqlite_error(code);
-    // A foreign or damaged file must not make SQLite run code, take much memory or never end.
+    // These settings keep a foreign or damaged file from running code, using much memory or never
+    // ending.
     constexpr int steps_per_check = 20000;
     sqlite3_progress_handler(
         handle, steps_per_check,
@@ -85,7 +88,7 @@ class DatabaseFile : public RecordingFile {
         time_->end_ns = std::max(time_->end_ns, place->time_ns);
       }
     } catch (const FileError& error) {
-      warn(error);  // what comes before the damage is read
+      warn(error);  // messages before the damage are used
     }
     find_ = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
   }
@@ -95,7 +98,7 @@ class DatabaseFile : public RecordingFile {
   void list(std::size_t, const std::vector<bool>& chosen_topics, const TimeSpan& within,
             std::size_t max_places, std::vector<MessageLocation>& places) const override {
     const std::lock_guard lock(mutex_);
-    // The index of times is faster only for a part of the messages.
+    // The index of times is faster only if a part of the messages is read.
     const bool is_all = within.begin_ns <= time_->begin_ns && within.end_ns >= time_->end_ns;
     const Statement rows =
         prepare(is_all ? "SELECT id, topic_id, timestamp FROM messages"
@@ -176,7 +179,8 @@ class DatabaseFile : public RecordingFile {
     return {data, static_cast<std::size_t>(sqlite3_column_bytes(row.get(), column))};
   }
 
-  // Both must be tables of rows: no views, which run what a stranger wrote, and none of modules.
+  // Throws FileError unless both are real tables: views run SQL of the file's author, and virtual
+  // tables run modules.
   void require_tables() const {
     const Statement rows = prepare(
         "SELECT count(*) FROM sqlite_schema WHERE name IN ('topics', 'messages') AND "
@@ -186,8 +190,8 @@ class DatabaseFile : public RecordingFile {
     }
   }
 
-  // Reads the place of a message from a row that begins with id, topic and time. Empty where these
-  // have other types.
+  // Reads the location of a message from a row that begins with id, topic and time; `nullopt` if
+  // these are no integers or the topic is unknown.
   [[nodiscard]] std::optional<MessageLocation> read_place(const Statement& row) const {
     for (int column = 0; column < 3; ++column) {
       if (sqlite3_column_type(row.get(), column) != SQLITE_INTEGER) {

@@ -5,8 +5,8 @@
 
 namespace panonav::recordings {
 
-/// Returns the files that the metadata.yaml of a rosbag2 folder names, in their order, as paths in
-/// the folder; they may be missing. Throws FileError.
+/// Returns the files that the metadata.yaml of a rosbag2 folder lists, in that order, as paths in
+/// the folder; files may be missing. Throws FileError.
 [[nodiscard]] std::vector<std::filesystem::path> read_rosbag2_folder(
     const std::filesystem::path& folder);
 

@@ -16,7 +16,8 @@
 
 namespace panonav::recordings {
 
-/// Messages of one type on one topic of an MCAP file.
+/// Writes messages of one type to one topic of an MCAP file; adds its channel with the first
+/// message.
 template <class Message>
 class TopicWriter {
  public:
@@ -37,8 +38,8 @@ class TopicWriter {
   std::optional<std::uint16_t> channel_;
 };
 
-/// Converts a stamp to nanoseconds: the whole seconds are exact, and the rest is rounded to the
-/// precision of a double, so that 1700000003.3 is not 1700000003.299999952.
+/// Converts a stamp to nanoseconds. A stamp of whole microseconds stays exact: 1700000003.3 does
+/// not become 1700000003.299999952.
 inline std::int64_t to_nanoseconds(double stamp_s) {
   require(stamp_s >= 0.0 && stamp_s < 0x1p31, "stamp_s", stamp_s, "0 <= stamp_s < 2147483648");
   constexpr double second_ns = 1e9;
@@ -54,7 +55,7 @@ inline std::int64_t to_nanoseconds(double stamp_s) {
 /// them.
 class RobotTopics {
  public:
-  /// `world`: the frame of true poses.
+  /// `world` is the name of the frame of true poses.
   RobotTopics(McapWriter& writer, std::string world)
       : world_(std::move(world)),
         odometry_(writer, "/odom"),

@@ -78,7 +78,8 @@ double seconds(const timespec& time) {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// Drivers stamp by the clock that never jumps; how far the wall clock is from it now.
+/// Returns how far the wall clock is now ahead of the monotonic clock, by which drivers stamp
+/// frames, in seconds.
 double wall_minus_monotonic_s() {
   timespec wall{};
   timespec monotonic{};
@@ -196,7 +197,7 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
   while (true) {
     std::array<pollfd, 2> waits{pollfd{descriptor_, POLLIN, 0}, pollfd{stop, POLLIN, 0}};
     const int ready = poll(waits.data(), waits.size(), silent_ms);
-    if (ready < 0) continue;  // a signal
+    if (ready < 0) continue;  // interrupted by a signal
     if (waits[1].revents != 0) return std::nullopt;
     if (ready == 0) fail("has sent no image for 5 s");
     v4l2_buffer buffer{};
@@ -227,7 +228,7 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
             std::chrono::microseconds(buffer.timestamp.tv_usec));
       }
       if (sequence_) frame.lost = buffer.sequence - *sequence_ - 1U;
-      if (frame.lost > 1'000'000) frame.lost = 0;  // the driver restarted its counter
+      if (frame.lost > 1'000'000) frame.lost = 0;  // restarted counter of the driver
       sequence_ = buffer.sequence;
     }
     if (!control(descriptor_, VIDIOC_QBUF, &buffer)) fail("has gone");

@@ -17,7 +17,7 @@ namespace panonav::recordings {
 /// A V4L2 camera that streams into mapped buffers.
 class V4l2Camera {
  public:
-  /// Opens the device. Throws FileError that states the fault.
+  /// Opens the device. Throws FileError if it is no usable camera.
   V4l2Camera(std::string device, const std::optional<ImageSize>& size);
   ~V4l2Camera();
   V4l2Camera(const V4l2Camera&) = delete;
@@ -27,12 +27,12 @@ class V4l2Camera {
     std::vector<std::uint8_t> bytes;
     double stamp_s = 0.0;  ///< since 1970-01-01 UTC
     std::chrono::steady_clock::time_point arrived{};
-    std::uint64_t lost = 0;  ///< by the driver since the frame before
+    std::uint64_t lost = 0;  ///< frames that the driver lost since the previous one
   };
-  /// The newest picture. Empty when `stop` becomes readable. Throws FileError when the camera is
-  /// gone.
+  /// Waits for the next undamaged frame; `nullopt` once the descriptor `stop` is readable. Throws
+  /// FileError if the camera is silent for 5 s or was disconnected.
   [[nodiscard]] std::optional<Frame> next(int stop);
-  /// The bytes of a frame as a picture. Throws FileError, ContractError.
+  /// Decodes the bytes of a frame. Throws FileError, ContractError.
   [[nodiscard]] Image decode(std::span<const std::uint8_t> bytes, const ImageLimits& limits) const;
 
  private:

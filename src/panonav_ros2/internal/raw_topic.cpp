@@ -22,7 +22,7 @@ struct RawSample : ddsi_serdata {
     ddsi_serdata_init(this, of, what);
     bytes.resize(size);
   }
-  std::vector<std::uint8_t> bytes;  // a multiple of 4, as RTPS wants it
+  std::vector<std::uint8_t> bytes;  // size is a multiple of 4, as RTPS requires
 };
 
 RawSample& raw(ddsi_serdata* sample) {
@@ -32,7 +32,7 @@ const RawSample& raw(const ddsi_serdata* sample) {
   return *static_cast<const RawSample*>(sample);
 }
 
-/// Exceptions must not pass through C: null if there is no memory.
+/// Makes a sample; null if there is no memory, because exceptions must not pass through C.
 RawSample* make_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, std::size_t size) {
   try {
     return new RawSample(type, kind, size);
@@ -41,7 +41,8 @@ RawSample* make_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, std::si
   }
 }
 
-/// Fragments may overlap. What ends too early or is no CDR is for the reader of the message.
+/// Assembles a sample from fragments, which may overlap. Missing ends and invalid CDR are left to
+/// the reader of the message.
 ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
                              const nn_rdata* fragment, std::size_t size) {
   RawSample* const sample = make_sample(type, kind, size);
@@ -78,14 +79,15 @@ ddsi_serdata* from_bytes(const ddsi_sertype* type, ddsi_serdata_kind kind, const
   RawSample* const sample = make_sample(type, kind, size);
   if (sample == nullptr) return nullptr;
   std::ranges::copy(bytes, sample->bytes.begin());
-  // The last bits of the header's options count padding bytes that are not part of the message.
-  constexpr std::size_t options_at = 3;
-  if (size > options_at) sample->bytes[options_at] = static_cast<std::uint8_t>(size - bytes.size());
+  // The lowest bits of the header's options state the number of padding bytes at the end.
+  constexpr std::size_t options_offset = 3;
+  if (size > options_offset)
+    sample->bytes[options_offset] = static_cast<std::uint8_t>(size - bytes.size());
   return sample;
 }
 
-/// All samples of a type without key are of one instance.
-ddsi_serdata* instance(const ddsi_sertype* type) {
+/// Makes the key sample; all samples of a keyless type belong to one instance.
+ddsi_serdata* make_key_sample(const ddsi_sertype* type) {
   RawSample* const sample = make_sample(type, SDK_KEY, 0);
   return sample;
 }
@@ -98,7 +100,8 @@ const ddsi_serdata_ops sample_operations{
         },
     .from_ser = from_fragments,
     .from_ser_iov = from_vector,
-    .from_keyhash = [](const ddsi_sertype* type, const ddsi_keyhash*) { return instance(type); },
+    .from_keyhash = [](const ddsi_sertype* type,
+                       const ddsi_keyhash*) { return make_key_sample(type); },
     .from_sample = from_bytes,
     .to_ser = [](const ddsi_serdata* sample, std::size_t at, std::size_t count,
                  void* to) { std::memcpy(to, raw(sample).bytes.data() + at, count); },
@@ -112,7 +115,7 @@ const ddsi_serdata_ops sample_operations{
     .to_sample = [](const ddsi_serdata*, void*, void**, void*) { return false; },
     .to_untyped =
         [](const ddsi_serdata* sample) {
-          ddsi_serdata* const untyped = instance(sample->type);
+          ddsi_serdata* const untyped = make_key_sample(sample->type);
           if (untyped != nullptr) untyped->type = nullptr;
           return untyped;
         },

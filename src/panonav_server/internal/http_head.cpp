@@ -19,7 +19,7 @@ class HeadReader {
   HeadReader(const char* version, std::size_t max_body, HttpRequest& request)
       : max_body_(max_body), request_(request), line_end_(version + std::strlen(version)) {}
 
-  /// Is called for each field, in their order.
+  /// Called by libmicrohttpd for each field, in their order.
   static MHD_Result read(void* self, MHD_ValueKind /*kind*/, const char* name, const char* value) {
     auto& head = *static_cast<HeadReader*>(self);
     if (value == nullptr) value = "";
@@ -28,7 +28,7 @@ class HeadReader {
     return MHD_YES;
   }
 
-  /// Returns the result; the head had `bytes` bytes from `begin` on.
+  /// Returns the result for a head of `bytes` bytes from `begin` on.
   HttpHead finish(const char* begin, std::size_t bytes) {
     const bool ends_there = has_whole_lines_ && line_end_ + 4 == begin + bytes;
     if (bytes > max_head_bytes) {
@@ -44,9 +44,10 @@ class HeadReader {
     if (result_.status == 0) result_.status = status;
   }
 
-  /// A lenient libmicrohttpd takes heads that others read in another way: folded lines, and lines
-  /// that end in "\n" or "\r" alone. It parses in place, and ends each text by as many zeros as the
-  /// line had characters at its end, which is how these are noticed here.
+  /// Detects malformed lines that a lenient libmicrohttpd accepts and other programs parse
+  /// differently: folded lines, and lines that end in "\n" or "\r" alone. It parses in place and
+  /// replaces the end of each line by as many zeros, so the distance to the next field shows the
+  /// length of that end.
   void check_adjacency(const char* name, const char* value) {
     has_whole_lines_ = has_whole_lines_ && line_end_ + 2 == name;
     line_end_ = value + std::strlen(value);
@@ -86,8 +87,8 @@ class HeadReader {
   HttpRequest& request_;
   HttpHead result_;
   bool has_length_ = false;
-  const char* line_end_;         // of the line before
-  bool has_whole_lines_ = true;  // each field is one line, which ended in "\r\n"
+  const char* line_end_;         // end of the previous line's text
+  bool has_whole_lines_ = true;  // each line so far ended in "\r\n"
 };
 
 }  // namespace

@@ -11,17 +11,17 @@ namespace panonav::server {
 /// Largest head of a request, in bytes.
 inline constexpr std::size_t max_head_bytes = 8192;
 
-/// True if this libmicrohttpd reads heads that it should refuse, and has no option against it.
+/// True if this version of libmicrohttpd accepts malformed heads and has no option against it.
 [[nodiscard]] bool is_lenient_version();
 
 /// Result of reading a head, besides the fields of `HttpRequest`.
 struct HttpHead {
-  int status = 0;              ///< why the request is refused; 0: it is not
+  int status = 0;              ///< error status for a refusal; 0: accepted
   std::size_t body_bytes = 0;  ///< as announced
 };
 
 /// Reads the fields of a head that libmicrohttpd has parsed. `method` and `version` are the texts
-/// that it gave with it. Cost: linear in the head.
+/// that libmicrohttpd gave with the head. Cost: linear in the head.
 [[nodiscard]] HttpHead read_http_head(MHD_Connection* handle, const char* method,
                                       const char* version, std::size_t max_body,
                                       HttpRequest& request);

@@ -6,8 +6,8 @@
 
 namespace panonav::simulation {
 
-/// An affine map of space, p_in_a = matrix * p_in_b + translation: poses, scales and mirror images
-/// of scene parts, row-major.
+/// An affine transform, p_in_a = matrix * p_in_b + translation, for poses, scales and mirror images
+/// of scene parts. The matrix is row-major.
 struct Affine3 {
   std::array<double, 9> matrix{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
   Vector3 translation;
@@ -23,7 +23,7 @@ struct Affine3 {
   }
 };
 
-/// a_from_c = a_from_b * b_from_c.
+/// Returns a_from_c = a_from_b * b_from_c.
 [[nodiscard]] inline Affine3 operator*(const Affine3& a_from_b, const Affine3& b_from_c) {
   Affine3 result;
   for (std::size_t row = 0; row < 3; ++row) {

@@ -4,7 +4,7 @@
 
 namespace panonav::simulation {
 
-// The makers behind `make_scene`, one per kind of place.
+// Functions used by `make_scene`, one per built-in scene.
 [[nodiscard]] Scene make_office(const SceneVariation& variation);
 [[nodiscard]] Scene make_lab(const SceneVariation& variation);
 [[nodiscard]] Scene make_hall(const SceneVariation& variation, bool periodic);

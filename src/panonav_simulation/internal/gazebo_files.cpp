@@ -15,17 +15,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_there(const fs::path& path) {
+bool path_exists(const fs::path& path) {
   std::error_code code;
   return fs::exists(path, code);
 }
 
-// Returns the path below `base` with the case of letters of the folders; the first in the order of
-// names where several fit.
+// Returns `path` below `base` with the case of letters that the folders on disk have, or nullopt if
+// it does not exist. If several names match, the first in alphabetical order is used.
 std::optional<fs::path> find_path_in_any_case(const fs::path& base, const fs::path& path) {
   fs::path found = base;
   for (const fs::path& part : path) {
-    if (part == "/" || part.empty() || is_there(found / part)) {
+    if (part == "/" || part.empty() || path_exists(found / part)) {
       found /= part;
       continue;
     }
@@ -38,7 +38,7 @@ std::optional<fs::path> find_path_in_any_case(const fs::path& base, const fs::pa
     if (names.empty()) return std::nullopt;
     found /= *std::min_element(names.begin(), names.end());
   }
-  return is_there(found) ? std::optional(found) : std::nullopt;
+  return path_exists(found) ? std::optional(found) : std::nullopt;
 }
 
 // Returns NAME/FILE of https://SERVER/1.0/OWNER/models/NAME[/VERSION/files/FILE]; empty for other
@@ -99,9 +99,9 @@ std::vector<fs::path> gazebo_model_folders_of_environment() {
 
 GazeboFiles::GazeboFiles(fs::path world, std::vector<fs::path> model_folders)
     : world_(std::move(world)), folders_(std::move(model_folders)) {
-  const fs::path beside = fs::absolute(world_).lexically_normal().parent_path();
-  for (const fs::path& folder :
-       {beside / "models", beside.parent_path() / "models", beside, beside.parent_path()}) {
+  const fs::path world_folder = fs::absolute(world_).lexically_normal().parent_path();
+  for (const fs::path& folder : {world_folder / "models", world_folder.parent_path() / "models",
+                                 world_folder, world_folder.parent_path()}) {
     folders_.push_back(folder);
   }
 }
@@ -125,7 +125,7 @@ std::optional<FoundFile> GazeboFiles::resolve(std::string_view uri,
   }
   if (!path.is_absolute()) bases.insert(bases.end(), folders_.begin(), folders_.end());
   for (const fs::path& base : bases) {
-    if (is_there(base / path)) return FoundFile{base / path};
+    if (path_exists(base / path)) return FoundFile{base / path};
   }
   for (const fs::path& base : bases) {
     if (auto found = find_path_in_any_case(base, path)) return FoundFile{std::move(*found), false};
@@ -139,7 +139,7 @@ std::string GazeboFiles::places() const {
   return text;
 }
 
-pugi::xml_node GazeboFiles::sdf(const fs::path& file) {
+pugi::xml_node GazeboFiles::read_sdf_root(const fs::path& file) {
   const std::string key = file.lexically_normal().string();
   if (const auto known = files_.find(key); known != files_.end())
     return known->second.document_element();
@@ -167,7 +167,7 @@ fs::path GazeboFiles::find_description(const fs::path& folder) {
     try {
       config = parse_xml(read_scene_file(folder / list));
     } catch (const Error&) {
-      break;  // the usual names may do
+      break;  // use the usual names instead
     }
     std::optional<fs::path> best;
     double best_version = -1.0;

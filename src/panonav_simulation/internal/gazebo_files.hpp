@@ -11,8 +11,8 @@
 
 namespace panonav::simulation {
 
-/// Throws FileError unless this is a regular file of at most 256 MB: worlds and meshes name other
-/// files, and devices and pipes have no end.
+/// Throws FileError unless `file` is a regular file of at most 256 MB. Worlds and meshes name other
+/// files, which could be devices or pipes without an end.
 void require_scene_file(const std::filesystem::path& file);
 
 /// Reads the bytes of a file. Throws FileError as require_scene_file does.
@@ -23,7 +23,7 @@ void require_scene_file(const std::filesystem::path& file);
 
 struct FoundFile {
   std::filesystem::path path;
-  bool as_written = true;  ///< false: only the case of letters differs
+  bool as_written = true;  ///< false: differs in the case of letters
 };
 
 /// Finds and reads the files that a Gazebo world refers to.
@@ -31,22 +31,23 @@ class GazeboFiles {
  public:
   GazeboFiles(std::filesystem::path world, std::vector<std::filesystem::path> model_folders);
 
-  /// Finds the file or folder that `uri` means: `model://` and `package://` in the model folders,
-  /// the models of a Fuel server (`https://.../models/NAME`) as `model://NAME`, `file://` and plain
-  /// paths absolute, beside `directory`, beside the world or in the model folders. Where none has
-  /// the name as it is written, one whose letters differ in case. Nullopt if there is none.
+  /// Finds the file or folder that `uri` refers to: `model://` and `package://` in the model
+  /// folders, models of a Fuel server (`https://.../models/NAME`) as `model://NAME`, and `file://`
+  /// and plain paths as absolute paths, relative to `directory` or the world, or in the model
+  /// folders. If no name matches exactly, a name that differs in case is used. nullopt if there is
+  /// none.
   [[nodiscard]] std::optional<FoundFile> resolve(std::string_view uri,
                                                  const std::filesystem::path& directory) const;
 
-  /// Returns the model folders, for messages.
+  /// Returns the model folders as text for messages.
   [[nodiscard]] std::string places() const;
 
-  /// Returns the root element <sdf> or <gazebo> of a file, read once; valid as long as *this.
-  /// Throws FileError.
-  pugi::xml_node sdf(const std::filesystem::path& file);
+  /// Returns the root element <sdf> or <gazebo> of a file, which is read once; valid as long as
+  /// this object. Throws FileError.
+  pugi::xml_node read_sdf_root(const std::filesystem::path& file);
 
-  /// Finds the model description in a folder: of those that `model.config` lists the one of the
-  /// highest version, else `model.sdf`, else the first *.sdf. Throws FileError.
+  /// Finds the model description in a folder: the one of the highest version in `model.config` or
+  /// `manifest.xml`, else `model.sdf`, else the first *.sdf file. Throws FileError.
   [[nodiscard]] static std::filesystem::path find_description(const std::filesystem::path& folder);
 
  private:

@@ -36,16 +36,16 @@ struct Corner {
 };
 using Corners = std::array<Corner, 3>;
 
-Corner middle(const Corner& a, const Corner& b) {
+Corner compute_middle(const Corner& a, const Corner& b) {
   return {0.5F * (a.position + b.position),
           {0.5F * (a.uv[0] + b.uv[0]), 0.5F * (a.uv[1] + b.uv[1])}};
 }
 
-// Spacing at which light is computed: `spacing_m` on the floor, coarser in proportion to the
-// distance from it.
-class Spacing {
+// Spacing of the points at which light is computed: `spacing_m` on the floor, and an eighth of the
+// distance from it if that is larger.
+class LightSpacing {
  public:
-  Spacing(const Scene& scene, double spacing_m)
+  LightSpacing(const Scene& scene, double spacing_m)
       : low_{static_cast<float>(scene.floor_low.x_m), static_cast<float>(scene.floor_low.y_m)},
         high_{static_cast<float>(scene.floor_high.x_m), static_cast<float>(scene.floor_high.y_m)},
         spacing_m_(static_cast<float>(spacing_m)) {}
@@ -61,8 +61,9 @@ class Spacing {
   float spacing_m_;
 };
 
-// Halves the longest side until all are short enough.
-void split(const Corners& corners, const Spacing& spacing, std::vector<Corners>& out) {
+// Halves the longest side of a triangle until all sides are at most as long as the spacing.
+void split_triangle(const Corners& corners, const LightSpacing& spacing,
+                    std::vector<Corners>& out) {
   std::vector<Corners> stack{corners};
   while (!stack.empty()) {
     const Corners t = stack.back();
@@ -81,22 +82,22 @@ void split(const Corners& corners, const Spacing& spacing, std::vector<Corners>&
       out.push_back(t);
       continue;
     }
-    const Corner m = middle(t[side], t[(side + 1) % 3]);
+    const Corner m = compute_middle(t[side], t[(side + 1) % 3]);
     const Corner& opposite = t[(side + 2) % 3];
     stack.push_back({m, t[(side + 1) % 3], opposite});
     stack.push_back({t[side], m, opposite});
   }
 }
 
-// Largest distance of an obstacle that darkens a surface, in spacings.
+// Largest distance, in spacings, at which an obstacle darkens a surface.
 constexpr double occlusion_spacings = 5.0;
 
 // A point a little above one side of a surface, where light is computed.
 struct LightPoint {
   Float3 position;
   Float3 normal;
-  Float3 inwards{};  ///< sum of the ways to the middles of the triangles that share the point
-  float sharers = 0.0F;
+  Float3 offset_to_triangles{};  ///< sum of vectors to the centres of adjacent triangles
+  float triangle_count = 0.0F;
   float light = 0.0F;
 };
 
@@ -115,8 +116,8 @@ struct PointKeyHash {
   }
 };
 
-// Returns the key of a point. Points nearer to each other than a tenth of the spacing, on surfaces
-// of the same direction, share their light.
+// Returns the key of a point. Points in the same cell, a tenth of the spacing wide, on surfaces of
+// the same direction share their light.
 PointKey make_key(const Float3& position, const Float3& normal, float spacing_m) {
   PointKey key;
   for (int i = 0; i < 3; ++i) {
@@ -126,9 +127,9 @@ PointKey make_key(const Float3& position, const Float3& normal, float spacing_m)
   return key;
 }
 
-// Returns directions of a hemisphere about z, as dense as the cosine: each counts the same for
-// ambient light.
-std::vector<Float3> hemisphere(int count) {
+// Returns directions of a hemisphere about z with cosine-weighted density, so that each has the
+// same weight for ambient light.
+std::vector<Float3> make_hemisphere_directions(int count) {
   std::vector<Float3> directions;
   for (int i = 0; i < count; ++i) {
     const double r2 = (i + 0.5) / count;
@@ -151,13 +152,13 @@ class LightProbe {
         shadows_(shadows),
         reach_m_(static_cast<float>(occlusion_spacings * spacing_m)),
         spacing_(scene, spacing_m),
-        directions_(hemisphere(24)) {}
+        directions_(make_hemisphere_directions(24)) {}
 
   [[nodiscard]] float light_at(const Float3& surface, const Float3& normal) const {
-    // Above pictures that hang close before their wall: those are no obstacles to its light.
-    const float lift_m = 0.08F * spacing_.at(surface);
-    const Float3 position = surface + lift_m * normal;
-    float sum = scene_.ambient * openness(position, normal);
+    // Lift the point above pictures that hang close to their wall, which must not shadow it.
+    const float surface_offset_m = 0.08F * spacing_.at(surface);
+    const Float3 position = surface + surface_offset_m * normal;
+    float sum = scene_.ambient * compute_openness(position, normal);
     for (const PointLight& lamp : scene_.lights) {
       const Float3 to_lamp =
           Float3{static_cast<float>(lamp.position.x_m), static_cast<float>(lamp.position.y_m),
@@ -166,27 +167,28 @@ class LightProbe {
       const float distance = std::max(length(to_lamp), 1e-6F);
       const Float3 direction = (1.0F / distance) * to_lamp;
       const float strength = lamp.intensity / (distance * distance + lamp.radius_m * lamp.radius_m);
-      sum += strength * visible(position, normal, direction, 0.97F * distance);
+      sum += strength * visible_cosine(position, normal, direction, 0.97F * distance);
     }
     for (const DirectionalLight& light : scene_.directional_lights) {
       const Float3 towards{static_cast<float>(light.towards_light.x),
                            static_cast<float>(light.towards_light.y),
                            static_cast<float>(light.towards_light.z)};
-      sum += light.intensity * visible(position, normal, (1.0F / length(towards)) * towards, 1e6F);
+      sum += light.intensity *
+             visible_cosine(position, normal, (1.0F / length(towards)) * towards, 1e6F);
     }
     return sum;
   }
 
  private:
-  [[nodiscard]] float visible(const Float3& position, const Float3& normal, const Float3& direction,
-                              float distance_m) const {
+  [[nodiscard]] float visible_cosine(const Float3& position, const Float3& normal,
+                                     const Float3& direction, float distance_m) const {
     const float cosine = dot(normal, direction);
     if (cosine <= 0.0F) return 0.0F;
     if (shadows_ && !is_unblocked({position, direction}, distance_m)) return 0.0F;
     return cosine;
   }
 
-  // True if nothing but lamps and skies, which throw no shadows, stands within the distance.
+  // True if only lamps and skies, which cast no shadows, are within the distance along the ray.
   [[nodiscard]] bool is_unblocked(Ray ray, float distance_m) const {
     for (int surfaces = 0; surfaces < 4; ++surfaces) {
       const RayHit hit = tracer_.first_hit(ray);
@@ -203,7 +205,7 @@ class LightProbe {
     return scene_.materials[lit_.triangles[hit.triangle].material].emission;
   }
 
-  [[nodiscard]] float openness(const Float3& position, const Float3& normal) const {
+  [[nodiscard]] float compute_openness(const Float3& position, const Float3& normal) const {
     if (!shadows_) return 1.0F;
     const Float3 helper = std::fabs(normal[2]) < 0.9F ? Float3{0, 0, 1} : Float3{1, 0, 0};
     Float3 tangent = cross(helper, normal);
@@ -225,7 +227,7 @@ class LightProbe {
   const LitTriangles& lit_;
   bool shadows_;
   float reach_m_;
-  Spacing spacing_;
+  LightSpacing spacing_;
   std::vector<Float3> directions_;
 };
 
@@ -233,11 +235,11 @@ class LightProbe {
 
 LitTriangles subdivide(const Scene& scene, double spacing_m) {
   LitTriangles lit;
-  const Spacing spacing(scene, spacing_m);
+  const LightSpacing spacing(scene, spacing_m);
   std::vector<Corners> pieces;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = scene.meshes[m];
-    const bool own_light = scene.materials[mesh.material].emission >= 1.0F;
+    const bool is_emissive = scene.materials[mesh.material].emission >= 1.0F;
     for (const auto& index : mesh.triangles) {
       Corners corners;
       for (int i = 0; i < 3; ++i) {
@@ -261,10 +263,10 @@ LitTriangles subdivide(const Scene& scene, double spacing_m) {
                     (corners[2].uv[0] - corners[0].uv[0]) * (corners[1].uv[1] - corners[0].uv[1]));
       triangle.texture_density = std::sqrt(uv_area / area);
       pieces.clear();
-      if (own_light) {
+      if (is_emissive) {
         pieces.push_back(corners);
       } else {
-        split(corners, spacing, pieces);
+        split_triangle(corners, spacing, pieces);
       }
       for (const Corners& piece : pieces) {
         const auto first = static_cast<std::uint32_t>(lit.vertices.size());
@@ -282,7 +284,7 @@ LitTriangles subdivide(const Scene& scene, double spacing_m) {
 
 void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, double spacing_m,
                 LitTriangles& lit, Executor& executor) {
-  const Spacing spacing(scene, spacing_m);
+  const LightSpacing spacing(scene, spacing_m);
   std::vector<LightPoint> points;
   std::unordered_map<PointKey, std::uint32_t, PointKeyHash> known;
   std::vector<std::array<std::uint32_t, 6>> points_of(lit.triangles.size());
@@ -292,10 +294,10 @@ void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, doubl
     if (fresh) points.push_back({position, normal});
     return entry->second;
   };
-  const auto note_middle = [&](std::uint32_t index, const Float3& centre) {
+  const auto add_triangle_centre = [&](std::uint32_t index, const Float3& centre) {
     LightPoint& point = points[index];
-    point.inwards = point.inwards + (centre - point.position);
-    point.sharers += 1.0F;
+    point.offset_to_triangles = point.offset_to_triangles + (centre - point.position);
+    point.triangle_count += 1.0F;
   };
   for (std::size_t t = 0; t < lit.triangles.size(); ++t) {
     if (scene.materials[lit.triangles[t].material].emission >= 1.0F) continue;
@@ -307,17 +309,19 @@ void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, doubl
       const Float3& corner = lit.vertices[lit.indices[t][i]];
       points_of[t][i] = point_index(corner, normal);
       points_of[t][3 + i] = point_index(corner, -1.0F * normal);
-      note_middle(points_of[t][i], centre);
-      note_middle(points_of[t][3 + i], centre);
+      add_triangle_centre(points_of[t][i], centre);
+      add_triangle_centre(points_of[t][3 + i], centre);
     }
   }
   const LightProbe probe(scene, tracer, lit, shadows, spacing_m);
   executor.for_chunks(points.size(), 256, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
-      // A point on the border of a surface is often inside the next one, where all is dark: it is
-      // moved by a third of the way to its triangles. Within a surface the moves cancel.
+      // A point on the border of a surface is often inside an adjacent body, where it is dark. Move
+      // it by a third of the mean vector to its triangles' centres; within a surface these vectors
+      // cancel.
       const LightPoint& point = points[i];
-      const Float3 position = point.position + (0.33F / point.sharers) * point.inwards;
+      const Float3 position =
+          point.position + (0.33F / point.triangle_count) * point.offset_to_triangles;
       points[i].light = probe.light_at(position, point.normal);
     }
   });

@@ -10,31 +10,29 @@
 
 namespace panonav::simulation {
 
-/// A scene's triangles cut so small that light can be interpolated within each.
+/// A scene's triangles, subdivided so finely that light can be interpolated within each.
 struct LitTriangles {
   struct Triangle {
     std::array<float, 3> normal{};
     float texture_density = 0.0F;  ///< texture coordinates per metre
     std::array<std::array<float, 2>, 3> uv{};
-    std::array<std::array<float, 3>, 2>
-        light{};  ///< at the corners, on the normal's side and behind
+    std::array<std::array<float, 3>, 2> light{};  ///< per corner, on the normal's side and behind
     int material = 0;
     int mesh = 0;
   };
   std::vector<RayTracer::Vertex> vertices;
   std::vector<RayTracer::Triangle> indices;
-  std::vector<Triangle> triangles;  ///< same order as `indices`; light still 0
+  std::vector<Triangle> triangles;  ///< in the order of `indices`; light is 0 before `bake_light`
 };
 
-/// Cuts every triangle of a material that light falls upon until no side is longer than
-/// `spacing_m`, or an eighth of the distance from the floor where that is more. Triangles without
-/// area are left out.
+/// Subdivides every triangle whose material is lit until no side is longer than `spacing_m` or, if
+/// that is larger, an eighth of the distance from the floor. Omits triangles without area.
 [[nodiscard]] LitTriangles subdivide(const Scene& scene, double spacing_m);
 
-/// Fills in the light at every corner: lamps and far lights by Lambert's law, with `shadows` only
-/// where a ray reaches them; the ambient light, with `shadows` dimmed in corners and beneath things
-/// by the share of directions that are blocked nearer than five times `spacing_m`. Cost: about 25
-/// rays per distinct corner and side with shadows. The same bits on any number of threads.
+/// Computes the light at every corner: lamps and distant lights by Lambert's law, with `shadows`
+/// only if a ray reaches them; ambient light, with `shadows` reduced by the share of directions
+/// that are blocked nearer than five times `spacing_m`, as in corners. Cost: about 25 rays per
+/// distinct corner and side with shadows. The same bits on any number of threads.
 void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, double spacing_m,
                 LitTriangles& lit, Executor& executor);
 

@@ -19,7 +19,7 @@ struct NamedColour {
   std::array<float, 3> colour;
 };
 
-// Gazebo's material file, diffuse colours.
+// Diffuse colours of Gazebo's material file.
 constexpr std::array<NamedColour, 21> gazebo_colours{{
     {"Gazebo/Grey", {0.7F, 0.7F, 0.7F}},
     {"Gazebo/Gray", {0.7F, 0.7F, 0.7F}},
@@ -44,7 +44,7 @@ constexpr std::array<NamedColour, 21> gazebo_colours{{
     {"Gazebo/Wood", {0.55F, 0.38F, 0.21F}},
 }};
 
-// Splits a script into words; braces stand alone, comments are left out.
+// Splits a script into words; braces are separate words, comments are omitted.
 std::vector<std::string> read_words(const fs::path& file) {
   require_scene_file(file);
   std::ifstream stream(file);

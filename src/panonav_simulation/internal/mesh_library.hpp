@@ -14,40 +14,41 @@
 
 namespace panonav::simulation {
 
-/// A mesh as its file holds it, z up, in metres.
+/// A mesh as read from its file, z up, in metres.
 struct FileMesh {
-  std::string node;      ///< name of the node it hangs on
+  std::string node;      ///< name of the node that the mesh belongs to
   std::string geometry;  ///< name of the mesh itself
   Material material;
   Mesh mesh;  ///< `object` and `material` are not set
 };
 
-/// Mesh files of one scene, each read once however often it is shown.
+/// The mesh files of one scene, each read once.
 class MeshLibrary {
  public:
-  /// `textures` outlives *this.
+  /// `textures` must outlive this object.
   explicit MeshLibrary(TextureStore& textures) : textures_(textures) {}
 
-  /// Throws FileError, each time the same. The reference stays valid.
+  /// Reads a file or returns it from the cache. Throws FileError, the same one on each call. The
+  /// reference remains valid.
   const std::vector<FileMesh>& read(const std::filesystem::path& path,
                                     UpAxis up = UpAxis::of_format);
 
  private:
   using Key = std::pair<std::string, UpAxis>;
-  std::vector<FileMesh> read_new(const std::filesystem::path& path, UpAxis up);
+  std::vector<FileMesh> import_file(const std::filesystem::path& path, UpAxis up);
 
   TextureStore& textures_;
   std::map<Key, std::vector<FileMesh>> files_;
-  std::map<Key, FileError> faults_;
+  std::map<Key, FileError> errors_;
 };
 
-/// Adds `mesh` to the scene at a place. A map that mirrors keeps the mesh's shape; surfaces are
-/// seen from both sides.
+/// Adds `mesh` to the scene, transformed by `world_from_mesh`. Mirroring transforms are allowed,
+/// because surfaces are visible from both sides.
 void place_mesh(Scene& scene, const Mesh& mesh, const Affine3& world_from_mesh, std::string object,
                 int material);
 
-/// Returns the lowest and highest corner of the meshes from `first_mesh` on; nullopt if there is no
-/// vertex.
+/// Returns the lowest and highest corner of the meshes from index `first_mesh` on; nullopt if they
+/// have no vertex.
 [[nodiscard]] std::optional<std::pair<Vector3, Vector3>> extent(const Scene& scene,
                                                                 std::size_t first_mesh = 0);
 

@@ -8,7 +8,8 @@ namespace panonav::simulation {
 
 namespace {
 
-// Returns the part of a convex polygon on one side of a horizontal plane: sign * (z - height) >= 0.
+// Returns the part of a convex polygon on one side of the plane z = height, where sign * (z -
+// height) >= 0.
 std::vector<Vector3> clip(const std::vector<Vector3>& polygon, double height, double sign) {
   std::vector<Vector3> result;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -34,8 +35,8 @@ struct Interval {
   }
 };
 
-// Returns the x values of the convex polygon's points with y in y_low .. y_high.
-Interval span_between(const std::vector<Vector3>& polygon, double y_low, double y_high) {
+// Returns the range of x over all points of the convex polygon with y in y_low .. y_high.
+Interval find_x_range(const std::vector<Vector3>& polygon, double y_low, double y_high) {
   Interval span;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Vector3& a = polygon[i];
@@ -54,8 +55,8 @@ int clamp_cell(double coordinate, int count) {
   return static_cast<int>(std::clamp(std::floor(coordinate), -1.0, static_cast<double>(count)));
 }
 
-void mark(const std::vector<Vector3>& polygon, const Raster& raster,
-          std::vector<std::uint8_t>& cells) {
+void mark_polygon_cells(const std::vector<Vector3>& polygon, const Raster& raster,
+                        std::vector<std::uint8_t>& cells) {
   Interval y;
   for (const Vector3& v : polygon) y.add(v.y_m);
   const int first = std::max(0, clamp_cell((y.low - raster.low.y_m) / raster.cell_m, raster.rows));
@@ -63,7 +64,7 @@ void mark(const std::vector<Vector3>& polygon, const Raster& raster,
       std::min(raster.rows - 1, clamp_cell((y.high - raster.low.y_m) / raster.cell_m, raster.rows));
   for (int j = first; j <= last; ++j) {
     const double y_low = raster.low.y_m + j * raster.cell_m;
-    const Interval x = span_between(polygon, y_low, y_low + raster.cell_m);
+    const Interval x = find_x_range(polygon, y_low, y_low + raster.cell_m);
     if (!(x.low <= x.high)) continue;
     const int left =
         std::max(0, clamp_cell((x.low - raster.low.x_m) / raster.cell_m, raster.columns));
@@ -76,9 +77,9 @@ void mark(const std::vector<Vector3>& polygon, const Raster& raster,
   }
 }
 
-// Computes the lower envelope of the parabolas f(q) + (p - q)^2 at every p.
-void transform_line(const std::vector<float>& f, std::vector<float>& result,
-                    std::vector<int>& roots, std::vector<float>& borders) {
+// Computes the minimum over q of the parabolas f(q) + (p - q)^2, at every p.
+void transform_distances(const std::vector<float>& f, std::vector<float>& result,
+                         std::vector<int>& envelope_roots, std::vector<float>& envelope_borders) {
   constexpr float infinity = std::numeric_limits<float>::infinity();
   const int n = static_cast<int>(f.size());
   int last = -1;
@@ -87,18 +88,18 @@ void transform_line(const std::vector<float>& f, std::vector<float>& result,
     if (fq == infinity) continue;
     float border = -infinity;
     while (last >= 0) {
-      const int r = roots[static_cast<std::size_t>(last)];
+      const int r = envelope_roots[static_cast<std::size_t>(last)];
       const auto qf = static_cast<double>(q);
       const auto rf = static_cast<double>(r);
       border = static_cast<float>(((fq + qf * qf) - (f[static_cast<std::size_t>(r)] + rf * rf)) /
                                   (2.0 * (qf - rf)));
-      if (border > borders[static_cast<std::size_t>(last)]) break;
+      if (border > envelope_borders[static_cast<std::size_t>(last)]) break;
       border = -infinity;
       --last;
     }
     ++last;
-    roots[static_cast<std::size_t>(last)] = q;
-    borders[static_cast<std::size_t>(last)] = border;
+    envelope_roots[static_cast<std::size_t>(last)] = q;
+    envelope_borders[static_cast<std::size_t>(last)] = border;
   }
   if (last < 0) {
     std::fill(result.begin(), result.end(), infinity);
@@ -106,8 +107,9 @@ void transform_line(const std::vector<float>& f, std::vector<float>& result,
   }
   int k = 0;
   for (int p = 0; p < n; ++p) {
-    while (k < last && borders[static_cast<std::size_t>(k) + 1] < static_cast<float>(p)) ++k;
-    const int r = roots[static_cast<std::size_t>(k)];
+    while (k < last && envelope_borders[static_cast<std::size_t>(k) + 1] < static_cast<float>(p))
+      ++k;
+    const int r = envelope_roots[static_cast<std::size_t>(k)];
     const auto d = static_cast<float>(p - r);
     result[static_cast<std::size_t>(p)] = d * d + f[static_cast<std::size_t>(r)];
   }
@@ -115,8 +117,8 @@ void transform_line(const std::vector<float>& f, std::vector<float>& result,
 
 }  // namespace
 
-std::vector<std::uint8_t> occupied_cells(const Scene& scene, const Raster& raster, double low_z_m,
-                                         double high_z_m) {
+std::vector<std::uint8_t> find_occupied_cells(const Scene& scene, const Raster& raster,
+                                              double low_z_m, double high_z_m) {
   std::vector<std::uint8_t> cells(
       static_cast<std::size_t>(raster.columns) * static_cast<std::size_t>(raster.rows), 0);
   for (const Mesh& mesh : scene.meshes) {
@@ -127,13 +129,14 @@ std::vector<std::uint8_t> occupied_cells(const Scene& scene, const Raster& raste
       if (highest < low_z_m || lowest > high_z_m) continue;
       if (lowest < low_z_m) polygon = clip(polygon, low_z_m, 1.0);
       if (highest > high_z_m) polygon = clip(polygon, high_z_m, -1.0);
-      if (!polygon.empty()) mark(polygon, raster, cells);
+      if (!polygon.empty()) mark_polygon_cells(polygon, raster, cells);
     }
   }
   return cells;
 }
 
-std::vector<float> distance_to_cells(const std::vector<std::uint8_t>& cells, const Raster& raster) {
+std::vector<float> compute_distances_to_cells(const std::vector<std::uint8_t>& cells,
+                                              const Raster& raster) {
   const auto columns = static_cast<std::size_t>(raster.columns);
   const auto rows = static_cast<std::size_t>(raster.rows);
   std::vector<float> squared(cells.size());
@@ -141,20 +144,20 @@ std::vector<float> distance_to_cells(const std::vector<std::uint8_t>& cells, con
     squared[i] = cells[i] != 0 ? 0.0F : std::numeric_limits<float>::infinity();
   }
   const std::size_t longest = std::max(columns, rows);
-  std::vector<int> roots(longest);
-  std::vector<float> borders(longest);
+  std::vector<int> envelope_roots(longest);
+  std::vector<float> envelope_borders(longest);
   std::vector<float> line(rows);
   std::vector<float> result(rows);
   for (std::size_t i = 0; i < columns; ++i) {
     for (std::size_t j = 0; j < rows; ++j) line[j] = squared[j * columns + i];
-    transform_line(line, result, roots, borders);
+    transform_distances(line, result, envelope_roots, envelope_borders);
     for (std::size_t j = 0; j < rows; ++j) squared[j * columns + i] = result[j];
   }
   line.resize(columns);
   result.resize(columns);
   for (std::size_t j = 0; j < rows; ++j) {
     std::copy_n(squared.begin() + static_cast<std::ptrdiff_t>(j * columns), columns, line.begin());
-    transform_line(line, result, roots, borders);
+    transform_distances(line, result, envelope_roots, envelope_borders);
     std::transform(result.begin(), result.end(),
                    squared.begin() + static_cast<std::ptrdiff_t>(j * columns),
                    [](float d2) { return std::sqrt(d2); });

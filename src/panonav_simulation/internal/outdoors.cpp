@@ -1,4 +1,4 @@
-// Scenes without a room around them: the garden, and the arena on a table.
+// Outdoor scenes and tables: the garden, and the arena on a table.
 
 #include <algorithm>
 #include <array>
@@ -13,22 +13,23 @@ namespace panonav::simulation {
 
 namespace {
 
-// Adds a dome far away, from a little below the horizon up to the zenith: sky and clouds all round.
+// Adds a distant dome with sky and clouds, from a little below the horizon up to the zenith.
 void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
   Mesh mesh;
   mesh.object = "sky";
   mesh.material = builder.add_textured_material(sky_texture(builder.random(), 512, 256), 1.0F);
   constexpr int facets = 48;
   constexpr int rings = 16;
-  constexpr double lowest = -0.05;
+  constexpr double lowest_elevation_rad = -0.05;
   for (int ring = 0; ring <= rings; ++ring) {
     const double share = static_cast<double>(ring) / rings;
-    const double elevation = lowest + share * (0.5 * std::numbers::pi - lowest);
+    const double elevation =
+        lowest_elevation_rad + share * (0.5 * std::numbers::pi - lowest_elevation_rad);
     for (int i = 0; i <= facets; ++i) {
       const double angle = 2.0 * std::numbers::pi * i / facets;
-      const double flat_m = radius_m * std::cos(elevation);
-      mesh.vertices.push_back({centre.x_m + flat_m * std::cos(angle),
-                               centre.y_m + flat_m * std::sin(angle),
+      const double ground_radius_m = radius_m * std::cos(elevation);
+      mesh.vertices.push_back({centre.x_m + ground_radius_m * std::cos(angle),
+                               centre.y_m + ground_radius_m * std::sin(angle),
                                radius_m * std::sin(elevation)});
       mesh.texture_coordinates.push_back(
           {static_cast<float>(i) / facets, static_cast<float>(0.01 + 0.98 * share)});
@@ -97,7 +98,7 @@ void add_hedge(SceneBuilder& builder, const std::string& name, Point2 from, Poin
       foliage_texture(random, 256, {0.75F * green, green, 0.5F * green}));
   const double length = distance(from, to);
   const double turn = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
-  // Segments of different height and depth: a hedge grows as it likes.
+  // Segments have random heights and depths, so that the hedge is irregular.
   const int segments = std::max(1, static_cast<int>(length / 0.8));
   for (int i = 0; i < segments; ++i) {
     const double share = (i + 0.5) / segments;
@@ -111,7 +112,7 @@ void add_hedge(SceneBuilder& builder, const std::string& name, Point2 from, Poin
   }
 }
 
-// Hedges around, with gaps through which far trees are seen.
+// Adds hedges on all four sides, with gaps through which distant trees are visible.
 void add_hedges(SceneBuilder& builder) {
   Random& random = builder.random();
   const std::array<Point2, 4> corners{Point2{-1.5, -1.5}, Point2{13.5, -1.5}, Point2{13.5, 11.5},
@@ -129,7 +130,7 @@ void add_hedges(SceneBuilder& builder) {
   }
 }
 
-// Trees and flower boxes beside the tour.
+// Adds trees and flower boxes at positions clear of the tour.
 void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
   Random& random = builder.random();
   const auto place = [&](double radius_m) {
@@ -156,7 +157,7 @@ void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
   }
 }
 
-// Adds far trees, of a few kinds, which make the horizon.
+// Adds distant trees of a few kinds, which form the horizon.
 void add_far_trees(SceneBuilder& builder, Point2 middle) {
   Random& random = builder.random();
   std::array<TreeKind, 6> kinds;
@@ -196,10 +197,10 @@ Scene make_garden(const SceneVariation& variation) {
   const FloorArea plot{{-1.0, -1.0}, {13.0, 11.0}};
   scene.tour = {{1.0, 1.0}, {11.0, 1.0}, {11.0, 9.0}, {1.0, 9.0}};
   add_trees_and_boxes(builder, plot);
-  const Colour plaster = tint(random, 0.4, 0.8, 0.2);
+  const Colour plaster = sample_colour(random, 0.4, 0.8, 0.2);
   const Footing house{{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)};
   add_house(builder, "house", house, {9.0, 6.0, 3.2}, plaster, {0.5F, 0.25F, 0.2F});
-  const Colour tar = tint(random, 0.15, 0.4, 0.2);
+  const Colour tar = sample_colour(random, 0.15, 0.4, 0.2);
   const Footing shed{{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)};
   add_house(builder, "shed", shed, {3.0, 2.2, 2.0}, builder.palette().wood, tar);
   add_far_trees(builder, middle);
@@ -217,45 +218,46 @@ Scene make_arena(const SceneVariation& variation) {
   scene.ambient = 0.5F;
   const int table =
       builder.add_textured_material(noise_texture(random, 128, {0.55F, 0.55F, 0.5F}, 0.06));
-  // A little above the floor of the lab, so that the two do not compete.
+  // The table is 2 mm above the floor of the lab, because coinciding surfaces would flicker.
   builder.add_floor(table, {-0.04, -0.04}, {1.44, 1.24}, 0.4, 0.002);
-  // The lab around the table, seen above the houses.
+  // The lab around the table is visible above the houses.
   const FloorArea lab{{-2.0, -2.0}, {3.4, 3.2}};
   furnish_room_shell(builder, lab, 2.2);
-  // One lamp stands to the side, so that houses have a bright and a dark face.
+  // One lamp is at the side, so that houses have a bright and a dark face.
   builder.add_lamp({random.uniform(-1.5, -0.5), random.uniform(-1.5, 2.7), 1.9}, 2.5F);
   builder.add_lamp({0.7, 0.6, 2.0}, 0.5F);
 
-  // A low wall around the town: painted, dark in places and bright in others.
+  // A low painted wall around the town has dark and bright parts.
   const std::array<Point2, 4> wall{Point2{-0.04, -0.04}, Point2{1.44, -0.04}, Point2{1.44, 1.24},
                                    Point2{-0.04, 1.24}};
   for (std::size_t i = 0; i < 4; ++i) {
     builder.add_wall("border " + std::to_string(i),
-                     builder.add_textured_material(
-                         noise_texture(random, 128, tint(random, 0.2, 0.75, 0.15), 0.35, 3.0)),
+                     builder.add_textured_material(noise_texture(
+                         random, 128, sample_colour(random, 0.2, 0.75, 0.15), 0.35, 3.0)),
                      wall[i], wall[(i + 1) % 4], 0.16, 1.0);
   }
-  // Two rows of three blocks with streets of 20 cm and more around each, one or two houses a block.
+  // The town has two rows of three blocks, with streets at least 20 cm wide, and one or two houses
+  // per block.
   const FloorArea plot{{0.0, 0.0}, {1.4, 1.2}};
   int number = 0;
   for (const double y : {0.38, 0.82}) {
     for (const double x : {0.3, 0.7, 1.1}) {
-      const Colour paint = tint(random, 0.15, 0.85, 0.3);
-      const Colour tiles = tint(random, 0.15, 0.5, 0.4);
+      const Colour paint = sample_colour(random, 0.15, 0.85, 0.3);
+      const Colour tiles = sample_colour(random, 0.15, 0.5, 0.4);
       const Footing block{
           {x + random.normal(0.0, 0.015), y + random.normal(0.0, 0.015)},
           random.uniform() < 0.5 ? random.normal(0.0, 0.12) : 1.57 + random.normal(0.0, 0.12)};
       const Footing footing = builder.place_movable(block, 0.1, plot);
-      const bool pair = random.uniform() < 0.4;
-      const double length = pair ? 0.085 : random.uniform(0.12, 0.18);
-      for (const double side : pair ? std::array{-0.05, 0.05} : std::array{0.0, 0.0}) {
+      const bool has_two_houses = random.uniform() < 0.4;
+      const double length = has_two_houses ? 0.085 : random.uniform(0.12, 0.18);
+      for (const double side : has_two_houses ? std::array{-0.05, 0.05} : std::array{0.0, 0.0}) {
         const Footing place{{footing.centre.x_m + side * std::cos(footing.turn_rad),
                              footing.centre.y_m + side * std::sin(footing.turn_rad)},
                             footing.turn_rad};
         const Colour plaster = vary_colour(random, paint);
         const Vector3 size{length, random.uniform(0.09, 0.14), random.uniform(0.1, 0.17)};
         add_house(builder, "house " + std::to_string(number++), place, size, plaster, tiles);
-        if (!pair) break;
+        if (!has_two_houses) break;
       }
     }
   }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr float unlimited_distance_m = std::numeric_limits<float>::infinity();
 
-// The calls that differ between the major versions.
+// Calls that differ between Embree's major versions.
 #if PANONAV_EMBREE_MAJOR >= 4
 void intersect_one(RTCScene scene, RTCRayHit* ray) {
   rtcIntersect1(scene, ray);
@@ -71,8 +71,8 @@ struct RayTracer::Handles {
 RayTracer::RayTracer(std::span<const Vertex> vertices, std::span<const Triangle> triangles,
                      const std::string& instructions)
     : handles_(std::make_unique<Handles>()) {
-  // One thread builds: the tree, and with it the order of equal hits, must not depend on the
-  // machine.
+  // Build in one thread, because the tree, and with it the choice among equal hits, must not depend
+  // on the machine.
   std::string config = "threads=1,set_affinity=0";
   if (!instructions.empty()) config += ",isa=" + instructions;
   handles_->device = rtcNewDevice(config.c_str());
@@ -81,7 +81,7 @@ RayTracer::RayTracer(std::span<const Vertex> vertices, std::span<const Triangle>
                 std::to_string(rtcGetDeviceError(nullptr)) + ")");
   }
   handles_->scene = rtcNewScene(handles_->device);
-  // Robust: rays through a shared edge must not slip between two triangles.
+  // Use robust mode, because rays through a shared edge must not pass between the two triangles.
   rtcSetSceneFlags(handles_->scene, RTC_SCENE_FLAG_ROBUST);
   if (!triangles.empty()) {
     RTCGeometry geometry = rtcNewGeometry(handles_->device, RTC_GEOMETRY_TYPE_TRIANGLE);

@@ -1,4 +1,4 @@
-// Scenes that are one room: office, lab, hall.
+// Scenes that consist of one room: office, lab and hall.
 
 #include <algorithm>
 #include <array>
@@ -16,12 +16,12 @@ namespace {
 
 constexpr double quarter_turn_rad = 0.5 * std::numbers::pi;
 
-// Numbers that stand for kinds of furniture in `furnish_row`.
+// Values of `kind` in `furnish_row` that select a desk and a shelf.
 constexpr double desk_kind = 0.15;
 constexpr double shelf_kind = 0.6;
 
-// Adds a row of furniture along a straight line, in random order and spacing, facing `turn_rad`. It
-// begins with things of `first_kind`, if it has a value.
+// Adds a row of furniture along a straight line, in random order and spacing, facing `turn_rad`.
+// The first piece is of `first_kind` if it has a value.
 void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string& name, Point2 from,
                  Point2 to, double turn_rad, std::optional<double> first_kind) {
   Random& random = builder.random();
@@ -32,7 +32,7 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
   int number = 0;
   double kind = random.uniform();
   while (along < length - 0.3) {
-    // Things of a kind stand together.
+    // The next piece often has the same kind as the last one.
     if (random.uniform() < 0.35) kind = random.uniform();
     if (number == 0 && first_kind) kind = *first_kind;
     const bool is_desk = kind < 0.3;
@@ -45,7 +45,7 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
     const Point2 at{from.x_m + ux * (along + 0.5 * width), from.y_m + uy * (along + 0.5 * width)};
     const std::string piece = name + " " + std::to_string(number++);
     const Footing planned{at, turn_rad + random.normal(0.0, 0.05)};
-    // Wardrobes are not movable.
+    // Wardrobes are never moved.
     const Footing footing =
         is_wardrobe ? planned : builder.place_movable(planned, 0.5 * width, room);
     if (is_desk) {
@@ -69,77 +69,77 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
   }
 }
 
-// First kind of furniture in the rows along the long walls; empty: any.
-struct RowBeginnings {
+// Kind of the first piece in the rows along the long walls; nullopt: random.
+struct FirstFurnitureKinds {
   std::optional<double> south{};
   std::optional<double> north{};
 };
 
-// Adds furniture along all four walls, `depth_m` from them.
+// Adds furniture along all four walls, at a distance of `depth_m`.
 void furnish_walls(SceneBuilder& builder, const FloorArea& room, double depth_m,
-                   const RowBeginnings& beginnings = {}) {
+                   const FirstFurnitureKinds& first_kinds = {}) {
   const Point2 a{room.low.x_m + depth_m, room.low.y_m + depth_m};
   const Point2 b{room.high.x_m - depth_m, room.low.y_m + depth_m};
   const Point2 c{room.high.x_m - depth_m, room.high.y_m - depth_m};
   const Point2 d{room.low.x_m + depth_m, room.high.y_m - depth_m};
-  furnish_row(builder, room, "south", a, b, 2.0 * quarter_turn_rad, beginnings.south);
+  furnish_row(builder, room, "south", a, b, 2.0 * quarter_turn_rad, first_kinds.south);
   furnish_row(builder, room, "east", b, c, -quarter_turn_rad, std::nullopt);
-  furnish_row(builder, room, "north", c, d, 0.0, beginnings.north);
+  furnish_row(builder, room, "north", c, d, 0.0, first_kinds.north);
   furnish_row(builder, room, "west", d, a, quarter_turn_rad, std::nullopt);
 }
 
-// Adds lamps of intensities from `weakest` to `strongest`.
+// Adds a grid of lamps with random intensities from `min_intensity` to `max_intensity`.
 void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, double spacing_m,
-               double weakest = 0.1, double strongest = 1.0) {
+               double min_intensity = 0.1, double max_intensity = 1.0) {
   const double width = room.high.x_m - room.low.x_m;
   const double depth = room.high.y_m - room.low.y_m;
   const int columns = std::max(1, static_cast<int>(width / spacing_m));
   const int rows = std::max(1, static_cast<int>(depth / spacing_m));
-  const int shine = builder.add_plain_material({0.98F, 0.98F, 0.95F}, 1.0F);
+  const int lamp_material = builder.add_plain_material({0.98F, 0.98F, 0.95F}, 1.0F);
   for (int i = 0; i < columns; ++i) {
     for (int j = 0; j < rows; ++j) {
       const Point2 at{room.low.x_m + (i + 0.5) * width / columns,
                       room.low.y_m + (j + 0.5) * depth / rows};
       builder.add_lamp({at.x_m, at.y_m, height_m - 0.2},
-                       static_cast<float>(builder.random().uniform(weakest, strongest)));
-      builder.add_box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.1},
+                       static_cast<float>(builder.random().uniform(min_intensity, max_intensity)));
+      builder.add_box("lamp", lamp_material, lamp_material, {at, 0.0}, {0.0, 0.0, height_m - 0.1},
                       {1.2, 0.25, 0.06});
     }
   }
 }
 
 // Materials of the walls of the periodic hall.
-struct PeriodicLook {
+struct PeriodicWallMaterials {
   int plaster, poster, door, stone;
   double height_m;
 };
 
-// Adds a wall that carries the same picture and pillar every 2 m; the first one has a door.
-void add_periodic_wall(SceneBuilder& builder, const PeriodicLook& look, std::size_t number,
-                       Point2 from, Point2 to) {
+// Adds a wall with the same picture and pillar every 2 m; wall 0 has a door instead of one picture.
+void add_periodic_wall(SceneBuilder& builder, const PeriodicWallMaterials& materials,
+                       std::size_t number, Point2 from, Point2 to) {
   const std::string wall = "wall " + std::to_string(number);
   const double length = distance(from, to);
   const auto on_line = [&](double along) {
     const double share = along / length;
     return Point2{from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m)};
   };
-  constexpr double pillar_m = 0.35;
-  double wall_from = 0.0;  // the wall runs from pillar to pillar
+  constexpr double pillar_width_m = 0.35;
+  double wall_from = 0.0;  // start of the next piece of wall, after a pillar
   for (double along = 0.5; along + 1.0 < length; along += 2.0) {
     const bool is_door = number == 0 && std::abs(along - 4.5) < 1e-9;
     if (is_door) {
-      builder.add_on_wall("door", look.door, from, to, along, 0.9, 0.0, 2.1);
+      builder.add_on_wall("door", materials.door, from, to, along, 0.9, 0.0, 2.1);
     } else {
-      builder.add_on_wall(wall + " picture", look.poster, from, to, along, 0.9, 0.6, 1.8);
+      builder.add_on_wall(wall + " picture", materials.poster, from, to, along, 0.9, 0.6, 1.8);
     }
     const double pillar = along + 1.45;
-    builder.add_box(wall + " pillar", look.stone, look.stone, {on_line(pillar), 0.0},
-                    {0.0, 0.0, 0.0}, {pillar_m, pillar_m, look.height_m}, 1.0);
-    builder.add_wall(wall, look.plaster, on_line(wall_from), on_line(pillar - 0.5 * pillar_m),
-                     look.height_m, 2.0);
-    wall_from = pillar + 0.5 * pillar_m;
+    builder.add_box(wall + " pillar", materials.stone, materials.stone, {on_line(pillar), 0.0},
+                    {0.0, 0.0, 0.0}, {pillar_width_m, pillar_width_m, materials.height_m}, 1.0);
+    builder.add_wall(wall, materials.plaster, on_line(wall_from),
+                     on_line(pillar - 0.5 * pillar_width_m), materials.height_m, 2.0);
+    wall_from = pillar + 0.5 * pillar_width_m;
   }
-  builder.add_wall(wall, look.plaster, on_line(wall_from), to, look.height_m, 2.0);
+  builder.add_wall(wall, materials.plaster, on_line(wall_from), to, materials.height_m, 2.0);
 }
 
 }  // namespace
@@ -154,7 +154,7 @@ Scene make_office(const SceneVariation& variation) {
   const FloorArea room{{-1.6, -1.5}, {6.6, 3.5}};
   constexpr double room_height_m = 2.6;
   furnish_room_shell(builder, room, room_height_m);
-  // So near to the walls that the chairs before the desks leave the 5 x 2 m free.
+  // The furniture is so near to the walls that chairs in front of desks leave the 5 x 2 m free.
   furnish_walls(builder, room, 0.5, {desk_kind, shelf_kind});
   add_lamps(builder, room, room_height_m, 2.5);
   scene.tour = {{0.3, 0.3}, {4.7, 0.3}, {4.7, 1.7}, {0.3, 1.7}};
@@ -194,21 +194,21 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
     scene.tour = {{0.5, 0.5}, {6.5, 0.5}, {6.5, 6.5}, {0.5, 6.5}};
     return builder.finish();
   }
-  // Every wall carries the same picture and pillar every 2 m; one clock and one door tell the walls
-  // apart.
-  const Colour joint = tint(random, 0.1, 0.4, 0.1);
-  const Colour tile = tint(random, 0.3, 0.6, 0.1);
+  // All walls have the same picture and pillar every 2 m; only one clock and one door distinguish
+  // them.
+  const Colour joint = sample_colour(random, 0.1, 0.4, 0.1);
+  const Colour tile = sample_colour(random, 0.3, 0.6, 0.1);
   builder.add_floor(builder.add_textured_material(brick_texture(random, 128, 2, 2, tile, joint)),
                     room.low, room.high, 1.0);
   builder.add_ceiling(builder.add_plain_material({0.85F, 0.85F, 0.83F}), room.low, room.high,
                       room_height_m, 1.0);
-  const int plaster =
-      builder.add_textured_material(noise_texture(random, 128, tint(random, 0.45, 0.8, 0.1), 0.05));
+  const int plaster = builder.add_textured_material(
+      noise_texture(random, 128, sample_colour(random, 0.45, 0.8, 0.1), 0.05));
   const int poster = builder.add_textured_material(poster_texture(random, 128));
-  const int door =
-      builder.add_textured_material(door_texture(random, 128, tint(random, 0.2, 0.6, 0.3)));
-  const int stone =
-      builder.add_textured_material(noise_texture(random, 128, tint(random, 0.15, 0.7, 0.1), 0.1));
+  const int door = builder.add_textured_material(
+      door_texture(random, 128, sample_colour(random, 0.2, 0.6, 0.3)));
+  const int stone = builder.add_textured_material(
+      noise_texture(random, 128, sample_colour(random, 0.15, 0.7, 0.1), 0.1));
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
                                       Point2{room.low.x_m, room.high.y_m}};
   for (std::size_t i = 0; i < 4; ++i) {

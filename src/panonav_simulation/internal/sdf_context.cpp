@@ -5,7 +5,7 @@
 namespace panonav::simulation {
 
 void SdfContext::warn(const std::string& object, const std::string& what) {
-  const auto [known, is_new] = warning_of_text_.try_emplace(what, warnings_.size());
+  const auto [known, is_new] = warning_index_by_text_.try_emplace(what, warnings_.size());
   if (is_new) warnings_.push_back({{}, what});
   Warning& warning = warnings_[known->second];
   ++warning.count;

@@ -15,14 +15,14 @@
 
 namespace panonav::simulation {
 
-/// Origin of a part of a world.
+/// File and model from which a part of a world comes.
 struct SdfOrigin {
-  std::filesystem::path directory;  ///< of its file
-  std::string object;  ///< the model at the top that it belongs to; empty in the world itself
+  std::filesystem::path directory;  ///< folder of its file
+  std::string object;               ///< its top-level model; empty in the world itself
 };
 
-/// State of the readers of one Gazebo world: the growing scene, its files and pictures, and
-/// the warnings, each once however often its cause occurs.
+/// Shared state of the readers of one Gazebo world: the scene built so far, files and textures, and
+/// the warnings, each stored once with its number of occurrences.
 class SdfContext {
  public:
   SdfContext(const std::filesystem::path& world, const GazeboOptions& options)
@@ -32,41 +32,42 @@ class SdfContext {
   TextureStore textures;
   GazeboFiles files;
 
-  /// Adds a warning that concerns the model `object`; "": the world itself.
+  /// Adds a warning about the model `object`; an empty `object` means the world itself.
   void warn(const std::string& object, const std::string& what);
 
   /// Returns the lines of all warnings, in the order of their first occurrence.
   [[nodiscard]] std::vector<std::string> warning_lines() const;
 
-  /// Finds the file that `uri` names, as GazeboFiles::resolve finds it; warns where only the case
-  /// of letters differs.
+  /// Finds the file that `uri` names, as GazeboFiles::resolve does; warns if the names differ in
+  /// the case of letters.
   std::optional<std::filesystem::path> find(std::string_view uri, const SdfOrigin& origin);
 
-  /// Calls `add`; what cannot be shown is left out with a warning, the rest of the world is read.
+  /// Calls `add` and turns its errors into a warning that the part `thing` is left out, so that the
+  /// rest of the world is still read.
   template <class Add>
   void try_to_add(const std::string& thing, const std::string& object, const Add& add) {
     try {
       add();
-    } catch (const Unusable& fault) {
+    } catch (const UnusablePart& fault) {
       warn(object, thing + " is left out: " + fault.why);
     } catch (const Error& error) {
       warn(object, thing + " is left out: " + to_readable_line(error.what()));
     }
-    while (texture_warnings_ < textures.warnings().size())
-      warn(object, to_readable_line(textures.warnings()[texture_warnings_++]));
+    while (copied_texture_warnings_ < textures.warnings().size())
+      warn(object, to_readable_line(textures.warnings()[copied_texture_warnings_++]));
   }
 
  private:
   struct Warning {
-    std::vector<std::string> objects;  // the models that it concerns; none for the world itself
+    std::vector<std::string> objects;  // models it is about; empty: the world itself
     std::string what;
     int count = 0;
   };
   static std::string to_line(const Warning& warning);
 
   std::vector<Warning> warnings_;
-  std::map<std::string, std::size_t> warning_of_text_;
-  std::size_t texture_warnings_ = 0;  // of those of the textures, how many are taken over
+  std::map<std::string, std::size_t> warning_index_by_text_;
+  std::size_t copied_texture_warnings_ = 0;  // texture warnings already copied to this list
 };
 
 }  // namespace panonav::simulation

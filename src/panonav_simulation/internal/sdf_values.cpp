@@ -10,8 +10,8 @@ namespace panonav::simulation {
 
 namespace {
 
-// Returns the quaternion w x y z of turns about x, y and z, in this order; `half` turns the unit of
-// the angles into half radians.
+// Returns the quaternion w x y z of rotations about x, then y, then z. `half` converts the unit of
+// the angles to half radians.
 std::array<double, 4> make_quaternion(double roll, double pitch, double yaw, double half) {
   const double cr = std::cos(roll * half);
   const double sr = std::sin(roll * half);
@@ -49,9 +49,9 @@ std::vector<double> read_size(pugi::xml_node shape, const char* name, std::size_
   if (text.empty() && otherwise) return std::vector<double>(count, *otherwise);
   auto numbers = parse_numbers(text);
   if (!numbers || numbers->size() != count) {
-    throw Unusable{"the " + std::string(name) + " of its " + to_readable_line(shape.name()) +
-                   " is not " +
-                   (count == 1 ? "a finite number" : std::to_string(count) + " finite numbers")};
+    throw UnusablePart{
+        "the " + std::string(name) + " of its " + to_readable_line(shape.name()) + " is not " +
+        (count == 1 ? "a finite number" : std::to_string(count) + " finite numbers")};
   }
   return *std::move(numbers);
 }
@@ -59,13 +59,13 @@ std::vector<double> read_size(pugi::xml_node shape, const char* name, std::size_
 std::vector<double> read_positive_size(pugi::xml_node shape, const char* name, std::size_t count) {
   auto numbers = read_size(shape, name, count);
   if (std::any_of(numbers.begin(), numbers.end(), [](double v) { return !(v > 0.0); })) {
-    throw Unusable{"the " + std::string(name) + " of its " + to_readable_line(shape.name()) +
-                   " is not above 0"};
+    throw UnusablePart{"the " + std::string(name) + " of its " + to_readable_line(shape.name()) +
+                       " is not above 0"};
   }
   return numbers;
 }
 
-pugi::xml_node pose_element(pugi::xml_node part) {
+pugi::xml_node find_pose_element(pugi::xml_node part) {
   const pugi::xml_node pose = part.child("pose");
   return pose ? pose : part.child("origin");
 }
@@ -80,14 +80,14 @@ Affine3 read_pose(pugi::xml_node pose) {
   const auto n = parse_numbers(text);
   if (n && n->empty()) return {};
   if (!n || n->size() != count)
-    throw Unusable{"its pose is not " + std::to_string(count) + " finite numbers"};
+    throw UnusablePart{"its pose is not " + std::to_string(count) + " finite numbers"};
   const auto& v = *n;
   const std::string_view degrees = pose.attribute("degrees").value();
   const double half = degrees == "true" || degrees == "1" ? std::numbers::pi / 360.0 : 0.5;
   const std::array<double, 4> q =
       is_quaternion ? std::array{v[6], v[3], v[4], v[5]} : make_quaternion(v[3], v[4], v[5], half);
   const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
-  if (!(length > 0.0) || !std::isfinite(length)) throw Unusable{"its pose has no rotation"};
+  if (!(length > 0.0) || !std::isfinite(length)) throw UnusablePart{"its pose has no rotation"};
   const double w = q[0] / length;
   const double x = q[1] / length;
   const double y = q[2] / length;
@@ -99,7 +99,7 @@ Affine3 read_pose(pugi::xml_node pose) {
 }
 
 std::string_view find_pose_frame(pugi::xml_node part) {
-  const pugi::xml_node pose = pose_element(part);
+  const pugi::xml_node pose = find_pose_element(part);
   const std::string_view frame = pose.attribute("relative_to").value();
   return frame.empty() ? pose.attribute("frame").value() : frame;
 }

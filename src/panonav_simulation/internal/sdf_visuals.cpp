@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns a frame whose z axis is the plane's normal.
+// Returns the rotation that turns the z axis to the plane's normal.
 Affine3 make_frame_along(const Vector3& normal) {
   const double length = std::hypot(normal.x_m, normal.y_m, normal.z_m);
   if (!(length > 0.0)) return {};
@@ -26,7 +26,7 @@ Affine3 make_frame_along(const Vector3& normal) {
   return {{x.x_m, y.x_m, z.x_m, x.y_m, y.y_m, z.y_m, x.z_m, y.z_m, z.z_m}, {}};
 }
 
-// Makes the mesh of a shape of SDF around its own origin; `nullopt` for an empty one. Throws
+// Makes the mesh of an SDF shape around its own origin; `nullopt` for an empty shape. Throws
 // Unusable.
 std::optional<Mesh> make_shape(pugi::xml_node shape) {
   const std::string_view kind = shape.name();
@@ -53,14 +53,14 @@ std::optional<Mesh> make_shape(pugi::xml_node shape) {
     return make_rectangle_mesh(size[0], size[1]);
   }
   if (kind == "empty") return std::nullopt;
-  throw Unusable{"panonav does not show a geometry of the kind " + quote(kind)};
+  throw UnusablePart{"panonav does not show a geometry of the kind " + quote(kind)};
 }
 
-// Returns the map that moves the middle of these parts to the origin.
+// Returns the translation that moves the centre of these parts to the origin.
 Affine3 make_centring_map(const std::vector<const FileMesh*>& parts) {
-  Scene together;
-  for (const FileMesh* part : parts) together.meshes.push_back(part->mesh);
-  const auto [low, high] = *extent(together);
+  Scene combined;
+  for (const FileMesh* part : parts) combined.meshes.push_back(part->mesh);
+  const auto [low, high] = *extent(combined);
   Affine3 shift;
   shift.translation = {-0.5 * (low.x_m + high.x_m), -0.5 * (low.y_m + high.y_m),
                        -0.5 * (low.z_m + high.z_m)};
@@ -108,14 +108,14 @@ void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
   if (uri.empty()) uri = child_text(shape, "filename");
   const auto path = context_.find(uri, origin);
   if (!path)
-    throw Unusable{"its mesh " + quote(uri) + " was not found in " + context_.files.places()};
+    throw UnusablePart{"its mesh " + quote(uri) + " was not found in " + context_.files.places()};
   const pugi::xml_node submesh = shape.child("submesh");
   const std::string name = child_text(submesh, "name");
   std::vector<const FileMesh*> shown;
   for (const FileMesh& part : meshes_.read(*path)) {
     if (name.empty() || part.node == name || part.geometry == name) shown.push_back(&part);
   }
-  if (shown.empty()) throw Unusable{path->string() + " has no part " + quote(name)};
+  if (shown.empty()) throw UnusablePart{path->string() + " has no part " + quote(name)};
   const auto scale = read_size(shape, "scale", 3, 1.0);
   Affine3 world_from_mesh = world_from_visual * Affine3::scaling(scale[0], scale[1], scale[2]);
   const std::string centre = child_text(submesh, "center");
@@ -127,7 +127,8 @@ void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
   }
 }
 
-// Models that stand there many times share their materials, unless the visual changes them.
+// Returns the index of the part's material. Visuals that show the same part share one material,
+// unless they change it.
 int SdfVisuals::get_or_add_material(const FileMesh& part, pugi::xml_node visual,
                                     const SdfOrigin& origin) {
   const bool is_shared = !visual.child("material");
@@ -142,16 +143,17 @@ int SdfVisuals::get_or_add_material(const FileMesh& part, pugi::xml_node visual,
 // Returns the material of a mesh, changed by the visual's <material>.
 Material SdfVisuals::apply_material(Material material, pugi::xml_node visual,
                                     const SdfOrigin& origin) {
-  const pugi::xml_node said = visual.child("material");
-  if (!said) return material;
-  if (const auto diffuse = read_colour(said, "diffuse")) {
+  const pugi::xml_node material_element = visual.child("material");
+  if (!material_element) return material;
+  if (const auto diffuse = read_colour(material_element, "diffuse")) {
     material.colour = *diffuse;
-  } else if (const auto ambient = read_colour(said, "ambient")) {
+  } else if (const auto ambient = read_colour(material_element, "ambient")) {
     material.colour = *ambient;
   }
-  if (const auto emissive = read_colour(said, "emissive")) set_emission(material, *emissive);
-  apply_script(material, said, origin);
-  for (const pugi::xml_node& workflow : said.child("pbr"))
+  if (const auto emissive = read_colour(material_element, "emissive"))
+    set_emission(material, *emissive);
+  apply_script(material, material_element, origin);
+  for (const pugi::xml_node& workflow : material_element.child("pbr"))
     set_texture(material, child_text(workflow, "albedo_map"), origin);
   return material;
 }
@@ -167,17 +169,19 @@ void SdfVisuals::set_texture(Material& material, const std::string& written,
   material.colour = {1.0F, 1.0F, 1.0F};
 }
 
-void SdfVisuals::apply_script(Material& material, pugi::xml_node said, const SdfOrigin& origin) {
-  const pugi::xml_node script = said.child("script");
+void SdfVisuals::apply_script(Material& material, pugi::xml_node material_element,
+                              const SdfOrigin& origin) {
+  const pugi::xml_node script = material_element.child("script");
   std::string name = child_text(script, "name");
-  if (name.empty()) name = child_text(said, "script");
+  if (name.empty()) name = child_text(material_element, "script");
   if (name.empty()) return;
   std::vector<fs::path> places;
-  for (const pugi::xml_node& uri : (script ? script : said).children("uri")) {
+  for (const pugi::xml_node& uri : (script ? script : material_element).children("uri")) {
     if (const auto found = context_.files.resolve(element_text(uri), origin.directory))
       places.push_back(found->path);
   }
-  // Models list the folders of their scripts and textures as several <uri>; they lie side by side.
+  // Models list the folders of scripts and textures as separate <uri> elements; the usual scripts
+  // folder is searched last.
   places.push_back(origin.directory / "materials/scripts");
   const auto known = find_script_material(name, places);
   if (!known) {

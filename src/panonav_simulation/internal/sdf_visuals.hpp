@@ -11,13 +11,13 @@ namespace panonav::simulation {
 /// Adds the visuals of a Gazebo world to its scene: shapes, mesh files and their materials.
 class SdfVisuals {
  public:
-  /// `context` outlives *this.
+  /// `context` must outlive this object.
   explicit SdfVisuals(SdfContext& context) : context_(context), meshes_(context.textures) {}
 
-  /// Adds the mesh and material of a <visual>. Throws Unusable, Error.
+  /// Adds the meshes and materials of a <visual>. Throws Unusable, Error.
   void add(pugi::xml_node visual, const Affine3& world_from_visual, const SdfOrigin& origin);
 
-  /// Numbers of the scene's meshes that are planes.
+  /// Returns the indices of the scene's meshes that are planes.
   [[nodiscard]] const std::vector<std::size_t>& planes() const { return planes_; }
 
  private:
@@ -28,7 +28,7 @@ class SdfVisuals {
   int get_or_add_material(const FileMesh& part, pugi::xml_node visual, const SdfOrigin& origin);
   Material apply_material(Material material, pugi::xml_node visual, const SdfOrigin& origin);
   void set_texture(Material& material, const std::string& written, const SdfOrigin& origin);
-  void apply_script(Material& material, pugi::xml_node said, const SdfOrigin& origin);
+  void apply_script(Material& material, pugi::xml_node material_element, const SdfOrigin& origin);
 
   SdfContext& context_;
   MeshLibrary meshes_;

@@ -7,7 +7,7 @@ namespace panonav::simulation {
 
 namespace {
 
-// Round shapes: 10 degrees a step keeps a radius of 1 m within 4 mm.
+// Sectors of round shapes: steps of 10 degrees are accurate to 4 mm at a radius of 1 m.
 constexpr int sectors = 36;
 
 void add_quad(Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
@@ -15,12 +15,13 @@ void add_quad(Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c, std
   mesh.triangles.push_back({a, c, d});
 }
 
-// A surface of revolution from rings of (radius, z), with the seam doubled for the texture.
+// A ring of a surface of revolution; its first vertex is repeated at the end, for the texture's
+// seam.
 struct Ring {
   double radius;
   double z;
 };
-Mesh revolve(const std::vector<Ring>& rings) {
+Mesh make_surface_of_revolution(const std::vector<Ring>& rings) {
   Mesh mesh;
   const auto last = static_cast<double>(rings.size() - 1);
   for (std::size_t r = 0; r < rings.size(); ++r) {
@@ -49,7 +50,7 @@ Mesh make_box_mesh(const Vector3& size_m) {
   const double x = 0.5 * size_m.x_m;
   const double y = 0.5 * size_m.y_m;
   const double z = 0.5 * size_m.z_m;
-  // Each face: lower left, lower right, upper right, upper left, as seen from outside.
+  // Corners of each face: lower left, lower right, upper right, upper left, viewed from outside.
   const std::array<std::array<Vector3, 4>, 6> faces{{
       {{{-x, -y, -z}, {x, -y, -z}, {x, -y, z}, {-x, -y, z}}},
       {{{x, y, -z}, {-x, y, -z}, {-x, y, z}, {x, y, z}}},
@@ -70,7 +71,7 @@ Mesh make_box_mesh(const Vector3& size_m) {
 
 Mesh make_cylinder_mesh(double radius_m, double length_m) {
   const double z = 0.5 * length_m;
-  return revolve({{0.0, -z}, {radius_m, -z}, {radius_m, z}, {0.0, z}});
+  return make_surface_of_revolution({{0.0, -z}, {radius_m, -z}, {radius_m, z}, {0.0, z}});
 }
 
 Mesh make_ellipsoid_mesh(const Vector3& radii_m) {
@@ -79,7 +80,7 @@ Mesh make_ellipsoid_mesh(const Vector3& radii_m) {
     const double polar = std::numbers::pi * (2.0 * i / sectors - 0.5);
     rings.push_back({std::cos(polar), std::sin(polar)});
   }
-  Mesh mesh = revolve(rings);
+  Mesh mesh = make_surface_of_revolution(rings);
   for (Vector3& v : mesh.vertices) {
     v = {v.x_m * radii_m.x_m, v.y_m * radii_m.y_m, v.z_m * radii_m.z_m};
   }
@@ -91,11 +92,11 @@ Mesh make_capsule_mesh(double radius_m, double length_m) {
   for (int i = 0; i <= sectors / 2; ++i) {
     const double polar = std::numbers::pi * (2.0 * i / sectors - 0.5);
     const Ring ring{radius_m * std::cos(polar), radius_m * std::sin(polar)};
-    // The ring of the equator stands twice, once at either end of the cylinder.
+    // The equator has two rings, one at each end of the cylinder.
     if (i <= sectors / 4) rings.push_back({ring.radius, ring.z - 0.5 * length_m});
     if (i >= sectors / 4) rings.push_back({ring.radius, ring.z + 0.5 * length_m});
   }
-  return revolve(rings);
+  return make_surface_of_revolution(rings);
 }
 
 Mesh make_rectangle_mesh(double size_x_m, double size_y_m) {

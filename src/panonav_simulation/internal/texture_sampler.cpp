@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::array<float, 3> grey_weights{0.299F, 0.587F, 0.114F};  // ITU-R BT.601
 
-float grey(const std::array<float, 3>& colour) {
+float compute_grey(const std::array<float, 3>& colour) {
   return grey_weights[0] * colour[0] + grey_weights[1] * colour[1] + grey_weights[2] * colour[2];
 }
 
@@ -17,7 +17,7 @@ float grey(const std::array<float, 3>& colour) {
 
 MaterialSampler::MaterialSampler(const Material& material, int channels)
     : channels_(channels), emission_(material.emission) {
-  const float grey_scale = grey(material.colour);
+  const float grey_scale = compute_grey(material.colour);
   scale_ =
       channels == 1 ? std::array<float, 3>{grey_scale, grey_scale, grey_scale} : material.colour;
   if (!material.texture) return;
@@ -33,31 +33,32 @@ MaterialSampler::MaterialSampler(const Material& material, int channels)
     if (channels == 3) {
       for (int c = 0; c < 3; ++c) base.texels[3 * i + c] = texel[image.channels() == 3 ? c : 0];
     } else if (grey_scale > 0.0F) {
-      // The colours are multiplied before they are turned to grey, as a camera would see them.
+      // Multiply by the material's colour before converting to grey, as a grey camera would measure
+      // it.
       for (int c = 0; c < 3; ++c) colour[c] *= material.colour[c];
-      base.texels[i] =
-          static_cast<std::uint8_t>(std::clamp(grey(colour) / grey_scale + 0.5F, 0.0F, 255.0F));
+      base.texels[i] = static_cast<std::uint8_t>(
+          std::clamp(compute_grey(colour) / grey_scale + 0.5F, 0.0F, 255.0F));
     }
   }
   max_side_ = static_cast<float>(std::max(base.width, base.height));
   levels_.push_back(std::move(base));
   while (levels_.back().width > 1 || levels_.back().height > 1) {
-    const Level& fine = levels_.back();
-    Level coarse{std::max(1, fine.width / 2), std::max(1, fine.height / 2), {}};
+    const Level& finer = levels_.back();
+    Level coarse{std::max(1, finer.width / 2), std::max(1, finer.height / 2), {}};
     coarse.texels.resize(static_cast<std::size_t>(coarse.width) * coarse.height * channels);
     for (int y = 0; y < coarse.height; ++y) {
-      // The last texel of an odd side joins its neighbour.
-      const int y0 = y * fine.height / coarse.height;
-      const int y1 = (y + 1) * fine.height / coarse.height;
+      // With an odd size the last texel is averaged with its neighbour.
+      const int y0 = y * finer.height / coarse.height;
+      const int y1 = (y + 1) * finer.height / coarse.height;
       for (int x = 0; x < coarse.width; ++x) {
-        const int x0 = x * fine.width / coarse.width;
-        const int x1 = (x + 1) * fine.width / coarse.width;
+        const int x0 = x * finer.width / coarse.width;
+        const int x1 = (x + 1) * finer.width / coarse.width;
         const unsigned count = static_cast<unsigned>((y1 - y0) * (x1 - x0));
         for (int c = 0; c < channels; ++c) {
           unsigned sum = 0;
           for (int v = y0; v < y1; ++v) {
             for (int u = x0; u < x1; ++u) {
-              sum += fine.texels[(static_cast<std::size_t>(v) * fine.width + u) * channels + c];
+              sum += finer.texels[(static_cast<std::size_t>(v) * finer.width + u) * channels + c];
             }
           }
           coarse.texels[(static_cast<std::size_t>(y) * coarse.width + x) * channels + c] =
@@ -69,15 +70,15 @@ MaterialSampler::MaterialSampler(const Material& material, int channels)
   }
 }
 
-void MaterialSampler::bilinear(const Level& level, float u, float v, float weight,
-                               float* values) const {
+void MaterialSampler::add_bilinear_sample(const Level& level, float u, float v, float weight,
+                                          float* values) const {
   const float x = u * static_cast<float>(level.width) - 0.5F;
   const float y = v * static_cast<float>(level.height) - 0.5F;
   const float x_floor = std::floor(x);
   const float y_floor = std::floor(y);
   const float fx = x - x_floor;
   const float fy = y - y_floor;
-  // u and v are in [0, 1], so the neighbours are at most one texel outside.
+  // u and v are in [0, 1], so the neighbours are at most one texel outside the texture.
   const auto wrap = [](int i, int n) { return i < 0 ? i + n : (i >= n ? i - n : i); };
   const int x0 = wrap(static_cast<int>(x_floor), level.width);
   const int y0 = wrap(static_cast<int>(y_floor), level.height);
@@ -105,18 +106,18 @@ void MaterialSampler::sample(float u, float v, float footprint, float* values) c
   }
   std::fill_n(values, channels_, 0.0F);
   u -= std::floor(u);
-  v = std::ceil(v) - v;  // texture coordinates run upwards, rows downwards
+  v = std::ceil(v) - v;  // v runs upwards, rows run downwards
   const float level = std::log2(std::max(1.0F, footprint * max_side_));
   const auto last = static_cast<float>(levels_.size() - 1);
   if (level <= 0.0F) {
-    bilinear(levels_.front(), u, v, 1.0F, values);
+    add_bilinear_sample(levels_.front(), u, v, 1.0F, values);
   } else if (level >= last) {
-    bilinear(levels_.back(), u, v, 1.0F, values);
+    add_bilinear_sample(levels_.back(), u, v, 1.0F, values);
   } else {
-    const auto fine = static_cast<std::size_t>(level);
-    const float fraction = level - static_cast<float>(fine);
-    bilinear(levels_[fine], u, v, 1.0F - fraction, values);
-    bilinear(levels_[fine + 1], u, v, fraction, values);
+    const auto finer = static_cast<std::size_t>(level);
+    const float fraction = level - static_cast<float>(finer);
+    add_bilinear_sample(levels_[finer], u, v, 1.0F - fraction, values);
+    add_bilinear_sample(levels_[finer + 1], u, v, fraction, values);
   }
 }
 

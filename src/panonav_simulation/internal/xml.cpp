@@ -12,12 +12,12 @@ namespace {
 
 constexpr std::string_view blanks = " \t\r\n";
 
-// Throws where a document is larger than those of worlds and meshes are.
+// Throws if a document is larger than any real world or mesh file.
 class SizeCheck final : public pugi::xml_tree_walker {
  public:
   bool for_each(pugi::xml_node& node) override {
-    constexpr int max_depth = 200;         // of elements; readers of worlds recurse as deep
-    constexpr int max_elements = 1000000;  // some 100 MB of nodes
+    constexpr int max_depth = 200;         // readers of worlds recurse as deeply
+    constexpr int max_elements = 1000000;  // about 100 MB of nodes
     if (node.type() != pugi::node_element) return true;
     if (depth() >= max_depth) throw Error("elements are nested more than 200 deep");
     if (++elements_ > max_elements) throw Error("has more than 1000000 elements");

@@ -21,7 +21,7 @@ std::string_view trim(std::string_view text) {
   return text;
 }
 
-// Empty when a quote is not closed or something follows it.
+// Splits a line; nullopt if a quote is not closed or text follows it.
 std::optional<std::vector<std::string>> split_fields(std::string_view line) {
   std::vector<std::string> fields;
   std::size_t i = 0;
@@ -57,7 +57,7 @@ std::optional<std::vector<std::string>> split_fields(std::string_view line) {
 CsvTable CsvTable::read(const std::filesystem::path& path) {
   const auto bytes = read_file(path, table_limit_bytes);
   std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  // A byte order mark is how some programs begin a table.
+  // Some programs begin tables with a byte order mark.
   if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
   CsvTable table;
   table.path_ = path;

@@ -8,29 +8,30 @@
 
 namespace panonav {
 
-/// A small table of text with a header line. Fields are separated by commas, may stand in double
-/// quotes, and are trimmed of blanks; empty lines and lines that start with # do not count.
+/// A small table of text with a header line. Fields are separated by commas, may be in double
+/// quotes, and are trimmed of blanks; empty lines and lines that begin with # are ignored.
 class CsvTable {
  public:
-  /// Throws FileError: missing, larger than 64 MB, no header, a row with another number of fields
-  /// than the header (with its line), a column name that stands twice.
+  /// Reads a table. Throws FileError if the file is missing or larger than 64 MB, has no header, a
+  /// row whose number of fields differs from the header, or two columns of one name.
   [[nodiscard]] static CsvTable read(const std::filesystem::path& path);
 
-  /// Lines that count, the header not among them.
+  /// Returns the number of rows without the header.
   [[nodiscard]] std::size_t rows() const noexcept { return cells_.size(); }
-  /// Names of the columns, in the order of the header.
+  /// Returns the names of the columns, in the order of the header.
   [[nodiscard]] const std::vector<std::string>& columns() const noexcept { return columns_; }
   /// True if the header names the column.
   [[nodiscard]] bool has(std::string_view column) const noexcept {
     return index(column).has_value();
   }
-  /// Throws FileError when there is no such column.
+  /// Returns the text of a field. Throws FileError if there is no such column.
   [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
-  /// Throws FileError that names line, column and value unless it is a finite number.
+  /// Returns the number in a field. Throws FileError that names line, column and value unless it is
+  /// finite.
   [[nodiscard]] double number(std::size_t row, std::string_view column) const;
-  /// The same for a coordinate in metres, which `is_position`.
+  /// Returns a coordinate in metres, and throws as `number`, also if it is no `is_position`.
   [[nodiscard]] double position(std::size_t row, std::string_view column) const;
-  /// Throws FileError: the field of this row is `found`, and what is allowed instead.
+  /// Throws FileError: the field of this row is `found`; it also names what is `allowed`.
   [[noreturn]] void fail(std::size_t row, std::string_view column, std::string_view found,
                          std::string_view allowed) const;
 

@@ -8,14 +8,15 @@
 #include "panonav/core/image.hpp"
 #include "panonav/io/image_file.hpp"
 
-/// The two codecs behind image_file.hpp, one file each, because their C headers do not mix.
+/// The codecs of image_file.hpp, in a source file each, because their C headers cannot be included
+/// together.
 namespace panonav::detail {
 
-/// Throws FileError unless a picture of this size may be read.
+/// Throws FileError if a picture of this size exceeds the limits.
 void check_image_size(ImageSize size, std::string_view name, const ImageLimits& limits);
 
-/// 1 .. 8 as in EXIF, from a block that begins with its byte order; 1, upright, where it says
-/// nothing that can be read.
+/// Returns the orientation, 1 .. 8, of an EXIF block that begins with its byte order; 1, which is
+/// upright, if it has none that can be read.
 [[nodiscard]] int exif_orientation(std::span<const std::uint8_t> exif);
 [[nodiscard]] ImageSize upright_size(ImageSize stored, int orientation);
 [[nodiscard]] Image upright(Image stored, int orientation);

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-// jpeglib.h needs the C types above it, jerror.h the settings of jpeglib.h.
+// The C headers must stay before jpeglib.h, and jpeglib.h before jerror.h.
 #include <jpeglib.h>
 
 #include <jerror.h>
@@ -20,7 +20,7 @@ namespace panonav::detail {
 namespace {
 
 // libjpeg would exit the program on an error; here it leaves the failed call by longjmp instead.
-// The functions that call it (`*_steps`) hold no object with a destructor.
+// Functions that call libjpeg (`*_steps`) must not hold objects with a destructor.
 
 struct Reader {
   jpeg_decompress_struct jpeg{};
@@ -41,8 +41,8 @@ struct Reader {
   std::longjmp(reader->on_failure, 1);
 }
 
-// libjpeg fills lost pixels with grey and only warns. A partly invented view must not pass for a
-// real one, so warnings of lost pixels count as damage; those of untidy headers do not.
+// libjpeg fills lost pixels with grey and only warns. An image with invented pixels must not be
+// used as a view, so warnings of lost pixels are errors; warnings of irregular headers are ignored.
 void on_message(j_common_ptr jpeg, int level) {
   if (level >= 0) return;
   switch (jpeg->err->msg_code) {
@@ -103,7 +103,7 @@ bool read_pixels(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
   throw FileError(name, std::string("damaged JPEG: ") + reader.message);
 }
 
-// The EXIF block: what an APP1 segment before the first scan holds behind its name.
+// Returns the EXIF block, which is in an APP1 segment before the first scan, after its name.
 std::span<const std::uint8_t> find_exif(std::span<const std::uint8_t> bytes) {
   constexpr std::uint8_t app1 = 0xE1;
   constexpr std::uint8_t start_of_scan = 0xDA;

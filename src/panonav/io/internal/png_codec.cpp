@@ -12,8 +12,8 @@ namespace panonav::detail {
 
 namespace {
 
-// libpng leaves a failed call by longjmp. The functions that call it (`*_steps`) hold no object
-// with a destructor; all that must be freed lives in the structs below, one frame further up.
+// libpng leaves a failed call by longjmp. Functions that call it (`*_steps`) must not hold objects
+// with a destructor; the structs below, in the calling function, free everything.
 
 constexpr std::size_t message_size = 160;
 
@@ -26,7 +26,7 @@ struct Reader {
   png_infop info = nullptr;
   const std::uint8_t* next = nullptr;
   std::size_t left = 0;
-  std::span<const std::uint8_t> exif;  // libpng's; empty: none before the pixels
+  std::span<const std::uint8_t> exif;  // memory of libpng; empty: none
   char message[message_size] = {};
   ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
 };
@@ -48,7 +48,8 @@ void on_read(png_structp png, png_bytep to, png_size_t count) {
 
 bool open_steps(Reader& reader, ImageSize& size) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
-  // The caller checks sizes, with its own message; ancillary chunks must not take much memory.
+  // Sizes are checked by the caller, which has a clearer message. Ancillary chunks must not take
+  // much memory.
   png_set_user_limits(reader.png, 0x7FFFFFFF, 0x7FFFFFFF);
   png_set_chunk_malloc_max(reader.png, 8U << 20U);
   png_set_chunk_cache_max(reader.png, 64);
@@ -66,7 +67,7 @@ bool open_steps(Reader& reader, ImageSize& size) {
   return true;
 }
 
-// Asks for 8 bit grey or RGB and tells how many channels that is.
+// Requests 8-bit grey or RGB, and sets `channels` to their number.
 bool set_transforms(Reader& reader, int& channels) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_set_scale_16(reader.png);
@@ -81,7 +82,7 @@ bool set_transforms(Reader& reader, int& channels) {
 bool read_pixels(Reader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
-  // Also reads the end of the file: an image without its end was cut short.
+  // Reads the end of the file, too, because without it the image was cut short.
   png_read_end(reader.png, nullptr);
   return true;
 }
@@ -90,7 +91,8 @@ bool read_pixels(Reader& reader, png_bytepp rows) {
   throw FileError(name, std::string("damaged PNG: ") + reader.message);
 }
 
-// libpng takes the memory of some chunks before it reads them, up to 2 GB whatever its limits are.
+// True if no chunk is longer than the file. libpng allocates memory for some chunks before it reads
+// them, up to 2 GB whatever its limits are.
 bool has_complete_chunks(std::span<const std::uint8_t> bytes) {
   constexpr std::size_t around = 12;  // length, name and checksum
   std::size_t at = 8;
@@ -131,7 +133,7 @@ struct Writer {
   png_longjmp(png, 1);
 }
 
-// False when memory ran out: an exception must not pass through libpng.
+// Returns false if memory ran out, because no exception may pass through libpng.
 bool keep_bytes(Writer& writer, const std::uint8_t* from, std::size_t count) noexcept {
   try {
     writer.bytes.insert(writer.bytes.end(), from, from + count);
@@ -177,8 +179,8 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
                  const ImageLimits& limits) {
   Reader reader;
   const ImageSize size = open(reader, bytes, name, limits);
-  // Deflate packs at most 1032 to 1: a larger picture cannot be in this file, so take no memory for
-  // it.
+  // Deflate packs at most 1032 to 1, so a larger picture cannot be in this file; no memory is
+  // allocated for it.
   const auto min_bits = static_cast<std::int64_t>(size.width) * size.height;
   if (min_bits / 8 / 1032 > static_cast<std::int64_t>(bytes.size())) {
     throw FileError(name, "damaged PNG: the file ends too early");

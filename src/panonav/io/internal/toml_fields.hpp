@@ -18,11 +18,11 @@ using TomlTable = std::vector<TomlField>;
 
 /// The value of a field.
 struct TomlValue {
-  /// Dates and times are monostate: nothing here uses them.
+  /// monostate stands for dates and times, which we do not use.
   std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<TomlValue>,
                TomlTable>
       content;
-  std::string shown;  ///< as an error message shows it: one line, not long
+  std::string shown;  ///< for error messages: one short line
 };
 
 /// A field of a table.
@@ -31,37 +31,38 @@ struct TomlField {
   TomlValue value;   ///< a number, a text, a list, a table and so on
 };
 
-/// Parses the file. Throws FileError with the line: missing, larger than 1 MB, not TOML, or TOML
-/// that no file of ours needs: values nested more than 16 deep, a line with more than 100 dots.
+/// Parses a file. Throws FileError with the line if it is missing, larger than 1 MB or not TOML,
+/// has values nested more than 16 deep or a line with more than 100 dots; our files need none of
+/// that.
 [[nodiscard]] TomlTable read_toml(const std::filesystem::path& path);
 
-/// Reads one table of a file, with one clear line for everything that is wrong. Remembers which
-/// fields were read, so that `finish` can refuse the others: a misspelt field would otherwise be
-/// silently ignored. The table must outlive it.
+/// Reads the fields of one table of a file, and throws FileError of one clear line for any fault.
+/// It remembers which fields were read, so that `finish` can refuse all others; otherwise a
+/// misspelt field would be ignored silently. The table must outlive this object.
 class TomlFields {
  public:
-  /// `section` is its name for messages; empty for the top level.
+  /// `section` is the name of the table in messages; empty for the top level.
   TomlFields(std::filesystem::path path, std::string section, const TomlTable& table);
 
-  /// Returns a number; nullopt when the field is absent. Throws FileError on another type.
+  /// Returns a number; nullopt if the field is absent. Throws FileError on another type.
   std::optional<double> number(std::string_view field);
   /// Returns a whole number; reals are refused.
   std::optional<std::int64_t> integer(std::string_view field);
   std::optional<bool> boolean(std::string_view field);      ///< true or false.
   std::optional<std::string> text(std::string_view field);  ///< A text in quotation marks.
-  /// A list of finite numbers; whole ones are taken as reals.
+  /// Returns a list of finite numbers; whole numbers are converted to reals.
   std::optional<std::vector<double>> numbers(std::string_view field);
-  /// A table within this one; its own `finish` is the caller's to call.
+  /// Returns a table within this one; the caller must call its `finish`.
   std::optional<TomlFields> section(std::string_view field);
   /// Returns the number; throws FileError if it is absent.
   double required_number(std::string_view field);
   /// Returns the text; throws FileError with `allowed` if it is absent.
   std::string required_text(std::string_view field, std::string_view allowed);
-  /// Index into `choices`; empty when absent.
+  /// Returns the index of the field's text in `choices`; nullopt if the field is absent.
   std::optional<std::size_t> choice(std::string_view field,
                                     std::span<const std::string_view> choices);
 
-  /// Throws FileError: the field of this table is `found`, and what is allowed instead.
+  /// Throws FileError: the field of this table is `found`; it also names what is `allowed`.
   [[noreturn]] void fail(std::string_view field, std::string_view found,
                          std::string_view allowed) const;
   /// Throws FileError if the table has a field that was never read.

@@ -14,16 +14,16 @@ struct GridCell {
   friend bool operator==(const GridCell&, const GridCell&) = default;
 };
 
-/// Returns the largest integer not above `cells`, within -limit .. limit: positions beyond any map,
-/// and no number, fall into the outermost cell.
+/// Returns floor(`cells`), limited to -limit .. limit. Positions beyond any map and NaN get an
+/// outermost cell.
 [[nodiscard]] inline std::int32_t cell_index(double cells, double limit) noexcept {
   const double far = cells < limit ? (cells > -limit ? cells : -limit) : limit;
   const auto towards_zero = static_cast<std::int32_t>(far);  // faster than floor
   return towards_zero - (static_cast<double>(towards_zero) > far ? 1 : 0);
 }
 
-/// The occupied cells of a grid, numbered from 0 in the order in which they were added. Open
-/// addressing, as it is searched for each particle.
+/// Hash table of the occupied cells of a grid, numbered from 0 in the order in which they were
+/// added. Uses open addressing for speed, as it is searched for each particle.
 class CellTable {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return cells_.size(); }
@@ -32,7 +32,7 @@ class CellTable {
     const std::uint32_t number = slots_[slot_of(cell)];
     return number == none ? std::nullopt : std::optional(number);
   }
-  /// Returns the number of the cell; adds it when it is not there.
+  /// Returns the number of the cell; adds the cell if it is missing.
   std::uint32_t find_or_add(GridCell cell) {
     const std::size_t slot = slot_of(cell);
     if (slots_[slot] != none) return slots_[slot];
@@ -49,7 +49,7 @@ class CellTable {
  private:
   static constexpr std::uint32_t none = 0xFFFFFFFF;
 
-  /// Returns the slot of the cell, or the one where it would be.
+  /// Returns the slot of the cell, or the free slot where it would be inserted.
   [[nodiscard]] std::size_t slot_of(GridCell cell) const noexcept {
     std::uint64_t hash = static_cast<std::uint32_t>(cell.x) * 0x9E3779B97F4A7C15ULL;
     hash = (hash ^ static_cast<std::uint32_t>(cell.y)) * 0xBF58476D1CE4E5B9ULL;
@@ -60,7 +60,7 @@ class CellTable {
     return slot;
   }
 
-  std::vector<std::uint32_t> slots_ = std::vector(64, none);  ///< a power of two, half of it empty
+  std::vector<std::uint32_t> slots_ = std::vector(64, none);  ///< 2^n, at least half empty
   std::vector<GridCell> cells_;
 };
 

@@ -10,11 +10,11 @@
 
 namespace panonav {
 
-/// The views of a memory as a particle filter uses them: all positions, and for each image a search
-/// and the column profiles of some views. They may be held or lie elsewhere.
+/// Gives a particle filter access to the views of a memory: all positions and, for each image, a
+/// search and the column profiles of some views. The views may be held in RAM or in storage.
 class ComparedViews {
  public:
-  /// Called with the index of a view in the list that was asked for.
+  /// Callback that receives the profiles of a view and its index in the list of requested views.
   using TakeProfiles = std::function<void(std::size_t, ColumnProfiles&&)>;
 
   virtual ~ComparedViews() = default;
@@ -25,9 +25,9 @@ class ComparedViews {
   [[nodiscard]] virtual std::vector<PosedView> posed_views() = 0;
   /// Returns the most similar views, at most `count`.
   [[nodiscard]] virtual std::vector<Match> search(const PackedSignature& view, int count) = 0;
-  /// Passes the profiles of those views that exist.
+  /// Passes the column profiles of each of these views that exists to `take`.
   virtual void load(std::span<const ViewId> views, const TakeProfiles& take) = 0;
-  /// Ends the work with one image; the next one sees what others changed meanwhile.
+  /// Ends the work with one image; changes by other users become visible at the next image.
   virtual void release() {}
 };
 
@@ -35,7 +35,7 @@ class ComparedViews {
 [[nodiscard]] std::unique_ptr<ComparedViews> make_compared_views(
     std::shared_ptr<const ColumnRanking> ranking);
 
-/// Returns views of an index that `open_index` opens for each image.
+/// Makes views that are read through an index, which `open_index` opens for each image.
 [[nodiscard]] std::unique_ptr<ComparedViews> make_compared_views(
     std::function<std::unique_ptr<ViewIndex>()> open_index, SignatureShape shape);
 

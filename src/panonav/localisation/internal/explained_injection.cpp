@@ -11,17 +11,17 @@ namespace panonav {
 
 namespace {
 
-/// Smallest weight of new particles, in particles: below half of one none is drawn.
+/// Smallest total weight of new particles, in units of one particle; below it none are drawn.
 constexpr double min_injected_particles = 0.5;
-/// Share of the particles that are replaced, as a multiple of the new particles' weight: a tenth of
-/// the old ones stays where they have no weight left.
+/// Share of particles replaced per unit of the new particles' weight. Below 1, so that a tenth of
+/// the old particles remains even if all weight is new.
 constexpr double replaced_share_factor = 0.9;
-/// Smallest such share: 250 of 5000 particles cover the places that explain a view.
+/// Smallest share of particles replaced: 250 of 5000 cover the places that explain a view.
 constexpr double min_replaced_share = 0.05;
-/// Log-likelihood by which a drawn particle may be less likely than the best place; below it all
-/// weigh alike, 1 : 8000, so that none vanishes.
+/// Largest loss of log-likelihood of a drawn particle relative to the best candidate; larger losses
+/// are clamped (1 : 8000), so that no weight vanishes.
 constexpr double max_log_loss = 9.0;
-/// Larger log-likelihood ratios decide alone; keeps exponentials finite.
+/// Limit of the log odds that keeps exponentials finite; larger values are certain anyway.
 constexpr double max_log_odds = 50.0;
 
 double sum_values(const std::vector<double>& values) {
@@ -30,7 +30,7 @@ double sum_values(const std::vector<double>& values) {
   return sum;
 }
 
-/// Returns the numbers of the `count` lightest particles, in no order.
+/// Returns the indices of the `count` lightest particles, unordered.
 std::vector<std::size_t> find_lightest(const Particles& particles, std::size_t count) {
   std::vector<std::size_t> order(particles.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -66,7 +66,7 @@ bool ExplainedInjection::find_places(const Particles& particles, Random& random)
   likelihood_->compute_log_ratios(poses, likelihoods_);
   log_largest_ = std::max(0.0, *std::ranges::max_element(likelihoods_));
   for (double& value : likelihoods_) value = std::exp(value - log_largest_);
-  // The view is unexplained at all other positions and headings.
+  // At all other positions and headings the likelihood is that of an unexplained view.
   const double share = heading_share_ / static_cast<double>(sites.size());
   const double unexplained = std::max(0.0, 1.0 - share * static_cast<double>(likelihoods_.size()));
   log_evidence_ = log_largest_ + std::log(share * sum_values(likelihoods_) +

@@ -13,12 +13,12 @@ namespace panonav {
 
 namespace {
 
-/// Spacings within which references are neighbours on a grid, diagonal ones included.
+/// Largest distance of neighbours on a grid in spacings, diagonal ones included.
 constexpr double adjacent_spacings = 1.5;
-/// Rounding of the half circle that a straight edge leaves free around the nearest reference.
+/// Tolerance for rounding: a reference on a straight edge of the map has an empty half circle.
 constexpr double edge_tolerance_rad = radians(1.0);
 
-// Differences are means of roots; their squares grow with the distance.
+// Column differences are means of square roots, so their squares grow with distance.
 double squared(double difference) {
   return difference * difference;
 }
@@ -102,7 +102,8 @@ KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double
       matrix(i, j) = variogram(near.between(a, static_cast<Eigen::Index>(result.used[j])));
     }
   }
-  // The solution of least norm: references with equal signatures share their weight.
+  // Takes the solution of smallest norm, so that references with equal signatures share their
+  // weight.
   const Eigen::VectorXd solution = matrix.completeOrthogonalDecomposition().solve(right);
   double total = 0.0;
   for (Eigen::Index i = 0; i < size; ++i) total += solution(i);
@@ -113,8 +114,8 @@ KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double
     result.position = {result.position.x_m + weight * p.x_m, result.position.y_m + weight * p.y_m};
   }
   result.variance = std::max(0.0, solution.dot(right));
-  // dissimilarity^exponent above 1 need not be a valid variogram for the L1 distance; where it is
-  // not, the solution can leave the neighbourhood, which no position between references does.
+  // With an exponent above 1 the variogram may be invalid for the L1 distance. The solution can
+  // then leave the neighbourhood; the position of the best match replaces it.
   if (!(distance(result.position, near.positions[0]) <= neighbourhood_m)) {
     result.position = near.positions[0];
     result.used = {0};

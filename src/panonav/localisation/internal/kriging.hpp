@@ -10,38 +10,40 @@
 
 namespace panonav {
 
-/// Share of the typical kriging variance that remains where the query equals a reference: noise of
-/// the sensor. Chosen by tests/localisation/position_model_test.cpp, where the radius holds 95 %.
+/// Share of the typical kriging variance that remains if the query equals a reference: sensor
+/// noise. Chosen so that the radius contains 95 % of the positions in
+/// tests/localisation/position_model_test.cpp.
 inline constexpr double min_variance_share = 0.1;
-/// Spacings of the references beyond which a place is elsewhere: farther than the neighbours of a
-/// place on a grid.
+/// Distance in spacings beyond which two places are unrelated: farther than the neighbours on a
+/// grid.
 inline constexpr double elsewhere_spacings = 3.0;
 
 /// Posed views that resemble a query, the best match first.
 struct ResemblingViews {
   std::vector<ViewId> views;
   std::vector<Point2> positions;
-  Eigen::VectorXd to_query;  ///< squared differences of columns
-  /// Similarities between the views: (i, j) compares query j with reference i. Comparing columns is
-  /// not quite symmetric; in this order the answer to view j is view j.
+  Eigen::VectorXd to_query;  ///< squared column differences between the query and each view
+  /// Squared column differences between the views: (i, j) compares view j as query with reference
+  /// i. The comparison is not quite symmetric; in this order, a query equal to view j gets the
+  /// position of view j.
   Eigen::MatrixXd between;
 };
 /// Compares the first `PositionModel::candidates` posed views of the matches with each other.
 [[nodiscard]] ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
                                                       std::span<const RankedMatch> matches);
 
-/// Returns the best match's difference over that of the best match elsewhere; 0 where there is
-/// none.
+/// Returns the best match's difference divided by that of the best match elsewhere
+/// (`elsewhere_spacings`); 0 if there is no match elsewhere.
 [[nodiscard]] double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m);
-/// True if similar references stand all around the nearest one.
+/// True if neighbouring references surround the best match, without an empty half circle.
 [[nodiscard]] bool is_surrounded(const ResemblingViews& near, double spacing_m);
 
 /// A position by ordinary kriging.
 struct KrigedPosition {
   Point2 position;
   double variance = 0.0;          ///< in units of the variogram
-  std::vector<std::size_t> used;  ///< numbers of the resembling views
-  std::vector<double> weights;    ///< of these
+  std::vector<std::size_t> used;  ///< indices of the interpolated resembling views
+  std::vector<double> weights;    ///< of the `used` views; sum to 1
 };
 /// Interpolates over the views within `neighbourhood_m` of the best match; the variogram is the
 /// squared difference over `unit`, to the power of `exponent`.

@@ -15,7 +15,7 @@ namespace panonav {
 
 namespace {
 
-/// Bins beside the heaviest one that belong to its mode, in each direction.
+/// Number of bins on each side of the heaviest one that belong to its mode.
 constexpr int mode_reach = 2;
 
 struct Bin {
@@ -25,7 +25,8 @@ struct Bin {
   int mode;
 };
 
-/// Sums over one mode relative to an anchor, so that no digits are lost far from the origin.
+/// Weighted sums over the particles of a mode, relative to the first one, so that precision is not
+/// lost far from the origin.
 struct Moments {
   Pose2 anchor;
   bool anchored = false;
@@ -87,7 +88,7 @@ class BinTable {
     return bin == none ? std::nullopt : std::optional(bin);
   }
   std::uint32_t find_or_add(GridCell place, std::int32_t heading) {
-    // Usually it is the cell of the particle before.
+    // Successive particles are usually in the same cell, so the last cell is tried first.
     if (cells_.size() == 0 || cells_[last_] != place) {
       last_ = cells_.find_or_add(place);
       bin_of_.resize(cells_.size() * headings_, none);
@@ -110,12 +111,13 @@ class BinTable {
   std::uint32_t last_ = 0;
 };
 
-// Returns the index of a bin; beyond any map, and for no number, the outermost one.
+// Returns the index of a bin; positions beyond any map and NaN get an outermost one.
 std::int32_t bin_index(double cells) {
   return cell_index(cells, 1e9);
 }
 
-/// Counts the particles in bins; returns the bin of each and sets the sum of the weights.
+/// Adds the particles' weights to their bins. Returns the bin of each particle and sets `sum` to
+/// the total weight.
 std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins& bins,
                                      BinTable& table, double& sum) {
   std::vector<std::uint32_t> bin_of(particles.size());
@@ -135,7 +137,7 @@ std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins&
   return bin_of;
 }
 
-/// Assigns the bins around the seed that belong to no mode yet to `mode`; returns their weight.
+/// Assigns the bins around `seed` that do not yet belong to a mode to `mode`; returns their weight.
 double gather_mode(BinTable& table, const PoseBins& bins, std::uint32_t seed, int mode) {
   const std::span<Bin> cells = table.bins();
   double weight = 0.0;
@@ -155,8 +157,8 @@ double gather_mode(BinTable& table, const PoseBins& bins, std::uint32_t seed, in
   return weight;
 }
 
-/// Gathers modes around the heaviest bins, the heaviest first, as long as one may have at least
-/// `min_weight`; returns their weights.
+/// Gathers modes around the bins in descending order of weight, until no further mode can have the
+/// weight `min_weight`. Returns the modes' weights.
 std::vector<double> gather_modes(BinTable& table, const PoseBins& bins, double min_weight) {
   const std::span<Bin> cells = table.bins();
   std::vector<std::uint32_t> order(cells.size());
@@ -168,7 +170,8 @@ std::vector<double> gather_modes(BinTable& table, const PoseBins& bins, double m
   std::vector<double> weights;
   for (const std::uint32_t seed : order) {
     if (cells[seed].mode >= 0) continue;
-    // No later mode can be heavier than all its bins at this weight.
+    // An upper bound of the weight of all later modes: each of their bins weighs at most as much as
+    // this one.
     constexpr double max_bins = (2 * mode_reach + 1) * (2 * mode_reach + 1) * (2 * mode_reach + 1);
     if (cells[seed].weight * max_bins < min_weight) break;
     weights.push_back(gather_mode(table, bins, seed, static_cast<int>(weights.size())));
@@ -176,7 +179,8 @@ std::vector<double> gather_modes(BinTable& table, const PoseBins& bins, double m
   return weights;
 }
 
-/// Numbers the modes by their weight, without those below `min_weight`. Returns how many are left.
+/// Renumbers the modes in descending order of weight and drops those below `min_weight`. Returns
+/// the number of modes left.
 std::size_t renumber_by_weight(std::span<Bin> cells, const std::vector<double>& weights,
                                double min_weight) {
   std::vector<int> by_weight;
@@ -226,7 +230,7 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
 
 double position_spread_m(const Particles& particles) {
   if (particles.empty()) return 0.0;
-  // Relative to the first, so that no digits are lost far from the origin.
+  // Sums relative to the first particle, so that precision is not lost far from the origin.
   const Point2 anchor = particles.position(0);
   double weight = 0.0;
   double first_x = 0.0;

@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-/// Particles at a time, so that all data stay in the first-level cache.
+/// Number of particles moved together; their data fit into the first-level cache.
 constexpr std::size_t block_size = 128;
 using Numbers = std::array<double, block_size>;
 

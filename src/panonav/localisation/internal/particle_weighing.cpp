@@ -10,24 +10,26 @@ namespace panonav {
 
 namespace {
 
-/// Stages of one view; the last one takes all that is left of it. Chosen by the rooms of
-/// tests/localisation/monte_carlo_test.cpp, where no view needs more.
+/// Largest number of stages of one view; the last stage uses the rest of the exponent. Chosen by
+/// the rooms of tests/localisation/monte_carlo_test.cpp, where no view needs more.
 constexpr int max_stages = 6;
-/// Effective sample size below which a stage stops: particles that represent one mode in three
-/// dimensions, the default of `MonteCarloOptions::min_particles`; a third of few particles.
+/// Smallest effective sample size after a stage: the number of particles that represent one mode in
+/// three dimensions (default of `MonteCarloOptions::min_particles`), or a third of the particles if
+/// they are few.
 constexpr double min_effective_sample_size = 200.0;
 constexpr double min_effective_share = 1.0 / 3.0;
-/// Halvings in the search for a stage's exponent: it is found to 1/64 of what is left.
+/// Number of bisections in the search for a stage's exponent: accurate to 1/64 of the rest.
 constexpr int exponent_halvings = 6;
 /// Smallest share of the remaining exponent that a stage takes: the resolution of the search.
 constexpr double min_exponent_share = 1.0 / 64.0;
-/// A rest of the exponent below it is rounding.
+/// A smaller rest of the exponent is due to rounding.
 constexpr double exponent_tolerance = 1e-9;
-/// Sum of weights below which no particle explains the view: the smallest exponential of the kernel
-/// is 1e-38.
+/// Smallest sum of weights; below it no particle explains the view. The kernel's smallest
+/// exponential is 1e-38.
 constexpr double min_weight_sum = 1e-37;
-/// Smallest exponent at which the stages estimate a view's likelihood better than the first
-/// particles, which may all miss a narrow maximum; below it the estimate is extrapolated fivefold.
+/// Smallest exponent at which the evidence of the stages is used, extrapolated at most fivefold.
+/// The evidence of the first particles alone may be too small, if all of them miss a narrow
+/// maximum.
 constexpr double min_evidence_exponent = 0.2;
 
 }  // namespace

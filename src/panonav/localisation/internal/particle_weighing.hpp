@@ -8,15 +8,17 @@
 
 namespace panonav {
 
-/// Weighs particles by views, in stages if one stage would keep only few of them: after each stage
-/// they are resampled and spread (progressive correction of a regularised particle filter; Musso,
-/// Oudjane and Le Gland 2001). Reuses its buffers from view to view.
+/// Weights particles by views, in several stages if a single one would leave only few effective
+/// particles: after each stage they are resampled and spread (progressive correction of a
+/// regularised particle filter; Musso, Oudjane and Le Gland 2001). Reuses its buffers from view to
+/// view.
 class ParticleWeighing {
  public:
   /// Multiplies the weights by the likelihood of the view of `likelihood`, to the power of
   /// `exponent`, > 0 and <= 1, and normalises them. Returns the logarithm of the mean likelihood
-  /// over that of an unexplained view. The particles must be arranged (`ViewLikelihood::arrange`).
-  /// `bins`: of the modes within which they are spread.
+  /// relative to an unexplained view. The particles must be ordered by
+  /// `ViewLikelihood::arrange`. `bins`: grid of the modes within which particles are
+  /// spread.
   double weigh(Particles& particles, ViewLikelihood& likelihood, double exponent,
                const PoseBins& bins, Random& random);
 
@@ -26,7 +28,7 @@ class ParticleWeighing {
     double weights = 0.0;
     double squares = 0.0;
   };
-  /// Computes the log-likelihoods at the particles; returns the largest of them.
+  /// Computes the log-likelihoods at the particles; returns the largest one.
   double update_log_ratios(const Particles& particles, ViewLikelihood& likelihood);
   /// Computes the factors by which the likelihood to the power of `exponent` multiplies the
   /// weights.

@@ -9,14 +9,14 @@ namespace panonav {
 
 namespace {
 
-/// Standard deviation of the position of new particles in spacings of the references: of each
-/// coordinate 79 % lie in the square of the grid that the reference represents.
+/// Standard deviation of new particles' positions in spacings; 79 % of the values of a coordinate
+/// lie in the grid square of the reference.
 constexpr double position_deviation_spacings = 0.4;
-/// Standard deviation of their heading, over the width of the headings that explain a view: nearly
-/// all new particles lie within it.
+/// Standard deviation of new particles' headings as a share of `heading_width_rad`, so that nearly
+/// all are within the width.
 constexpr double heading_deviation_widths = 0.25;
 
-/// Returns the heading of a random particle, for new ones where no compass gives it.
+/// Returns the heading of a random particle, for new particles without a heading by the compass.
 double borrow_heading(const Particles& particles, Random& random) {
   return particles.heading_rad[random.index(particles.size())];
 }

@@ -9,32 +9,32 @@
 
 namespace panonav {
 
-/// Draws poses for new particles at the references that a view was compared with.
+/// Draws poses of new particles near the references to which a view was compared.
 class PoseSampler {
  public:
-  /// All must outlive *this. `compass`: the visual compass gives headings.
+  /// `likelihood` and `model` must outlive *this. `compass`: headings come from the visual compass.
   PoseSampler(const ViewLikelihood& likelihood, const ObservationModel& model, bool compass)
       : likelihood_(&likelihood), model_(&model), compass_(compass) {}
 
-  /// A site in one of the two headings that fit there.
+  /// A site together with one of the two robot headings that fit best there.
   struct Candidate {
     std::uint32_t site;
     bool second_heading;
   };
   /// True if the compass gives the heading of the robot at the site.
   [[nodiscard]] bool has_heading(std::uint32_t site) const;
-  /// Returns the position of the site with the heading of the compass, else with that of a random
-  /// particle.
+  /// Returns the site's position with the heading by the compass, or that of a random particle if
+  /// the compass gives none.
   [[nodiscard]] Pose2 make_pose_at(Candidate candidate, const Particles& particles,
                                    Random& random) const;
-  /// Samples a pose around the candidate, as far away as the true pose may be.
+  /// Samples a pose around the candidate from a Gaussian as wide as the expected pose error.
   [[nodiscard]] Pose2 sample_around(Candidate candidate, const Particles& particles,
                                     Random& random) const;
-  /// Draws a position in the site's square of the grid, with this heading or any.
+  /// Draws a position in the site's grid square, with this heading or a random one.
   [[nodiscard]] Pose2 sample_in_square(std::size_t site, std::optional<double> heading_rad,
                                        Random& random) const;
-  /// Draws a position in the square of any site; without a compass with the heading of a random
-  /// particle.
+  /// Draws a position in the grid square of a random site. The heading is random; without a compass
+  /// it is that of a random particle.
   [[nodiscard]] Pose2 sample_anywhere(const Particles& particles, Random& random) const;
 
  private:

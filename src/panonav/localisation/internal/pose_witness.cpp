@@ -13,12 +13,13 @@ namespace {
 
 /// Smallest number of witnesses: two could both be wrong in the same way.
 constexpr std::size_t min_witnesses = 3;
-/// Share of the witnesses that agree; of sure answers 99 % are right (docs/decisions.md).
+/// Smallest share of witnesses that agree; 99 % of sure localisations are right
+/// (docs/decisions.md).
 constexpr double agreeing_share = 0.8;
-/// Smallest distance between the images of the witnesses, in reference spacings, so that they do
-/// not all see the same references.
+/// Smallest extent of the witnesses' images in spacings; nearer images would all be matched to the
+/// same references.
 constexpr double min_spread_spacings = 2.0;
-/// Error of odometry, as a share of the distance travelled: wheels that slip.
+/// Odometry error as a share of the distance travelled, due to slipping wheels.
 constexpr double travel_error = 0.05;
 
 Pose2 predict_pose(const Pose2& odometry, const PoseWitness& witness) {

@@ -8,24 +8,24 @@
 
 namespace panonav {
 
-/// Largest difference of two headings that agree: four times the error of the compass between
-/// neighbouring views, far below the quarter rotation after which rooms look alike.
+/// Largest difference of two headings that agree: four times the compass's error between
+/// neighbouring views, far below the quarter rotation after which rooms look similar.
 inline constexpr double agreeing_heading_rad = radians(20.0);
 
-/// A certain answer to one image of a run, as evidence of the pose of another image.
+/// A sure localisation of one image of a run, used as evidence of the pose of another image.
 struct PoseWitness {
-  Pose2 odometry;            ///< at the answered image, in the odometry's frame
-  Pose2 pose;                ///< of the answer, in the frame of the memory's positions
-  double radius_m = 0.0;     ///< of the answer: holds its position in 95 % of the cases
-  double travelled_m = 0.0;  ///< between it and the other image, >= 0
+  Pose2 odometry;            ///< at the witness's image, in the odometry's frame
+  Pose2 pose;                ///< localised, in the frame of the memory's positions
+  double radius_m = 0.0;     ///< contains the true position in 95 % of the cases
+  double travelled_m = 0.0;  ///< distance travelled between the two images, >= 0
 };
 
-/// Returns where a robot certainly took an image, by the answers to other images of the run,
-/// carried there by odometry. At least three witnesses, from images that lie two spacings apart,
-/// must agree on a pose, and four fifths of all; the image's own answer only makes the pose more
-/// precise. So a camera that was turned, a place that resembles another and a kidnapped robot show
-/// nothing. nullopt where the witnesses are too few, too near to each other or disagree.
-/// `odometry`: at the image; `own`: its own answer, where that was sure. `spacing_m`: of the
+/// Returns the certain pose at which an image was taken, predicted by odometry from sure
+/// localisations of other images of the run (witnesses). At least three witnesses, from images two
+/// spacings apart, and four fifths of all must agree on the pose; the image's own localisation can
+/// only refine it. So the pose stays unknown if the camera was turned, a place resembles another or
+/// the robot was kidnapped. nullopt if the witnesses are too few, too near to each other or
+/// disagree. `odometry`: at the image; `own`: its own localisation if sure. `spacing_m`: of the
 /// references. Cost: the square of the number of witnesses.
 [[nodiscard]] std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
                                                        std::span<const PoseWitness> witnesses,

@@ -23,12 +23,12 @@ void PositionError::observe(double variance_before_m2, double variance_after_m2,
   const double ratio = variance_before_m2 > 0.0 ? variance_after_m2 / variance_before_m2 : 1.0;
   const double kept = std::min(1.0, ratio);
   const double gain = 1.0 - kept;
-  // A view that moves the particles to another place widens them; the error variance grows by the
-  // same ratio.
+  // A view that moves the particles to another place increases their variance; the error variance
+  // grows by the same ratio.
   const double error_m2 = variance_at(variance_before_m2) * std::max(1.0, ratio);
   const double with_view_m2 = last_ ? correlation * last_->of_error_and_view_m2 : 0.0;
-  // By the particles the view's share has the variance after / gain, and so the whole view `share`
-  // times that.
+  // The particles imply the variance after / gain for the weakened view, so the whole view has the
+  // variance exponent * after / gain.
   last_ = {variance_after_m2,
            kept * kept * error_m2 + gain * share * variance_after_m2 +
                2.0 * kept * gain * with_view_m2 + variance_after_m2 / effective,
@@ -38,7 +38,7 @@ void PositionError::observe(double variance_before_m2, double variance_after_m2,
 
 double PositionError::variance_at(double particle_variance_m2) const {
   if (!last_ || !(last_->of_particles_m2 > 0.0)) return particle_variance_m2;
-  // Odometry adds its random errors to both.
+  // Odometry adds the same variance to the particles and to the error.
   if (particle_variance_m2 >= last_->of_particles_m2) {
     return last_->of_error_m2 + particle_variance_m2 - last_->of_particles_m2;
   }

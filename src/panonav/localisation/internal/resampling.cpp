@@ -36,7 +36,7 @@ std::vector<std::size_t> resample_systematically(std::span<const double> weights
   double passed = weights[0];
   for (std::size_t mark = 0; mark < count; ++mark) {
     const double position = (static_cast<double>(mark) + offset) * step;
-    // Rounding may leave the last mark beyond the sum.
+    // By rounding, the last mark may exceed the sum.
     while (position >= passed && i + 1 < weights.size()) passed += weights[++i];
     survivors.push_back(i);
   }
@@ -67,8 +67,9 @@ void resample_and_spread(Particles& particles, const PoseBins& bins, Random& ran
     const std::size_t s = survivors[i];
     Pose2 pose = particles.pose(s);
     if (found.mode_of[s] >= 0) {
-      // The kernel of least mean squared error for a normal distribution in three dimensions
-      // (Silverman 1986, eq. 4.14 and table 4.1: exponent 1 / (d + 4), factor (4 / (d + 2))).
+      // Width of the kernel with the smallest mean squared error for a normal distribution in three
+      // dimensions (Silverman 1986, eq. 4.14 and table 4.1: exponent 1 / (d + 4), factor (4 / (d +
+      // 2))).
       const auto m = static_cast<std::size_t>(found.mode_of[s]);
       const PoseMode& mode = found.modes[m];
       const double width =

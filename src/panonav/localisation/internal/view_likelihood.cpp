@@ -14,14 +14,16 @@ namespace panonav {
 
 namespace {
 
-/// Reach of the references near a cell in spacings: twelve lie in it beyond the border of the
-/// references, too.
+/// Distance in spacings within which references are near a cell: contains twelve even slightly
+/// outside the area of the references.
 constexpr double near_spacings = 2.0;
 /// Mean distance of a position in a square of a grid from the nearest corner, in spacings.
 constexpr double nearest_spacings = 0.3826;
-/// References near a cell: a grid's square and the ring around it.
+/// Largest number of references near a cell: the corners of a grid square and the ring around them,
+/// without its corners.
 constexpr std::size_t max_near = 12;
-/// Largest number of cached column profiles of 2.5 kB: 50 MB, more than a robot passes in an hour.
+/// Largest number of cached column profiles (2.5 kB each, 50 MB in all): more than a robot passes
+/// in an hour.
 constexpr std::size_t max_cached_profiles = 20'000;
 /// Number of sites whose profiles are loaded together: 2.4 MB of signatures.
 constexpr std::size_t sites_per_load = 1000;
@@ -212,7 +214,7 @@ const kernels::SimilarityLanes& ViewLikelihood::get_or_create_lanes(Cell& cell) 
     lanes.log_similarity[i] = lanes.other_log_similarity[i] =
         -std::numeric_limits<float>::infinity();
   }
-  // Relative to the cell, so that numbers are small wherever the origin is.
+  // Positions are relative to the cell, so that floats keep their precision far from the origin.
   const Point2 centre = centre_of(cell.place);
   const auto per_square_turn =
       static_cast<float>(-0.5 / (model_.heading_width_rad * model_.heading_width_rad));
@@ -233,7 +235,7 @@ const kernels::SimilarityLanes& ViewLikelihood::get_or_create_lanes(Cell& cell) 
 
 void ViewLikelihood::compute_log_ratios(const Particles& particles, std::span<double> ratios) {
   if (particles.empty()) return;
-  // Successive particles of one cell are passed on together.
+  // Passes successive particles of one cell to the kernel together.
   constexpr std::size_t block_size = 128;
   std::array<float, block_size> x_m, y_m, heading_rad, explained;
   std::size_t begin = 0;

@@ -14,65 +14,65 @@
 
 namespace panonav {
 
-/// Likelihood of one view at any pose, also between references (`ObservationModel`).
+/// Computes the likelihood of one view at any pose, also between references (`ObservationModel`).
 ///
-/// The similarity of the view to the references around a pose is correlated with the expected one,
-/// exp(-distance / range): with amplitude a free, least squares explain
-/// (sum similarity expected)^2 / sum expected^2 of the squared similarity. A heading that differs
-/// from that of a reference takes the reference's similarity away. References that were not
-/// compared count as dissimilar.
+/// Fits the similarities of the view to the references around a pose by the expected ones,
+/// exp(-distance / range), times a free amplitude. The fit explains (sum similarity expected)^2 /
+/// sum expected^2 of the squared similarity. The similarity of a reference is reduced if its
+/// heading differs from that of the pose. References that were not compared have similarity 0.
 class ViewLikelihood {
  public:
-  /// Covers the posed views of a memory. Without `compass` headings do not count. Cost: linear in
+  /// Covers the posed views of a memory. `compass`: headings affect the likelihood. Cost: linear in
   /// the views.
   ViewLikelihood(std::unique_ptr<ComparedViews> views, const ObservationModel& model, bool compass);
 
-  /// Covers the views that have positions now; nothing is compared then. Throws ContractError when
-  /// there is none, FileError as a `ViewIndex`; then all stays as it was.
+  /// Reloads the positions of the views and discards all comparisons. Throws, without any change,
+  /// ContractError if no view has a position, and exceptions of `ViewIndex` (FileError).
   void update_sites();
 
   /// The position of a posed view.
   struct Site {
     ViewId view;
     Point2 position;
-    float reference_heading_rad;  ///< NaN: not known
-    float heading_rad;  ///< absolute, of the robot that took the compared view; NaN: not known
-    float similarity;   ///< 0: dissimilar, or not compared
+    float reference_heading_rad;  ///< heading of the reference; NaN: unknown
+    float heading_rad;            ///< of the robot at the compared view, absolute; NaN: unknown
+    float similarity;             ///< 0: dissimilar, or not compared
     float log_similarity;
     float other_heading_rad;  ///< the second heading that fits (`match_columns_two_best`)
     float other_similarity;   ///< in the second heading
     float other_log_similarity;
-    std::uint32_t compared_at;  ///< number of the view with which it was compared
+    std::uint32_t compared_at;  ///< number of the view last compared to it
   };
 
   /// Sets the view to compare. Throws ContractError on a signature of another shape.
   void set_view(const PackedSignature& view);
-  /// Searches all views for the most similar ones, at most `count`; returns those with a site.
+  /// Searches the `count` most similar views; returns the sites of those with positions.
   [[nodiscard]] std::vector<std::uint32_t> search(int count);
-  /// Compares the view with the references of the sites, except those that are compared already and
-  /// those that no longer exist. Cost: 1 microsecond each, and 10 for one whose profiles are not
-  /// cached. Throws FileError as a `ViewIndex`.
+  /// Compares the view with the references at the sites, except those already compared and those
+  /// that no longer exist. Cost: 1 microsecond each; 10 microseconds if the profiles are not
+  /// cached. Throws FileError like `ViewIndex`.
   void compare(std::span<const std::uint32_t> sites);
-  /// Ends the work with the view: the next one sees what others changed in the memory.
+  /// Ends the work with the view; changes of the memory by other users become visible at the next
+  /// view.
   void release() { views_->release(); }
   [[nodiscard]] bool is_compared(std::uint32_t site) const noexcept {
     return sites_[site].compared_at == number_;
   }
-  /// Returns the smallest difference to those of the sites that were compared; nullopt when none
-  /// was.
+  /// Returns the smallest difference between the view and the compared ones of these sites; nullopt
+  /// if none was compared.
   [[nodiscard]] std::optional<double> min_difference(std::span<const std::uint32_t> sites) const;
 
-  /// Computes the log-likelihood of the view at each pose, over that of an unexplained view; >= 0.
-  /// Cost: 15 ns a pose where those of one cell follow each other (`arrange`).
+  /// Computes the log-likelihood of the view at each pose relative to an unexplained view; >= 0.
+  /// Cost: 15 ns a pose if particles are ordered by cell (`arrange`).
   void compute_log_ratios(const Particles& particles, std::span<double> ratios);
-  /// Reorders particles so that those of one cell follow each other. Cost: 10 ns each.
+  /// Reorders particles so that those of one cell are adjacent. Cost: 10 ns each.
   void arrange(Particles& particles);
 
   [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
-  /// Returns the nearest sites of a position, 12 at most; none far from all references.
+  /// Returns at most 12 nearest sites of a position; none if all references are far away.
   [[nodiscard]] std::span<const std::uint32_t> sites_near(Point2 position) const noexcept;
-  /// Returns at most `max_sites` sites with at least `min_weight` of the particles around them,
-  /// heaviest first.
+  /// Returns the sites around which the particles have a weight of at least `min_weight`, heaviest
+  /// first, at most `max_sites`.
   [[nodiscard]] std::vector<std::uint32_t> heaviest_sites(const Particles& particles,
                                                           std::size_t max_sites, double min_weight);
   [[nodiscard]] std::optional<std::uint32_t> site_of(ViewId view) const noexcept;
@@ -86,12 +86,12 @@ class ViewLikelihood {
   struct Cell {
     GridCell place;
     std::uint32_t begin, end;      ///< in `near_`
-    std::uint32_t lanes_revision;  ///< of the comparisons when `lanes` was made
+    std::uint32_t lanes_revision;  ///< value of `revision_` when `lanes` was made
     std::uint32_t lanes;
   };
-  /// The particles of one cell; all that are in no cell form a group too.
+  /// The particles of one cell; those outside all cells form one further group.
   struct Group {
-    std::uint32_t cell;  ///< in `cells_`; their number for no cell
+    std::uint32_t cell;  ///< index in `cells_`; cells_.size(): no cell
     std::uint32_t count;
     double weight;
   };
@@ -112,12 +112,12 @@ class ViewLikelihood {
   std::vector<std::optional<ColumnProfiles>> profiles_;  ///< cached ones
   std::size_t cached_profiles_ = 0;
   CellTable table_;          ///< of the cells with references near
-  std::vector<Cell> cells_;  ///< as `table_` numbers them
+  std::vector<Cell> cells_;  ///< in the order of the numbers of `table_`
   std::vector<std::uint32_t> near_;
   std::vector<kernels::SimilarityLanes> lanes_;  ///< made since the last comparison
   std::vector<Group> groups_;
-  std::vector<std::uint32_t> group_of_;       ///< each particle
-  std::vector<std::uint32_t> group_of_cell_;  ///< valid only where the group is of the cell
+  std::vector<std::uint32_t> group_of_;       ///< group of each particle
+  std::vector<std::uint32_t> group_of_cell_;  ///< valid only if the group's cell is this one
   Particles arranged_;
   std::uint32_t revision_ = 1;
   std::vector<std::uint32_t> compared_sites_;

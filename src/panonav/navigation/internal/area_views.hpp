@@ -16,62 +16,63 @@
 
 namespace panonav {
 
-/// The view of a robot in the forms in which references are compared with it.
+/// A robot's view in the two forms used for comparing it with references.
 struct QueryView {
-  /// Throws ContractError unless `components` is 0 (all) or 3 .. those of the signature.
+  /// Throws ContractError unless `components` is 0 (all), or from 3 to the number of the signature.
   QueryView(const FourierSignature& signature, float full_scale, int components = 0);
 
-  PackedSignature packed;  ///< with the memory's full scale
-  HomingView view;         ///< the first `components` only
-  int components;          ///< that are compared
+  PackedSignature packed;  ///< packed with the memory's full scale
+  HomingView view;         ///< only its first `components`
+  int components;          ///< number of components compared
 };
 
-/// The views of one area and those around it, loaded from a source. Nothing else of the memory is
-/// held but what was prefetched of the next area.
+/// Holds the views in and around one area, loaded from a source, and prefetched views of the next
+/// area, but nothing else of the memory.
 class AreaViews {
  public:
-  /// Views up to `links` edges outside of an area are loaded with it. The source must outlive
-  /// *this.
+  /// `links`: views up to this number of edges outside of an area are loaded with it. The source
+  /// must outlive *this.
   AreaViews(const ViewSource& source, int links) : source_(&source), links_(links) {}
 
-  /// Loads the part of the area that was not prefetched.
+  /// Makes this the current area and loads its views that were not prefetched.
   void enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area);
-  /// Loads at most `max_views` further views of the area that will be entered next. Drops what was
-  /// prefetched of another area.
+  /// Loads at most `max_views` further views of the area that will be entered next. Drops views
+  /// prefetched for another area.
   void prefetch(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
                 int max_views);
-  /// nullopt before the first `enter`.
+  /// Current area; nullopt before the first `enter`.
   [[nodiscard]] std::optional<std::size_t> area() const noexcept { return here_.area; }
   /// Number of views held, prefetched ones included.
   [[nodiscard]] std::size_t size() const noexcept { return here_.loaded + ahead_.loaded; }
-  /// True if the view was loaded with the area that was entered.
+  /// True if the view was loaded with the current area.
   [[nodiscard]] bool holds(ViewId view) const { return find_part(view) != nullptr; }
 
   // These throw ContractError on a view that is not loaded.
-  /// Returns the heading of the robot relative to the view; nullopt where the compass tells none.
+  /// Returns the robot's heading relative to the view; nullopt if the compass finds none.
   [[nodiscard]] std::optional<CompassReading> read_compass(ViewId view, const QueryView& query);
-  /// Returns all coefficients of the view, computed when it was loaded. Counts the bytes of
-  /// `components` of them as read (0: all). Valid until the next `enter`.
+  /// Returns all Fourier coefficients of the view, computed when it was loaded. Adds the bytes of
+  /// the first `components` (0: all) to `bytes_read`. Valid until the next `enter`.
   [[nodiscard]] const HomingView& read_coefficients(ViewId view, int components = 0);
-  /// Returns the view of least dissimilarity among those of `nodes` that are loaded; the lower node
-  /// of equal ones.
+  /// Returns the view of smallest dissimilarity among the loaded views of `nodes`; of ties the
+  /// lowest node.
   [[nodiscard]] std::optional<FoundView> find_nearest(const NavigationGraph& graph,
                                                       std::span<const std::size_t> nodes,
                                                       const QueryView& query);
-  /// Finds the nearest view among all loaded ones.
+  /// Returns the view of smallest dissimilarity among all loaded ones.
   [[nodiscard]] std::optional<FoundView> find_nearest(const NavigationGraph& graph,
                                                       const QueryView& query);
-  /// Returns the view, then the `count` others of least dissimilarity to the query.
+  /// Returns the signature of `view`, then those of the `count` other views of smallest
+  /// dissimilarity to the query.
   [[nodiscard]] std::vector<PackedSignature> most_similar_signatures(ViewId view,
                                                                      const QueryView& query,
                                                                      int count) const;
 
-  /// Bytes of signatures and of their index that the comparisons so far have read, without
+  /// Bytes of signatures and index read by all comparisons so far, except
   /// `most_similar_signatures`.
   [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
  private:
-  /// An area of which the first `loaded` views are loaded, in parts.
+  /// An area whose first `loaded` views are loaded, in several parts.
   struct LoadedArea {
     std::optional<std::size_t> area;
     std::vector<ViewId> views;  // ascending

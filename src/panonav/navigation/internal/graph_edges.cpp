@@ -10,7 +10,7 @@ namespace panonav {
 
 namespace {
 
-/// Smallest length of an edge over the median length: that between images of one place.
+/// Smallest length of an edge relative to the median: used between images of one place.
 constexpr double min_length_share = 0.1;
 
 // Computes a batch of edges from the phases of their views, which are all loaded at once.

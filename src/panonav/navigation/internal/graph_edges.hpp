@@ -13,7 +13,7 @@
 
 namespace panonav {
 
-/// Length of an edge of which nothing is known, over the median length.
+/// Length assumed for an edge of unknown motion and length, relative to the median length.
 inline constexpr double unknown_length_share = 3.0;
 
 /// The two nodes of an edge of a graph or a map.
@@ -33,14 +33,15 @@ inline void scale_displacement(Pose2& motion, double factor) {
   return std::hypot(motion.x_m, motion.y_m);
 }
 
-/// Returns the mean motion that both views of a reading show; nullopt where they disagree.
+/// Returns the motion averaged over both views of a reading; nullopt if the views disagree.
 [[nodiscard]] std::optional<Pose2> to_motion(const PhaseReading& reading);
 
-/// Sets the length of edges of which neither length nor motion is known from that of the others,
-/// and raises those between images of one place to a minimum.
+/// Sets edges of unknown length and motion to three times the median of the known lengths, and
+/// raises lengths between images of one place to a tenth of the median.
 void fill_missing_lengths(std::vector<NavigationGraph::Edge>& edges);
 
-/// Reads edges from the phases of their views; length 0 and no motion where nothing is read.
+/// Computes the edges of the links from the phases of their views. An edge gets length 0 and no
+/// motion if no motion can be computed.
 [[nodiscard]] std::vector<NavigationGraph::Edge> read_edges(const ViewSource& source,
                                                             std::span<const Link> links,
                                                             Executor& executor);

@@ -1,6 +1,6 @@
 #pragma once
 
-// The state of a navigator in named values, each of which is reset by assignment.
+// The navigator's state in structs; assigning a default value resets one.
 
 #include <limits>
 #include <map>
@@ -14,13 +14,13 @@
 
 namespace panonav {
 
-/// A home vector of less confidence is as likely as not only the error of reading it.
+/// Smallest confidence of a used home vector; below it the vector is as likely to be only noise.
 inline constexpr double min_vector_confidence = 0.5;
 
-/// Knowledge that a navigator gains once of its memory.
+/// Scales of a memory, which a navigator learns once at construction.
 struct MemoryScales {
-  PlaceScale place;   ///< by all components
-  PlaceScale coarse;  ///< by the first ones
+  PlaceScale place;   ///< learnt with all components
+  PlaceScale coarse;  ///< learnt with the first `coarse_components`
   float full_scale = 1.0F;
   int components = 0;
   int coarse_components = 0;            ///< 0: all
@@ -41,7 +41,7 @@ struct NavigationGoal {
   ArrivalScale arrival;
 };
 
-/// Evidence against the place where the robot is assumed to be. Reset with each goal.
+/// Evidence against the assumed place of the robot. Reset with each goal.
 struct PlaceDoubt {
   int unknown_steps = 0;                  ///< successive steps at which no reference matched
   int improbable_steps = 0;               ///< successive steps at which the place was improbable
@@ -49,32 +49,32 @@ struct PlaceDoubt {
   std::optional<std::size_t> other_node;  ///< that place
 };
 
-/// Position of the robot in the memory. Lasts from goal to goal, until `Navigator::forget_place`.
+/// Place of the robot in the memory. Kept when the goal changes, until `Navigator::forget_place`.
 struct NavigationPlace {
   std::optional<std::size_t> node;
-  std::optional<std::size_t> known_node;   ///< where the place last matched
-  std::optional<Point2> known_position_m;  ///< of it in the robot's frame, by dead reckoning
+  std::optional<std::size_t> known_node;   ///< node at which the view last matched
+  std::optional<Point2> known_position_m;  ///< of `known_node` in the robot's frame
   PlaceDoubt doubt;
 };
 
 /// The step before the present observation.
 struct LastStep {
-  std::optional<HomingView> view;       ///< from which it began
-  std::optional<double> direction_rad;  ///< in the frame of `view`; empty: the robot stood
+  std::optional<HomingView> view;       ///< view at the start of the step
+  std::optional<double> direction_rad;  ///< in the frame of `view`; nullopt: the robot stood still
   double advance_m = 0.0;
-  std::optional<double> path_length;       ///< that was left before it, if it was a whole step
-  std::optional<std::size_t> target_edge;  ///< empty where the step led around
+  std::optional<double> path_length;       ///< remaining before it; only after a whole step
+  std::optional<std::size_t> target_edge;  ///< edge that the step followed; nullopt for a detour
 };
 
 /// Obstacles in front of the robot. Reset with each goal.
 struct Obstruction {
   bool is_present = false;  ///< in the step before this observation
-  int level = 0;  ///< grows by 2 with each step that fails, falls by 1 with each other one
+  int level = 0;  ///< grows by 2 with each obstructed step, falls by 1 with each other step
 };
 
-/// The steps that were made along an edge since the robot last came nearer to the goal.
+/// Steps made along an edge since the path to the goal last became shorter.
 struct EdgeAttempts {
-  std::size_t node = 0;  ///< from which it was tried first
+  std::size_t node = 0;  ///< from which the edge was first tried
   int steps = 0;
   int obstructed_steps = 0;
 };
@@ -83,29 +83,30 @@ struct EdgeAttempts {
 struct Progress {
   int steps = 0;
   int attempts = 0;
-  int path_searches = 0;  ///< from places without a path, in this attempt
+  int path_searches = 0;  ///< number of searches for a place with a path, in this attempt
   double min_path_length = std::numeric_limits<double>::infinity();  ///< since the last plan
   int steps_without_progress = 0;  ///< since the path became shorter or an edge was blocked
   std::map<std::size_t, EdgeAttempts> edge_attempts;  ///< by edge, since the path became shorter
   /// Nodes around the latest blocked edge, ascending, until the robot leaves them.
   std::vector<std::size_t> near_blocked_edge;
-  std::set<std::size_t> suspect_edges;  ///< that were blocked in earlier attempts
+  std::set<std::size_t> suspect_edges;  ///< edges that were blocked in earlier attempts
 
   [[nodiscard]] bool was_obstructed() const;
-  /// Returns the attempts along an edge, which begin from `node` if there were none.
+  /// Returns the attempts along an edge; if there are none yet, adds an entry that starts at
+  /// `node`.
   EdgeAttempts& get_or_create_attempts(std::size_t edge, std::size_t node) {
     return edge_attempts.try_emplace(edge, EdgeAttempts{node}).first->second;
   }
 };
 
-/// An edge that is followed to its end, although other references may be nearer on the way.
+/// An edge that is followed to its end, even if other references match better meanwhile.
 struct CommittedEdge {
   std::size_t from = 0;  ///< node
   Guide guide;           ///< there
   int steps_left = 0;
 };
 
-/// The path to the goal. Reset where edges are blocked or unblocked.
+/// The plan to the goal. Reset when edges are blocked or unblocked.
 struct Plan {
   std::vector<Guide> field;  ///< of the loaded area
   std::optional<CommittedEdge> committed;
@@ -117,7 +118,7 @@ struct Step {
   const RobotReport& report;
   QueryView view;
   NavigationDecision decision;
-  /// Direction of the step before in the frame of the robot now; empty where it failed.
+  /// Direction of the last step in the robot's current frame; nullopt if there was none.
   std::optional<double> last_direction_rad;
 
   void add_event(NavigationDecision::Event event) { decision.events.push_back(event); }
@@ -143,7 +144,7 @@ struct Navigator::Core {
   Progress progress;
   Plan plan;
   std::optional<HomingPursuit> homing;  ///< while the robot homes to the goal
-  std::vector<double> path_reductions;  ///< by the last whole steps, towards any goal
+  std::vector<double> path_reductions;  ///< by the last whole steps, over all goals
 
   void set_goal(ViewId goal);
   void forget_place();

@@ -1,4 +1,4 @@
-// The place of a navigator's robot: the reference that it is nearest to.
+// Part of the navigator that determines the robot's place: the reference to which it is nearest.
 
 #include <algorithm>
 #include <iterator>
@@ -10,10 +10,12 @@ namespace panonav {
 
 namespace {
 
-/// Times that the search for the next place continues around the outermost reference found: a step
-/// is half an edge, and four edges where references stand eight times as densely as intended.
+/// Largest number of times that the search for the next place continues around the outermost
+/// reference found. A step is half an edge; with references eight times as dense as intended, it is
+/// four edges.
 constexpr int max_search_rounds = 2;
-/// Views besides the place that the evidence for it takes: the tenth best match is one of them.
+/// Number of other views compared for the evidence of a place; enough to include the tenth best
+/// match.
 constexpr int compared_views = 15;
 
 }  // namespace
@@ -39,7 +41,7 @@ void Navigator::Core::relocalise(Step& step) {
   const auto found = search_whole_memory(*source, graph(), planner.areas(), step.signature);
   step.add_event(NavigationDecision::Event::relocalised);
   if (!found) return;
-  // A place that does not match either is no reason to leave the expected one.
+  // If the place found does not match either, keeps the expected one.
   if (place.node && found->difference > scales.place.max_difference()) return;
   if (place.node) step.add_event(NavigationDecision::Event::kidnapped);
   step.decision.difference = found->difference;
@@ -58,8 +60,8 @@ Navigator::Core::PlaceCandidates Navigator::Core::find_candidates(const QueryVie
   PlaceCandidates found;
   found.around = nodes_around(graph(), {&*place.node, 1}, options.near_links);
   found.here = views.find_nearest(graph(), found.around, view);
-  // If references are dense, a step leads beyond them: the search continues around the outermost
-  // one while it finds more similar ones.
+  // If references are dense, a step leads beyond those searched. Therefore continues around the
+  // outermost reference found, as long as more similar ones are found.
   std::size_t centre = *place.node;
   for (int round = 0; round < max_search_rounds && found.here; ++round) {
     const auto inner = nodes_around(graph(), {&centre, 1}, options.near_links - 1);
@@ -131,7 +133,7 @@ void Navigator::Core::locate(Step& step) {
   update_known_place(step);
 }
 
-// Searches around the last place, with all components where the first ones leave doubt.
+// Searches around the last place; uses all components if the first ones are inconclusive.
 void Navigator::Core::search_place(Step& step) {
   PlaceCandidates found = find_candidates(step.view);
   const bool is_doubtful = !found.here || found.is_elsewhere ||
@@ -143,8 +145,8 @@ void Navigator::Core::search_place(Step& step) {
   choose_place(found, step);
 }
 
-// Counts the steps at which the place does not match; searches the whole memory again and again,
-// and gives up in the end.
+// Counts successive steps at which the place does not match. Searches the whole memory every
+// `min_agreeing_steps` of them; after `lost_patience` of them the robot is lost.
 void Navigator::Core::update_known_place(Step& step) {
   const auto matches = [&] { return step.decision.difference <= scales.max_difference(step.view); };
   if (plan.committed) {
@@ -152,7 +154,7 @@ void Navigator::Core::update_known_place(Step& step) {
     if (is_beyond || --plan.committed->steps_left < 0) plan.committed.reset();
   }
   int& unknown_steps = place.doubt.unknown_steps;
-  // Between references that stand far apart no place matches.
+  // Between references that are far apart no place matches, so a committed edge or a route decides.
   if (matches() || plan.committed || is_localised_on_route()) {
     unknown_steps = 0;
     if (matches() && !plan.committed) place.known_node = place.node;
@@ -175,13 +177,13 @@ double Navigator::Core::place_probability_of(const Step& step) const {
       views.most_similar_signatures(graph().view(*place.node), step.view, compared_views)));
 }
 
-// A reference that matches must also match better than by chance: in another building enough views
-// differ by little to drive on without end.
+// Updates the probability of the place, because a matching reference must also match better than by
+// chance: in another building, a robot would find matching views and drive endlessly.
 void Navigator::Core::update_probability(Step& step) {
   step.decision.probability = place_probability_of(step);
   int& improbable_steps = place.doubt.improbable_steps;
-  // No place is probable between references that are far apart, nor with an obstacle in view: such
-  // a run ends after every path was tried.
+  // Between distant references, and with an obstacle in view, no place is probable. These steps are
+  // not counted; an obstructed run ends after all paths were tried.
   if (step.decision.probability < 0.5 && !plan.committed && !is_localised_on_route() &&
       obstruction.level == 0) {
     ++improbable_steps;

@@ -1,4 +1,4 @@
-// Progress of a navigator towards its goal, and its reaction if there is none.
+// Part of the navigator that measures progress towards the goal and reacts if there is none.
 
 #include <algorithm>
 #include <array>
@@ -14,16 +14,18 @@ namespace panonav {
 
 namespace {
 
-/// Directions in which an obstructed robot tries to pass, one after the other, before the edge
-/// counts as blocked: ahead, then 40 and 75 degrees to either side.
+/// Directions in which an obstructed robot tries to pass, one after another, before the edge is
+/// blocked: ahead, then 40 and 75 degrees to either side.
 constexpr std::array<double, 5> detours_rad{0.0, 0.7, -0.7, 1.3, -1.3};
-/// Links from an obstacle within which edges may cross it: twice its half width and one more.
+/// Distance in edges from an obstacle within which edges may cross it: its width (two typical
+/// edges) and one more.
 constexpr int obstacle_links = 3;
-/// The last steps whose median says how far one leads.
+/// Number of last steps whose median is the typical reduction of path length by a step.
 constexpr std::size_t max_path_reductions = 5;
-/// Multiples of the golden angle cover the circle evenly, however many there are.
+/// Angle between successive search directions; multiples of the golden angle cover the circle
+/// evenly for any number.
 constexpr double golden_angle_rad = 2.39996322972865332;
-/// A step is short, so no far displacement need be searched.
+/// Homing options for one step, which is so short that no large displacements are searched.
 constexpr FourierHomingOptions short_displacement{.displacement_search = false};
 
 }  // namespace
@@ -33,9 +35,9 @@ bool Progress::was_obstructed() const {
                              [](const auto& each) { return each.second.obstructed_steps > 0; });
 }
 
-// Blocks an edge that was tried without success and, where something obstructed the robot, all that
-// cross a bar half way along it. The bar is two typical edges wide, whatever was blocked before:
-// wider ones would shut the sides of things and whole rooms.
+// Blocks an edge that was tried without success. If something obstructed the robot, also blocks all
+// edges that cross a bar half way along the edge. The bar is always two typical edges wide; a wider
+// one would also block the sides of objects and whole rooms.
 void Navigator::Core::block_edge(std::size_t edge, Step& step) {
   const EdgeAttempts tried = progress.edge_attempts.at(edge);
   std::vector<std::size_t> blocked{edge};
@@ -50,8 +52,8 @@ void Navigator::Core::block_edge(std::size_t edge, Step& step) {
                                             obstacle_links);
     blocked.insert(blocked.end(), crossed.begin(), crossed.end());
   }
-  // Edges that were blocked in an earlier attempt, and one of which fails again, are blocked as
-  // one.
+  // If an edge blocked in an earlier attempt fails again, blocks all edges of earlier attempts
+  // together.
   const auto is_suspect = [&](std::size_t e) { return progress.suspect_edges.contains(e); };
   if (std::ranges::any_of(blocked, is_suspect)) {
     blocked.insert(blocked.end(), progress.suspect_edges.begin(), progress.suspect_edges.end());
@@ -83,8 +85,9 @@ void Navigator::Core::unblock_edges_or_end(Step& step, NavigationDecision::State
   replan();
 }
 
-// Continues from the most similar place that has a path, as the memory does not hold every link
-// between neighbours; some times in each attempt only, as there may be none.
+// Moves the assumed place to the most similar one with a path to the goal, since the memory does
+// not hold every link between neighbours. Limited to a few times in each attempt, as there may be
+// no such place. Returns false without success.
 bool Navigator::Core::relocalise_with_path(Step& step) {
   if (progress.path_searches >= options.min_agreeing_steps) return false;
   ++progress.path_searches;
@@ -124,7 +127,7 @@ void Navigator::Core::update_path_length() {
   }
   ++progress.steps_without_progress;
   if (length < progress.min_path_length) {
-    // The first observation of a plan is no progress.
+    // The first observation after planning is not progress.
     if (std::isfinite(progress.min_path_length)) {
       attempts.clear();
       progress.steps_without_progress = 0;
@@ -133,13 +136,14 @@ void Navigator::Core::update_path_length() {
   }
 }
 
-// Sets whether the step before was obstructed, and where the robot last knew its place.
+// Determines whether the last step was obstructed, and updates the position at which the robot last
+// knew its place.
 void Navigator::Core::detect_obstruction(Step& step) {
   obstruction.is_present = step.report.obstacle;
   if (last.direction_rad && last.view) {
     const HomeVector back = home_vector_unchecked(*last.view, step.view.view, short_displacement);
-    // Views that hardly differ: the robot stood. Along a route steps may be short, and lines show
-    // the place.
+    // If the views before and after hardly differ, the robot did not move. Not tested on a route
+    // leg, where steps may be short and scanlines determine the position.
     obstruction.is_present |=
         !pilot.is_on_leg() && back.confidence < min_vector_confidence &&
         image_difference(*last.view, step.view.view) <
@@ -152,7 +156,8 @@ void Navigator::Core::detect_obstruction(Step& step) {
       place.known_position_m = inverse(moved) * *place.known_position_m;
     }
   }
-  // If the place hardly matches, a detour may lead to an unknown one.
+  // Resets the known position only at a good match: from a poor match, a detour may lead to an
+  // unknown place.
   const bool is_known = place.doubt.unknown_steps == 0;
   const bool is_well_known =
       is_known && step.decision.difference <= 0.5 * scales.max_difference(step.view);
@@ -166,7 +171,8 @@ void Navigator::Core::detect_obstruction(Step& step) {
   }
 }
 
-// Takes stock of the step before, and blocks the edge that was tried most where nothing helps.
+// Updates progress after the last step. Blocks an edge if all detours failed, or the most tried
+// edge if there was no progress for too long.
 void Navigator::Core::update_progress(Step& step) {
   detect_obstruction(step);
   if (homing) return;
@@ -184,14 +190,15 @@ void Navigator::Core::update_progress(Step& step) {
   }
 }
 
-// Returns the length of the edge ahead over the typical one; 0 where it is not known.
+// Returns the length of the edge ahead relative to the typical length; 0 if unknown.
 double Navigator::Core::relative_length(const Guide& ahead) const {
   if (!ahead.is_reachable()) return 0.0;
   const NavigationGraph::Edge& edge = graph().edges()[ahead.edge];
   return edge.a_from_b ? edge.length / scales.typical_length : 0.0;
 }
 
-// More along a long edge, on which a robot comes to no other view for a while.
+// Returns `edge_patience`, multiplied by the relative length on a long edge, along which there are
+// no other views.
 int Navigator::Core::max_steps_without_progress() const {
   double length = 0.0;
   if (*place.node != goal->node) {
@@ -200,8 +207,8 @@ int Navigator::Core::max_steps_without_progress() const {
   return static_cast<int>(std::ceil(options.edge_patience * std::max(1.0, length)));
 }
 
-// Returns the angle by which the direction is changed: to pass an obstacle, or to search around
-// where steps in the planned direction brought no progress.
+// Returns the angle added to the planned direction: to pass an obstacle, or to try other directions
+// after steps without progress.
 double Navigator::Core::detour_rad() const {
   if (obstruction.level >= 2) {
     return detours_rad[static_cast<std::size_t>(obstruction.level / 2) % detours_rad.size()];

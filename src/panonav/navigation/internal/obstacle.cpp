@@ -18,7 +18,7 @@ std::vector<std::size_t> find_crossed_edges(const NavigationGraph& graph, const 
           obstacle.distance, ">= 0 and finite");
   require(std::isfinite(obstacle.half_width) && obstacle.half_width >= 0.0, "half_width",
           obstacle.half_width, ">= 0 and finite");
-  // The nodes around, in a frame whose x axis is the direction of motion.
+  // Poses of the nodes around, in a frame whose x axis is the direction of motion.
   std::map<std::size_t, Pose2> placed{
       {obstacle.node, inverse(Pose2{0.0, 0.0, obstacle.direction_rad})}};
   std::vector<std::size_t> front{obstacle.node};

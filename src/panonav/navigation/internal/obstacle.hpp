@@ -15,9 +15,10 @@ struct Obstacle {
   double half_width = 0.0;     ///< in the graph's unit, >= 0
 };
 
-/// Returns the edges that cross the bar, ascending: all those through a door that is shut. Nodes up
-/// to `links` edges away count, placed by chaining motions along the fewest edges. Throws
-/// ContractError when there is no such node or a number is negative or not finite.
+/// Returns the edges that cross the bar, ascending; for a closed door, all edges through it.
+/// Considers nodes up to `links` edges away; their positions come from chaining motions along the
+/// fewest edges. Throws ContractError if there is no such node or a number is negative or not
+/// finite.
 [[nodiscard]] std::vector<std::size_t> find_crossed_edges(const NavigationGraph& graph,
                                                           const Obstacle& obstacle, int links = 2);
 

@@ -49,7 +49,8 @@ PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& gr
     linked.emplace_back(edge.a, edge.b);
   }
   if (!linked.empty()) scale.neighbour_difference = median_difference(source, linked, components);
-  // Pairs half of all views apart in their order: nearly all are far from each other.
+  // Pairs each view with the one half of all views later, since nearly all of these pairs are far
+  // from each other.
   std::vector<ViewPair> strange;
   const std::size_t half = graph.size() / 2;
   for (std::size_t i = 0; i < std::min(max_pairs, half); ++i) {
@@ -70,8 +71,8 @@ ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph
   std::vector<double> lengths;
   for (const NavigationGraph::Edge& edge : graph.edges()) lengths.push_back(edge.length);
   const double typical = upper_median(std::move(lengths));
-  // Views of the goal itself from another drive show no spacing; they count where there are no
-  // others.
+  // Views of the goal from another drive are too near to measure the spacing, so they are used only
+  // if there are no others.
   for (const double min_length : {0.5 * typical, 0.0}) {
     for (const auto& exit : graph.exits(*node)) {
       if (graph.edges()[exit.edge].length < min_length) continue;

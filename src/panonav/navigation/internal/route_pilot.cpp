@@ -12,10 +12,12 @@ namespace panonav {
 
 namespace {
 
-/// Largest length of the route over the straight line between two views: a right corner has 1.41.
+/// Largest ratio of the route's length to the straight line between two views; a right-angled
+/// corner has 1.41.
 constexpr double max_winding = 1.5;
 
-// Follows the route from one position in one direction: 1 as recorded, -1 back.
+// Finds how far the path follows the route from one position in one direction: 1 as recorded, -1
+// backwards.
 std::optional<RouteSection> follow_path(const KnownRoute& route, double start_m, double direction,
                                         std::span<const ViewId> path) {
   const auto poses = route.tracker.lines().poses();
@@ -76,7 +78,8 @@ bool RoutePilot::begin_leg(std::span<const ViewId> path, std::span<const float> 
   const KnownRoute& route = routes_[chosen];
   const auto fix = route.tracker.search(line);
   if (!fix) return false;
-  // Line and view must agree on the place, which the route may pass several times.
+  // Scanline and view must agree on the position, because the route may pass the view several
+  // times.
   const auto poses = route.tracker.lines().poses();
   std::vector<double> starts_m;
   for (const RoutePosition& start : find_passes(poses, fix->pose.position(), route.max_lateral_m)) {
@@ -108,7 +111,7 @@ void RoutePilot::track(std::span<const float> line, const Pose2& moved) {
     is_known = tracker.track(line, moved).has_value();
   }
   update_target();
-  // A place of the route that is not on the leg is of no use.
+  // A position on the route, but not on the leg, does not count as known.
   is_known &= distance(tracker.pose()->position(), leg_->follower.position()) <=
               routes_[leg_->route].max_lateral_m;
   leg_->unknown_steps = is_known ? 0 : leg_->unknown_steps + 1;

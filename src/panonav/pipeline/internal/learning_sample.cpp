@@ -8,9 +8,10 @@ namespace panonav {
 
 namespace {
 
-// Side of the square areas that are loaded as a whole: chosen, some spacings of references wide.
+// Side of the square areas that are loaded completely: several reference spacings (chosen).
 constexpr double area_side_m = 10.0;
-// Number of views loaded before a sampled view without a position, and from it onwards: chosen.
+// Number of views loaded before a sampled view without a position, and the same number from that
+// view on (chosen).
 constexpr std::size_t views_before = 128;
 
 PositionBounds enclosing_area_bounds(Point2 position) {

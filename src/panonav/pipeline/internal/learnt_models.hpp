@@ -10,35 +10,35 @@
 
 namespace panonav {
 
-/// Models that localisation and tracking learn from a memory before they answer, with the default
-/// learning options and over all components.
+/// Models that localisation and tracking learn from a memory, with the default learning options and
+/// all components.
 struct LearntModels {
   PlaceModel place;        ///< decides whether a place is known
   PositionModel position;  ///< estimates positions between references
   double spacing_m = 0.0;  ///< spacing of references with headings (`NeighbourSupport`)
-  /// Empty if the memory has too few views with a position, or all of them at one place.
+  /// nullopt if the memory has too few views with a position, or all of them are at the same
+  /// position.
   std::optional<ObservationModel> observation;
-  /// True if local features decide between the best matches
-  /// (`FeatureTrial::is_significantly_better`).
+  /// True if local features sort the best matches (`FeatureTrial::is_significantly_better`).
   bool by_features = false;
   friend bool operator==(const LearntModels&, const LearntModels&) = default;
 };
-/// Learns the models of a memory. `features`: empty where the memory has none.
+/// Learns the models of a memory. `features`: empty if the memory has none.
 [[nodiscard]] LearntModels learn_models(const VisualMemory& memory,
                                         const FeatureSource& features = {});
 
-/// Learns all models but the observation model, over `components` (0: all). Throws ContractError if
-/// the memory has fewer components.
+/// Learns all models except the observation model, with `components` Fourier components (0: all).
+/// Throws ContractError if the memory has fewer components.
 [[nodiscard]] LearntModels learn_place_models(const VisualMemory& memory,
                                               const FeatureSource& features, int components);
 
 /// Returns a function that reads the local features of a view from the file at each call; empty if
-/// the file has none. The file must outlive it.
+/// the file has none. The file must outlive the function.
 [[nodiscard]] FeatureSource make_feature_source(const MemoryFile& file);
 
-/// Reads the models stored in the file, bit for bit as `learn_models` returned them; nullopt if
-/// there are none or the views have changed since. `memory` holds all views of the file. Never
-/// writes. Cost: one pass over the signatures, 40 ms for 100,000 of 20 x 15.
+/// Reads the models stored in the file, bit for bit as returned by `learn_models`; nullopt if there
+/// are none or the views have changed since. `memory`: all views of the file. Does not change the
+/// file. Cost: one pass over the signatures, 40 ms for 100,000 of 20 x 15.
 [[nodiscard]] std::optional<LearntModels> load_stored_models(const MemoryFile& file,
                                                              const VisualMemory& memory);
 /// Reads the models stored last, even if the views have changed since.

@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-// An SQLite URI, in which some characters must be escaped.
+// Makes an SQLite URI of an unchangeable file; some characters must be escaped.
 std::string make_immutable_uri(const std::filesystem::path& path) {
   constexpr char digits[] = "0123456789ABCDEF";
   std::string uri = "file:";
@@ -30,7 +30,7 @@ std::string make_immutable_uri(const std::filesystem::path& path) {
   return uri + "?immutable=1";
 }
 
-constexpr int steps_between_checks = 20000;  // chosen: some 0.2 ms
+constexpr int steps_between_checks = 20000;  // chosen: about 0.2 ms
 
 std::string to_one_line(std::string text) {
   std::ranges::replace(text, '\n', ' ');
@@ -45,7 +45,7 @@ void Database::Close::operator()(sqlite3* handle) const noexcept {
 
 Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::move(path)) {
   int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE;
-  // An absolute path is never taken for a URI or for a database in memory.
+  // An absolute path cannot be mistaken for a URI or a database in memory.
   std::string name = std::filesystem::absolute(path_).string();
   switch (mode) {
     case DatabaseMode::create:
@@ -66,7 +66,8 @@ Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::m
   const int code = sqlite3_open_v2(name.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);
   if (code != SQLITE_OK) fail(code);
-  // A foreign or damaged file must not make SQLite run code, take much memory or never end.
+  // These settings keep a foreign or damaged file from running code, using much memory or never
+  // ending.
   constexpr int busy_timeout_ms = 10000;
   constexpr int max_field_bytes = 1 << 28;
   steps_left_ = std::make_unique<std::int64_t>(0);
@@ -99,8 +100,9 @@ std::int64_t Database::file_bytes() const {
 }
 
 void Database::set_step_limit() {
-  // SQLite's own check, the largest query, takes some 2 steps a byte; 12 leave a margin of six.
-  constexpr std::int64_t min_steps = 10'000'000;  // some 0.1 s
+  // SQLite's own check, the largest query, takes about 2 steps a byte; 12 leave a factor of six as
+  // a margin.
+  constexpr std::int64_t min_steps = 10'000'000;  // about 0.1 s
   constexpr std::int64_t steps_per_byte = 12;
   step_limit_ = min_steps + steps_per_byte * file_bytes();
   reset_step_count();
@@ -145,7 +147,7 @@ void Database::fail_damaged(std::string_view what) const {
 }
 
 void Database::fail(int code) const {
-  // The message must be taken before another call changes it.
+  // The message must be copied before another call changes it.
   const std::string text =
       to_one_line(handle_ ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code));
   const int system_error = handle_ ? sqlite3_system_errno(handle_.get()) : 0;
@@ -155,7 +157,7 @@ void Database::fail(int code) const {
   switch (code & 0xFF) {
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
-    case SQLITE_ERROR:  // our own statements are right, so the tables are not ours
+    case SQLITE_ERROR:  // our statements are valid, so the tables are wrong
     case SQLITE_FORMAT:
     case SQLITE_MISMATCH:
     case SQLITE_TOOBIG:
@@ -245,7 +247,7 @@ int Statement::run() {
     reset();
     return code == SQLITE_DONE ? 0 : code;
   }
-  // The cause is read before the reset, which may set another.
+  // The cause is read before the reset, which may replace it.
   try {
     database_->fail(code);
   } catch (...) {
@@ -321,7 +323,7 @@ DatabaseTransaction::DatabaseTransaction(Database& database, MemoryTables::Kind 
 
 DatabaseTransaction::~DatabaseTransaction() {
   if (!open_ || !database_.is_in_transaction())
-    return;  // SQLite rolls back by itself when it fails
+    return;  // SQLite has rolled back by itself after a failure
   sqlite3_exec(database_.handle(), within_another_ ? "ROLLBACK TO part; RELEASE part" : "ROLLBACK",
                nullptr, nullptr, nullptr);
 }

@@ -19,12 +19,12 @@ namespace panonav {
 enum class DatabaseMode {
   create,     ///< makes the file
   change,     ///< an existing file, for reading and writing
-  read,       ///< an existing file without permission to write it, which others may write meanwhile
+  read,       ///< read-only; others may write the file
   immutable,  ///< a file that nobody can change
 };
 
-/// A connection to an SQLite file. Everything that SQLite refuses is thrown as a FileError of one
-/// line that names the file.
+/// A connection to an SQLite file. Functions throw FileError of one line that names the file if
+/// SQLite refuses anything.
 class Database {
  public:
   Database(std::filesystem::path path, DatabaseMode mode);
@@ -32,24 +32,24 @@ class Database {
   void execute(const char* sql);
   [[nodiscard]] std::int64_t integer(const char* sql);
   [[nodiscard]] bool is_in_transaction() const noexcept;
-  /// From now on every transaction throws when the file was deleted, moved or replaced.
+  /// Makes every later transaction throw if the file was deleted, moved or replaced.
   void watch_for_moves() noexcept { watches_for_moves_ = true; }
   void require_unmoved() const;
   /// Returns the size of the file and of its write-ahead log.
   [[nodiscard]] std::int64_t file_bytes() const;
-  /// Closing will leave the write-ahead log as it is instead of bringing it into the file.
+  /// Makes closing leave the write-ahead log as it is, instead of copying it into the file.
   void leave_log_on_close() noexcept;
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] sqlite3* handle() const noexcept { return handle_.get(); }
 
-  /// Throws the FileError for an error code of SQLite, with the message of its last call.
+  /// Throws a FileError for an error code of SQLite, with SQLite's message of the last call.
   [[noreturn]] void fail(int code) const;
   [[noreturn]] void fail_damaged(std::string_view what) const;
 
-  /// Limits the steps of each statement in proportion to the present size of the file, since tables
-  /// whose pages refer to each other would be read without end.
+  /// Limits the steps of each statement in proportion to the present size of the file, because
+  /// damaged tables whose pages refer to each other could be read without end.
   void set_step_limit();
-  /// Grants the steps of the limit to the statement that begins.
+  /// Resets the count of steps for the next statement.
   void reset_step_count() const noexcept;
 
  private:
@@ -57,7 +57,7 @@ class Database {
     void operator()(sqlite3* handle) const noexcept;
   };
   std::filesystem::path path_;
-  std::unique_ptr<std::int64_t> steps_left_;  // has an address that stays when this is moved
+  std::unique_ptr<std::int64_t> steps_left_;  // on the heap: SQLite keeps its address
   std::int64_t step_limit_ = 0;
   std::unique_ptr<sqlite3, Close> handle_;
   bool watches_for_moves_ = false;
@@ -66,7 +66,7 @@ class Database {
 /// A prepared statement. Bound texts and blobs must live until the statement is reset.
 class Statement {
  public:
-  /// Binds the values to the parameters ?1, ?2, ...
+  /// Prepares a statement and binds the values to its parameters ?1, ?2, ...
   template <class... Values>
   explicit Statement(Database& database, const char* sql, const Values&... values)
       : Statement(database, sql, nullptr) {
@@ -90,16 +90,16 @@ class Statement {
   Statement& bind(int parameter, std::string_view text);
   Statement& bind(int parameter, std::span<const std::uint8_t> blob);
 
-  /// True if there is a row; otherwise the statement is done and reset.
+  /// Returns true if there is a row; otherwise the statement is done and was reset.
   bool step();
-  /// Runs a statement without rows. Returns SQLite's extended code when a constraint forbids it
-  /// (nothing has then changed), 0 when it is done.
+  /// Runs a statement without rows. Returns 0, or SQLite's extended code if a constraint is
+  /// violated, in which case nothing has changed.
   int run();
   void reset() noexcept;
 
   [[nodiscard]] bool is_null(int column) const;
   [[nodiscard]] int type(int column) const;
-  // These throw FileError ("damaged") when the column holds another type.
+  // These throw FileError ("damaged") if the column has another type.
   [[nodiscard]] std::int64_t integer(int column) const;
   [[nodiscard]] double real(int column) const;
   [[nodiscard]] std::string_view text(int column) const;               ///< until the next step
@@ -116,7 +116,7 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalise> statement_;
 };
 
-/// Runs a statement without rows. Returns as `Statement::run`.
+/// Runs a statement without rows. Returns as `Statement::run` does.
 template <class... Values>
 int run_statement(Database& database, const char* sql, const Values&... values) {
   return Statement(database, sql, values...).run();
@@ -126,8 +126,8 @@ class DatabaseTransaction final : public MemoryTables::Transaction {
  public:
   DatabaseTransaction(Database& database, MemoryTables::Kind kind);
   ~DatabaseTransaction() override;
-  /// Returns once everything is on the disk, with a new mark in the table `log`. Throws FileError
-  /// when the file is no longer where it was opened.
+  /// Writes a new mark to the table `log` and commits; returns once everything is on the disk.
+  /// Throws FileError if the file was moved or deleted.
   void commit() override;
 
  private:

@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// Appends a whole number, its least significant byte first.
+/// Appends a whole number, with the least significant byte first.
 template <class Word>
 void append_little_endian(std::vector<std::uint8_t>& bytes, Word word) {
   for (std::size_t shift = 0; shift < 8 * sizeof(Word); shift += 8) {

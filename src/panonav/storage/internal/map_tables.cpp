@@ -14,8 +14,8 @@ namespace panonav {
 
 namespace {
 
-// Records of little-endian numbers: view, component, x, y, heading; and a, b, kind, x, y, heading,
-// weight.
+// Records of little-endian numbers. Node: view, component, x, y, heading. Edge: a, b, kind, x, y,
+// heading, weight.
 constexpr std::size_t node_bytes = 2 * 4 + 3 * 8;
 constexpr std::size_t edge_bytes = 3 * 4 + 4 * 8;
 

@@ -13,21 +13,21 @@
 
 namespace panonav {
 
-/// Named maps in a memory file, within the caller's transaction. All throw FileError on damage.
+/// Named maps of a memory; call the functions within a transaction. All throw FileError on damage.
 
 /// Replaces the map of that name. Throws ContractError on an empty name and as `validate`.
 void write_map(MemoryTables& tables, std::string_view name, const TopologicalMap& map);
-/// Empty when there is no such map.
+/// Returns the map of that name; nullopt if there is none.
 [[nodiscard]] std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view name);
-/// Returns true if there was one.
+/// Removes a map; false if there was none.
 bool erase_map(MemoryTables& tables, std::string_view name);
-/// Removes views from a map, with their edges, and numbers its components again. Returns true if
-/// one was in it.
+/// Removes views and their edges from a map and renumbers its components. Returns true if the map
+/// had one of the views.
 bool forget_views(TopologicalMap& map, const std::set<ViewId>& forgotten);
-/// Drops the nodes of these views, and their edges, from all maps.
+/// Removes these views, as nodes with their edges, from all maps.
 void erase_views_from_maps(MemoryTables& tables, std::span<const ViewId> views);
-/// Passes every map to `check` that may throw; `check` keeps what it threw. `known` says whether a
-/// view is there.
+/// Checks every map: passes each part, which may throw, to `check`, which must collect the errors.
+/// `known` returns true if a view is in the memory.
 void verify_maps(MemoryTables& tables, const std::function<bool(ViewId)>& known,
                  const std::function<void(const std::function<void()>&)>& check);
 

@@ -43,10 +43,10 @@ bool is_writable(const fs::path& path) {
   return ::faccessat(AT_FDCWD, path.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
-// A new name is on the disk once its folder is.
+// A new name is durable only when its folder is synchronised, too.
 void sync_folder(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;  // a folder that may be written but not read: nothing to be done
+  if (descriptor < 0) return;  // not possible in folders that cannot be read
   static_cast<void>(::fsync(descriptor));
   ::close(descriptor);
 }
@@ -57,8 +57,8 @@ void remove_log_files(const fs::path& path) {
   }
 }
 
-/// Opens a file with changes in its log whose shared index cannot be made, as on a full disk: keeps
-/// the index in memory, which locks others out until it is closed.
+/// Opens a file with changes in its log if the shared index of the log cannot be made, as on a full
+/// disk. The index is kept in memory, which locks others out until the file is closed.
 Database read_with_private_index(const fs::path& file) {
   Database database(file, DatabaseMode::change);
   database.leave_log_on_close();
@@ -88,30 +88,30 @@ Database open_memory_database(const fs::path& path, Access access) {
   const auto size_of = [&](const fs::path& part) -> std::uintmax_t {
     return fs::exists(part, ignored) ? fs::file_size(part, ignored) : 0;
   };
-  // Whoever uses a log shares an index of at least one region (sqlite.org/walformat.html); a full
-  // disk leaves a shorter one.
+  // Programs that use a log share an index of at least one region (sqlite.org/walformat.html); on a
+  // full disk it may be shorter.
   constexpr std::uintmax_t index_region_bytes = 32768;
   const auto is_log_in_use = [&] {
     return size_of(with_suffix(file, "-shm")) >= index_region_bytes;
   };
-  // Nobody has the file open for writing and nobody left changes behind.
+  // True if nobody has the file open for writing and no changes are left in the log.
   const auto at_rest = [&] { return size_of(log) == 0 && !is_log_in_use(); };
-  // A reader without permission cannot make the log that SQLite wants to find.
+  // A reader without write permission cannot create the log that SQLite needs.
   if (!may_write && at_rest()) {
     return {file, DatabaseMode::immutable};
   }
   require_own_log(file);
   try {
-    // Opened for writing, where that is possible, so that SQLite can clear its log away in the end;
-    // no statement may write.
+    // Opened for writing if possible, so that SQLite can remove its log at the end; no statement
+    // may write.
     Database database(file, may_write ? DatabaseMode::change : DatabaseMode::read);
     database.execute("PRAGMA query_only=ON");
-    // The first access to the file: now SQLite makes or finds its log.
+    // The first access to the file makes SQLite create or find its log.
     static_cast<void>(database.integer("PRAGMA schema_version"));
     return database;
   } catch (const FileError&) {
-    // No room for a log on a full disk, or a file system that cannot share one. A file that is
-    // damaged is found to be so again.
+    // There is no room for a log on a full disk, or the file system cannot share one. For a damaged
+    // file the next attempt fails as well.
     if (at_rest()) return {file, DatabaseMode::immutable};
     if (may_write && !is_log_in_use()) return read_with_private_index(file);
     if (may_write || size_of(log) == 0) throw;
@@ -122,7 +122,7 @@ Database open_memory_database(const fs::path& path, Access access) {
   }
 }
 
-// Gives a checked file in another journal mode what changes need.
+// Switches a checked file to a write-ahead log, as changes require.
 void prepare_for_changes(Database& database) {
   Statement mode(database, "PRAGMA journal_mode=WAL");
   if (!mode.step() || mode.text(0) != "wal") {
@@ -148,7 +148,7 @@ void check_path_is_free(const fs::path& path) {
   if (!is_writable(folder)) {
     throw FileError(name, "cannot be created: no permission to write in " + folder.string());
   }
-  // A log without its file would be used as this file's own.
+  // SQLite would take a stray log of an earlier file for this file's own.
   for (const char* suffix : {"-wal", "-shm", "-journal"}) {
     const fs::path stray = with_suffix(path, suffix);
     if (fs::exists(fs::symlink_status(stray, ignored))) {
@@ -158,7 +158,8 @@ void check_path_is_free(const fs::path& path) {
   }
 }
 
-// A link refuses a name that is used meanwhile; a rename would replace that file.
+// A hard link fails if the name has been used in the meantime, while a rename would replace that
+// file.
 void link_to_final_name(const fs::path& unfinished, const fs::path& path) {
   if (::link(unfinished.c_str(), path.c_str()) != 0) {
     if (errno == EEXIST) throw_name_taken(path);
@@ -182,7 +183,7 @@ void create_memory_tables(const fs::path& path, const MemoryHeader& header,
   try {
     Database database(unfinished.path(), DatabaseMode::create);
     database.execute("PRAGMA synchronous=FULL");
-    // Three views of 80 x 15 fit on a page; larger pages cost more bytes per append.
+    // A page holds three views of 80 x 15; larger pages would write more bytes for each append.
     database.execute("PRAGMA page_size=8192");
     DatabaseTransaction transaction(database, MemoryTables::Kind::writing);
     create_schema(database);

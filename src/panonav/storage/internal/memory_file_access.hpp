@@ -9,8 +9,8 @@
 
 namespace panonav {
 
-/// Makes a memory, in a file or on a server, with what `fill` writes, whole or not at all. Throws
-/// FileError when something is there.
+/// Creates a memory in a file or on a server with the content that `fill` writes, completely or not
+/// at all. Throws FileError if there is something at `path`.
 void create_memory_tables(const std::filesystem::path& path, const MemoryHeader& header,
                           const std::function<void(MemoryTables&)>& fill);
 
@@ -19,10 +19,11 @@ struct OpenedMemory {
   MemoryHeader header;
 };
 
-/// Opens an existing memory on a server, or a file after checking its first bytes, and checks its
-/// schema and header. With read_only nothing can change the file. A file in another journal mode is
-/// given what changes need. Throws FileError: missing, no memory file, of another format version,
-/// damaged, no permission, or another program is using it just then.
+/// Opens an existing memory on a server, or a file whose first bytes it checks before; then it
+/// checks schema and header. With read_only nothing can change the file. With read_write it
+/// switches a file of another journal mode to a write-ahead log. Throws FileError if the memory is
+/// missing, damaged or of another format version, if the file is no memory file or there is no
+/// permission, or if another program is using it at this moment.
 [[nodiscard]] OpenedMemory open_memory_tables(const std::filesystem::path& path, Access access);
 
 }  // namespace panonav

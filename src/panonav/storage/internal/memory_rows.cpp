@@ -21,7 +21,8 @@ void unpack_signature(std::span<const std::uint8_t> bytes, SignatureShape shape,
   signature.phases.assign(bytes.begin() + half, bytes.end());
 }
 
-// The signature is hashed in place; the hash of the short fields is its seed.
+// The short fields are hashed first, and their hash is the seed for the signature, which needs no
+// copy.
 std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,
                            std::span<const std::uint8_t> signature) {
   scratch.clear();

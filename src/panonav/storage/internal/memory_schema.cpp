@@ -25,11 +25,11 @@ namespace {
 
 struct Table {
   std::string_view name;
-  const char* sql;  // as SQLite keeps it
+  const char* sql;  // text as SQLite stores it
 };
 
 // Links have a < b. Every checksum is XXH64 over the other fields of its row (docs/formats.md). The
-// table `log` comes first, so that it is on the second page of every file.
+// table `log` is first, so that it is on the second page of every file.
 constexpr std::array<Table, 12> tables{{
     {"log",
      "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT"},
@@ -70,10 +70,10 @@ constexpr std::array<Table, 12> tables{{
      "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
 }};
 
-// Entries that SQLite adds by itself: the last id of the views, and the index of their names.
+// Entries that SQLite adds by itself: the table with the last view id, and the index of the names.
 constexpr std::string_view sequence = "CREATE TABLE sqlite_sequence(name,seq)";
 constexpr std::string_view names_index = "sqlite_autoindex_views_1";
-// The second end of a link, so that a view's links are found from either.
+// Index of the second end of links, so that the links of a view are found from either end.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
 
 std::string to_hexadecimal(std::uint32_t value) {
@@ -105,8 +105,8 @@ void require_memory_file(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path, ignored)) {
     throw FileError(name, "is a folder; allowed: a memory file");
   }
-  // Through SQLite, which knows of its other connections to the file in this process: closing a
-  // descriptor of our own would give up all locks that they hold.
+  // The file is read through SQLite, which knows its other connections to it in this process:
+  // closing a descriptor of our own would release all locks that they hold.
   if (::access(path.c_str(), R_OK) != 0) {
     throw FileError(name, "cannot be read: " + std::generic_category().message(errno));
   }
@@ -156,7 +156,8 @@ void require_schema(Database& database) {
   const auto fail = [&](std::string_view type, std::string_view name, const char* what) {
     database.fail_damaged(std::string(type) + " " + std::string(name.substr(0, 60)) + " " + what);
   };
-  // An entry is erased when it is found, so that a second one of its name is refused.
+  // An entry is removed from `missing` when it is found, so that a second one of its name is
+  // refused.
   Statement rows(database,
                  "SELECT type, name, tbl_name, coalesce(sql, ''), rootpage FROM sqlite_schema");
   std::set<std::int64_t> pages{1};

@@ -69,7 +69,7 @@ std::string MemoryTables::shorten_message(std::string_view message) const {
 }
 
 void MemoryTables::leave_out(std::optional<ViewId> view, std::string_view what) {
-  constexpr std::size_t max_reported = 10;  // chosen: a screenful, however many rows are bad
+  constexpr std::size_t max_reported = 10;  // chosen: one screen, however many rows are bad
   MemoryFile::Fault fault{view, shorten_message(what)};
   if (std::ranges::find(left_out_, fault) != left_out_.end()) return;
   if (view) left_out_views_.insert(*view);

@@ -19,8 +19,8 @@
 
 namespace panonav {
 
-/// A row of the table of views as it is stored, not checked yet. `signature` is valid until the
-/// next row is read.
+/// A row of the table of views as stored, before any check. `signature` is valid until the next row
+/// is read.
 struct ViewRow {
   ViewId id;
   ReferenceInfo info;
@@ -28,7 +28,7 @@ struct ViewRow {
   std::int64_t checksum = 0;
 };
 
-/// The columns that a sketch is made of; no checksum covers them alone.
+/// The columns that sketches are computed from; no checksum covers only these.
 struct MagnitudesRow {
   ViewId id;
   std::optional<Point2> position;
@@ -61,21 +61,21 @@ struct StoredBytes {
 /// Tables of bytes that some views have.
 enum class ViewAttachment { thumbnails, features };
 
-/// A row that holds what no program of ours writes; the memory's other rows may be sound.
+/// Thrown for a row with content that our programs never write; the other rows may be correct.
 class DamageError : public FileError {
  public:
   using FileError::FileError;
 };
 
-/// Storage of the rows of one memory: an SQLite file or a PostgreSQL server. `MemoryFile`,
-/// map_tables.hpp and route_tables.hpp decide what the rows mean and what is refused. Everything
-/// that the database refuses is thrown as a FileError of one line that names the memory.
+/// Storage of the rows of one memory: an SQLite file or a PostgreSQL server. It stores rows;
+/// `MemoryFile`, map_tables.hpp and route_tables.hpp decide what rows mean and what is refused.
+/// Functions throw FileError of one line that names the memory if the database refuses anything.
 class MemoryTables {
  public:
   enum class Kind { reading, writing };
 
-  /// Rolls back unless committed. Within a writing transaction it is a part of that one, which is
-  /// rolled back alone or committed with the whole.
+  /// Rolls back at destruction unless committed. A transaction within a writing one is a part of
+  /// it: it can be rolled back alone, and is committed with the whole.
   class Transaction {
    public:
     Transaction() = default;
@@ -87,7 +87,7 @@ class MemoryTables {
   };
   template <class Row>
   using Consume = std::function<void(const Row&)>;
-  /// Runs a part of `verify` and keeps what it throws.
+  /// Runs a part of `verify` and collects the error that it throws.
   using Check = std::function<void(const std::function<void()>&)>;
 
   MemoryTables() = default;
@@ -97,17 +97,18 @@ class MemoryTables {
 
   /// Returns the path or address as it was passed.
   [[nodiscard]] virtual const std::filesystem::path& path() const noexcept = 0;
-  /// Returns the path that messages of damage name.
+  /// Returns the path that is named in messages about damage.
   [[nodiscard]] virtual const std::filesystem::path& message_path() const noexcept = 0;
   /// Throws DamageError.
   [[noreturn]] void fail_damaged(std::string_view what) const;
-  /// Throws DamageError on a link of which a view is missing.
+  /// Throws DamageError on a link one of whose views is missing.
   [[noreturn]] void fail_incomplete(const Link& link) const;
-  /// True if others than this program's user may write rows, as on a server: a bad row is then left
-  /// out and noted, so that it keeps nobody from the other rows. In a file it is a fault.
+  /// True if others than the user of this program may write rows, as on a server. A bad row is then
+  /// left out and reported, so that it does not block access to the other rows; in a file it is an
+  /// error.
   [[nodiscard]] virtual bool tolerates_bad_rows() const noexcept { return false; }
   /// Runs `work`, which reads one row. Returns false if it threw DamageError and the row was left
-  /// out; where bad rows are not tolerated, and for other errors, the error is thrown on.
+  /// out. If bad rows are not tolerated, the error is thrown on, as all other errors are.
   template <class Work>
   bool accept_row(std::optional<ViewId> view, const Work& work) {
     try {
@@ -119,12 +120,13 @@ class MemoryTables {
       return false;
     }
   }
-  /// Notes that a row was left out, for the handler of `set_left_out_handler` as well, unless it is
-  /// known. `view`: the one that is missing now, nullopt if it is another row.
+  /// Records that a row was left out and reports it to the handler of `set_left_out_handler`,
+  /// unless that was done before. `view` is the view that is missing because of that; nullopt for
+  /// other rows.
   void leave_out(std::optional<ViewId> view, std::string_view what);
-  /// Largest number of faults that are kept, so that noting one stays cheap. Chosen.
+  /// Largest number of recorded faults, chosen so that recording one more stays cheap.
   static constexpr std::size_t max_left_out = 1000;
-  /// Returns what was left out since the memory was opened, up to `max_left_out` rows.
+  /// Returns the rows left out since the memory was opened, at most `max_left_out`.
   [[nodiscard]] const std::vector<MemoryFile::Fault>& left_out() const noexcept {
     return left_out_;
   }
@@ -133,43 +135,44 @@ class MemoryTables {
   [[nodiscard]] const std::set<ViewId>& left_out_views() const noexcept { return left_out_views_; }
   /// Removes the memory's path and "is damaged: " from the beginning of a message.
   [[nodiscard]] std::string shorten_message(std::string_view message) const;
-  /// Throws FileError on a number that no view has.
+  /// Converts a stored number to a view id. Throws FileError if it is out of range.
   [[nodiscard]] ViewId to_view_id(std::int64_t number) const;
-  /// Returns the row itself. Throws DamageError when it does not match its checksum, and as
+  /// Checks a row and returns it. Throws DamageError if it does not match its checksum, and as
   /// `check_info`.
   const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
   /// Throws DamageError on values out of range (`validate` of reference_validation.hpp).
   void check_info(ViewId view, const ReferenceInfo& info) const;
   /// Throws DamageError if the bytes do not match their checksum.
   void check_attachment(ViewAttachment table, ViewId view, const StoredBytes& stored) const;
-  /// Returns the link of the row. Throws as above, and on values that no link has.
+  /// Returns the link of the row. Throws DamageError if its checksum or its values are wrong.
   [[nodiscard]] Link checked(const LinkRow& row) const;
   [[nodiscard]] virtual std::unique_ptr<Transaction> transaction(Kind kind) = 0;
 
-  /// Every checksum is checked.
+  /// Returns all settings, after checking their checksums.
   [[nodiscard]] virtual Settings settings() = 0;
-  /// Replaces the value that the key had.
+  /// Sets the value of a key.
   virtual void write_setting(const std::string& key, const SettingValue& value) = 0;
   virtual void erase_setting(const std::string& key) = 0;
 
-  /// The largest id that was ever given to a view; 0: none.
+  /// Returns the largest id that a view ever had; 0: none.
   [[nodiscard]] virtual std::uint32_t last_id() = 0;
-  /// Views with ids above `last_id`, ascending. Throws as `throw_used_name`.
+  /// Adds views, whose ids are above `last_id` and ascending. Throws as `throw_used_name`.
   virtual void insert(std::span<const ViewId> ids, std::span<const NewView> views) = 0;
-  /// Throws as `throw_unknown_view` for the first that is not there.
+  /// Throws as `throw_unknown_view` for the first of these views that does not exist.
   virtual void require_views(std::span<const ViewId> views) = 0;
   /// Removes views with their links, thumbnails and features.
   virtual void remove(std::span<const ViewId> views) = 0;
-  /// Replaces all but the signature. Throws as `throw_used_name`.
+  /// Replaces name, pose, stamp and checksum of a view. Throws as `throw_used_name`.
   virtual void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) = 0;
-  /// All, ascending.
+  /// Reads all views, by ascending id.
   virtual void read_views(const Consume<ViewRow>& consume) = 0;
-  /// These, in this order. Throws as `throw_unknown_view`.
+  /// Reads these views, in this order. Throws as `throw_unknown_view`.
   virtual void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) = 0;
   /// Reads those of the views that exist, in any order.
   virtual void read_available_views(std::span<const ViewId> views,
                                     const Consume<ViewRow>& consume) = 0;
-  /// Reads the first `bytes` of each signature of the views with ids first .. last, ascending.
+  /// Reads the first `bytes` bytes of the signatures of the views with ids first .. last, by
+  /// ascending id.
   virtual void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
                                const Consume<MagnitudesRow>& consume) = 0;
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
@@ -179,12 +182,12 @@ class MemoryTables {
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;
   /// Returns the views within the bounds, ascending.
   [[nodiscard]] virtual std::vector<PosedView> views_within(const PositionBounds& bounds) = 0;
-  /// Returns the views that have one, ascending.
+  /// Returns the views that have an entry in the table, ascending.
   [[nodiscard]] virtual std::vector<ViewId> views_with_attachment(ViewAttachment table) = 0;
   [[nodiscard]] virtual bool has_attachments(ViewAttachment table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) = 0;
-  /// Reads the bytes and checks them. Throws as `throw_unknown_view`, and FileError if they do not
-  /// match their checksum.
+  /// Returns the bytes after checking them; nullopt if there are none. Throws as
+  /// `throw_unknown_view`, and DamageError if they do not match their checksum.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> read_checked_bytes(ViewAttachment table,
                                                                             ViewId view);
 
@@ -202,7 +205,7 @@ class MemoryTables {
 
   virtual void write_route(std::string_view name, const RouteRow& row) = 0;
   [[nodiscard]] virtual std::optional<RouteRow> route(std::string_view name) = 0;
-  /// Erases a route with its blocks.
+  /// Removes a route with its blocks.
   virtual void erase_route(std::string_view name) = 0;
   /// Returns the names, ascending.
   [[nodiscard]] virtual std::vector<std::string> route_names() = 0;
@@ -211,20 +214,21 @@ class MemoryTables {
   [[nodiscard]] virtual std::optional<StoredBytes> block(std::string_view route,
                                                          std::int64_t number) = 0;
   [[nodiscard]] virtual std::int64_t blocks(std::string_view route) = 0;
-  /// Bytes of all its blocks.
+  /// Returns the packed bytes of all blocks of a route.
   [[nodiscard]] virtual std::int64_t route_bytes(std::string_view route) = 0;
-  /// Routes that have blocks.
+  /// Returns the names of routes that have blocks.
   [[nodiscard]] virtual std::vector<std::string> routes_with_blocks() = 0;
 
-  /// Within a writing transaction: runs `changes` and keeps what they replace or drop.
+  /// Runs `changes` within a writing transaction, and keeps the rows that they add, replace or
+  /// remove, so that `undo` can restore them.
   virtual void run_with_undo(const std::function<void()>& changes, const std::string& what) = 0;
-  /// The newest first.
+  /// Returns the kept changes, newest first.
   [[nodiscard]] virtual std::vector<MemoryFile::KeptChange> history() = 0;
   /// Undoes the newest change, within a writing transaction.
   virtual void undo() = 0;
 
-  /// Passes every part of the check of the tables themselves to `check`; nothing after it is safe
-  /// to read despite faults. Returns the ids of all views found.
+  /// Checks the tables themselves: passes each part to `check`. If it finds faults, later reads may
+  /// fail. Returns the ids of all views found.
   [[nodiscard]] virtual std::set<ViewId> verify_structure(const Check& check) = 0;
   [[nodiscard]] virtual MemoryFile::Info info() = 0;
 

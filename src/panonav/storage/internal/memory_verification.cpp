@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-// Runs parts of a check and collects what they throw, so that no fault hides another.
+// Runs parts of a check and collects their errors, so that no fault hides another.
 class MemoryVerification {
  public:
   MemoryVerification(MemoryTables& tables, const MemoryHeader& header)
@@ -31,7 +31,7 @@ class MemoryVerification {
     verify_links_and_maps(check_part);
     check([&] { verify_routes(tables_, check_part); });
     check([&] { static_cast<void>(tables_.history()); });
-    // Rows of a server that the functions above left out.
+    // Adds the rows of a server that the functions above left out.
     for (const MemoryFile::Fault& fault : tables_.left_out()) {
       if (std::ranges::find(faults_, fault) == faults_.end()) faults_.push_back(fault);
     }

@@ -6,12 +6,12 @@
 
 namespace panonav {
 
-/// Finds all faults of a memory: structure, then view by view, then what belongs to the views.
-/// Empty: intact.
+/// Finds all faults of a memory: of its structure, of each view, then of attachments, links, maps
+/// and routes. Returns none if it is intact.
 [[nodiscard]] std::vector<MemoryFile::Fault> verify_memory(MemoryTables& tables,
                                                            const MemoryHeader& header);
 
-/// Finds the faults of links and maps alone, those that lack a view among them.
+/// Finds the faults of links and maps only, also views that they lack.
 [[nodiscard]] std::vector<MemoryFile::Fault> verify_links_and_maps(MemoryTables& tables,
                                                                    const MemoryHeader& header);
 

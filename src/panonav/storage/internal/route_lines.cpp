@@ -13,8 +13,9 @@ namespace panonav {
 
 namespace {
 
-// A line's words: x_m, y_m, heading_rad (8 bytes each) and its turn (2 bytes). Byte k of all lines
-// stands together, so that values that hardly change along the route are adjacent.
+// Head of a line: x_m, y_m, heading_rad (8 bytes each) and its rotation in columns (2 bytes). Byte
+// k of all lines is stored together, so that values that hardly change along the route are
+// adjacent.
 constexpr std::size_t reals_of_pose = 3;
 constexpr std::size_t head_bytes = 8 * reals_of_pose + 2;
 
@@ -22,7 +23,7 @@ double& to_real(Pose2& pose, std::size_t i) {
   return i == 0 ? pose.x_m : i == 1 ? pose.y_m : pose.heading_rad;
 }
 
-// Returns the columns by which the line before is shifted to the heading of this one.
+// Returns the columns by which the previous line is shifted to the heading of this one.
 std::size_t rotation_in_columns(const Pose2& before, const Pose2& now, std::size_t columns) {
   const auto size = static_cast<long long>(columns);
   const auto turn = std::llround((now.heading_rad - before.heading_rad) *
@@ -30,7 +31,7 @@ std::size_t rotation_in_columns(const Pose2& before, const Pose2& now, std::size
   return static_cast<std::size_t>((turn % size + size) % size);
 }
 
-// Predicts the value of a column: the mean of its left neighbour and of the line before there.
+// Predicts a column as the mean of its left neighbour and of the previous line at that place.
 int predict_pixel(std::span<const std::uint8_t> before, std::size_t turn,
                   std::span<const std::uint8_t> line, std::size_t column) {
   const int above = before.empty() ? 0 : before[(column + turn) % before.size()];
@@ -53,7 +54,7 @@ std::vector<std::uint8_t> compress_bytes(std::span<const std::uint8_t> plain, in
   const int code = deflate(&stream, Z_FINISH);
   packed.resize(stream.total_out);
   deflateEnd(&stream);
-  if (code != Z_STREAM_END) throw std::bad_alloc();  // the bound leaves room for anything
+  if (code != Z_STREAM_END) throw std::bad_alloc();  // cannot happen: the buffer has the bound
   return packed;
 }
 
@@ -87,7 +88,7 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
   }
   std::vector<std::uint8_t> packed = compress_bytes(plain, Z_DEFAULT_STRATEGY);
   if (plain.size() > max_unpacked_for_each_byte * packed.size()) {
-    packed = compress_bytes(plain, Z_HUFFMAN_ONLY);  // a bit a byte at least
+    packed = compress_bytes(plain, Z_HUFFMAN_ONLY);  // at least one bit a byte
   }
   return packed;
 }

@@ -9,18 +9,18 @@
 
 namespace panonav {
 
-/// Lines `first` .. `first + count` of a route and their poses as packed bytes, without loss
-/// (docs/formats.md, route_blocks): what a line differs by from a guess. The guess knows the line
-/// before, rotated with the robot, and the columns of the line itself up to there.
+/// Packs the lines `first` .. `first + count` of a route and their poses without loss
+/// (docs/formats.md, route_blocks), as differences from a prediction. It predicts a line from the
+/// previous one, rotated with the robot, and from the line's own columns so far.
 [[nodiscard]] std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route,
                                                          std::size_t first, std::size_t count);
 
-/// Largest number of bytes to which one packed byte unpacks, so that the size of a file bounds the
-/// memory it takes. Images of real places are far below.
+/// Largest number of bytes that one packed byte can give, so that the size of a file limits the
+/// memory it needs. Images of real places stay far below.
 inline constexpr std::size_t max_unpacked_for_each_byte = 100;
 
-/// Appends `count` lines that `pack_route_lines` packed. False where `bytes` are anything else; the
-/// route may then hold some of them.
+/// Unpacks `count` lines of `pack_route_lines` and appends them to the route. Returns false if the
+/// bytes are not valid; the route may then have some of the lines.
 [[nodiscard]] bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,
                                       RoutePanorama& route);
 

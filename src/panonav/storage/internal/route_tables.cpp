@@ -13,8 +13,8 @@ namespace panonav {
 
 namespace {
 
-// Lines of a full block. Many, so that SQLite's overhead for each block is relatively small; not
-// more, as the last block is written again with every append.
+// Lines of a full block. A larger number has less overhead of SQLite for each block; a smaller one
+// writes less with each append, which replaces the last block.
 constexpr std::int64_t lines_of_block = 256;
 
 std::int64_t compute_row_checksum(std::string_view name, const RouteRow& row) {
@@ -29,7 +29,7 @@ std::int64_t count_blocks(const RouteRow& row) {
   return (row.lines - 1) / lines_of_block + 1;
 }
 
-// Lines of block `number`: all are full but the last.
+// Returns the number of lines of block `number`; all blocks but the last are full.
 std::int64_t count_lines(const RouteRow& row, std::int64_t number) {
   return std::min(lines_of_block, row.lines - number * lines_of_block);
 }
@@ -58,7 +58,7 @@ std::optional<RouteRow> read_row(MemoryTables& tables, std::string_view name) {
   if (row->lines < 1 || row->checksum != compute_row_checksum(name, *row)) {
     fail_route(tables, name, "does not match its checksum");
   }
-  // Its last block must be there: a count that the file has no room for is found at once.
+  // The last block must exist, so that an impossible number of lines is found at once.
   if (!tables.block(name, count_blocks(*row) - 1)) {
     fail_route(tables, name,
                "its last block of " + std::to_string(count_blocks(*row)) + " is missing");
@@ -66,7 +66,7 @@ std::optional<RouteRow> read_row(MemoryTables& tables, std::string_view name) {
   return row;
 }
 
-// Replaces the block of that number.
+// Writes or replaces the block of that number.
 void write_block(MemoryTables& tables, std::string_view name, std::int64_t number,
                  std::span<const std::uint8_t> lines) {
   tables.write_block(name, number, lines, compute_block_checksum(name, number, lines));
@@ -77,7 +77,7 @@ void write_row(MemoryTables& tables, std::string_view name, RouteRow row) {
   tables.write_route(name, row);
 }
 
-// The packed lines of block `number`, checked.
+// Returns the packed lines of block `number`, after checking them.
 std::vector<std::uint8_t> read_block(MemoryTables& tables, std::string_view name,
                                      std::int64_t number) {
   const std::string block = "block " + std::to_string(number);
@@ -109,7 +109,7 @@ std::size_t append_to_route(MemoryTables& tables, std::string_view name,
     throw ContractError("columns", more.columns(),
                         std::to_string(row.columns) + ", as in the route " + std::string(name));
   }
-  // Reopens the last block; a full one only to read the last line.
+  // Reads the last block to add lines to it; if it is full, only to compare with its last line.
   std::int64_t number = std::max<std::int64_t>(0, count_blocks(row) - 1);
   RoutePanorama open(static_cast<int>(row.columns));
   if (row.lines > 0) read_block(tables, name, row, number, open);
@@ -168,7 +168,7 @@ bool erase_route(MemoryTables& tables, std::string_view name) {
 
 void verify_routes(MemoryTables& tables,
                    const std::function<void(const std::function<void()>&)>& check) {
-  // Names of both tables: a route that either has lost is found in the other.
+  // Names in either table, so that a route that one of them has lost is found in the other.
   std::set<std::string> names;
   const auto add = [&](const std::vector<std::string>& found) {
     names.insert(found.begin(), found.end());

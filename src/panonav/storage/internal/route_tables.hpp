@@ -12,21 +12,22 @@
 
 namespace panonav {
 
-/// Named route panoramas in a memory file, within the caller's transaction. The tables must be
-/// there (memory_schema.hpp). All throw FileError on damage.
+/// Named route panoramas of a memory, whose tables must exist (memory_schema.hpp). Call the
+/// functions within a transaction. All throw FileError on damage.
 
-/// Adds the lines of `more` behind those of the route of that name, which is made where there is
-/// none, and returns how many: the first ones are left out while they are within a millimetre of
-/// the last line there. Throws ContractError on an empty name, a route without lines, and another
-/// number of columns than the route's. Cost: that of `more` and at most one block of lines.
+/// Appends the lines of `more` to the route of that name, which is created if it is missing, and
+/// returns how many were added: first lines within a millimetre of the last stored line are
+/// skipped. Throws ContractError on an empty name, a route without lines, or another number of
+/// columns than the stored route's. Cost: that of `more` and of at most one more block of lines.
 std::size_t append_to_route(MemoryTables& tables, std::string_view name, const RoutePanorama& more);
-/// Empty when there is no such route.
+/// Returns the route of that name; nullopt if there is none.
 [[nodiscard]] std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view name);
-/// Renames a route; there must be one of the old name and none of the new one.
+/// Renames a route, which must exist; the new name must be free.
 void rename_route(MemoryTables& tables, std::string_view name, std::string_view new_name);
-/// Returns true if there was one.
+/// Removes a route; false if there was none.
 bool erase_route(MemoryTables& tables, std::string_view name);
-/// Passes every part to `check` that may throw; `check` keeps what it threw.
+/// Checks every route: passes each part, which may throw, to `check`, which must collect the
+/// errors.
 void verify_routes(MemoryTables& tables,
                    const std::function<void(const std::function<void()>&)>& check);
 

@@ -21,7 +21,7 @@ std::optional<double> optional_real(const Statement& row, int column) {
   return row.real(column);
 }
 
-// Binds name, x_m, y_m, heading_rad, stamp_s from parameter `first` on.
+// Binds name, x_m, y_m, heading_rad and stamp_s to the parameters from `first` on.
 void bind_info(Statement& statement, int first, const ReferenceInfo& info) {
   const auto& pose = info.pose;
   statement.bind(first, info.name)
@@ -93,7 +93,7 @@ void SqliteTables::erase_setting(const std::string& key) {
 }
 
 std::uint32_t SqliteTables::last_id() {
-  // SQLite keeps it in a table without types, which can contain anything.
+  // SQLite stores the last id in a table without types, which can contain anything.
   Statement rows(database_, "SELECT name, seq FROM sqlite_sequence");
   std::int64_t last = 0;
   for (int count = 0; rows.step(); ++count) {
@@ -174,8 +174,8 @@ void SqliteTables::read_views(const Consume<ViewRow>& consume) {
                  "SELECT id, name, x_m, y_m, heading_rad, stamp_s, signature, checksum FROM views "
                  "ORDER BY id");
   for (; rows.step(); ++read) consume(read_view_row(rows));
-  // A page that lost its cells loses views without a fault of their own; the index of the names,
-  // which is on other pages, still counts them.
+  // A damaged page can lose views without any other error; the index of the names, on other pages,
+  // still counts them.
   const std::int64_t count = database_.integer(
       "SELECT count(*) FROM views INDEXED BY sqlite_autoindex_views_1 WHERE name > ''");
   if (count != read) {
@@ -185,9 +185,9 @@ void SqliteTables::read_views(const Consume<ViewRow>& consume) {
 
 void SqliteTables::read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) {
   for (const ViewId view : views) {
-    find_view_.reset();  // what was taken last may have thrown
+    find_view_.reset();  // an earlier `consume` may have thrown
     if (!find_view_.bind(1, view).step()) {
-      // The index of the names is on other pages: it still has rows that the table has lost.
+      // The index of the names is on other pages and still has rows that the table has lost.
       Statement named(database_,
                       "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?", view);
       if (!named.step()) throw_unknown_view(view);
@@ -242,7 +242,7 @@ std::vector<std::string> SqliteTables::names() {
 
 std::vector<ViewId> SqliteTables::views() {
   std::vector<ViewId> views;
-  // The index of the names holds the ids, too, on far fewer pages than the table.
+  // The index of the names also has the ids, and on far fewer pages than the table.
   Statement ids(database_, "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1");
   while (ids.step()) views.push_back(read_view_id(ids, 0));
   std::ranges::sort(views);
@@ -397,8 +397,8 @@ std::vector<std::string> SqliteTables::routes_with_blocks() {
 
 std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
   bool intact = true;
-  // The full check counts the entries of indexes, which has no end where pages refer to each other:
-  // the quick one finds such pages.
+  // The full check counts the entries of indexes, which never ends if pages refer to each other;
+  // the quick check finds such pages first.
   for (const char* sql : {"PRAGMA quick_check", "PRAGMA integrity_check"}) {
     if (!intact) break;
     intact = false;
@@ -414,7 +414,8 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
   check([&] { static_cast<void>(last_id()); });
   check([&] { static_cast<void>(read_synchronised_views(*this)); });
   check([&] { static_cast<void>(read_synchronised_links(*this)); });
-  // Ids of the table and of the index of names: a view that either has lost is found in the other.
+  // Ids in the table and in the index of names, so that a view that one of them has lost is found
+  // in the other.
   std::set<ViewId> views;
   for (const char* sql : {"SELECT id FROM views NOT INDEXED ORDER BY id",
                           "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1"}) {
@@ -431,8 +432,8 @@ MemoryFile::Info SqliteTables::info() {
     return static_cast<std::uint64_t>(database_.integer(sql));
   };
   MemoryFile::Info info;
-  // A condition makes SQLite step through the rows, which is bounded, instead of counting the
-  // entries of pages, which is not.
+  // The condition makes SQLite step through the rows, which the step limit bounds, instead of
+  // counting the entries of pages, which has no limit.
   info.views = count("SELECT count(*) FROM views WHERE id > 0");
   info.views_with_position = count("SELECT count(x_m) FROM views WHERE id > 0");
   info.views_with_heading = count("SELECT count(heading_rad) FROM views WHERE id > 0");

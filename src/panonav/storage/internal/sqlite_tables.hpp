@@ -10,7 +10,7 @@
 
 namespace panonav {
 
-/// The tables of an SQLite file of a checked schema (memory_schema.hpp).
+/// The tables of an SQLite file whose schema has been checked (memory_schema.hpp).
 class SqliteTables final : public MemoryTables {
  public:
   SqliteTables(std::filesystem::path path, Database database);
@@ -72,7 +72,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
   [[nodiscard]] MemoryFile::Info info() override;
 
-  /// For the tables that only a file has (synchronised_tables.hpp).
+  /// Returns the database, for the tables that only files have (synchronised_tables.hpp).
   [[nodiscard]] Database& database() noexcept { return database_; }
 
  private:
@@ -80,14 +80,14 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] ViewRow read_view_row(const Statement& row) const;
   void insert_attachment(ViewAttachment table, ViewId view, std::span<const std::uint8_t> bytes);
   [[nodiscard]] std::vector<std::string> query_texts(const char* sql);
-  /// Drops what exceeds the bounds of `MemoryFile::change`.
+  /// Removes kept changes beyond the limits of `MemoryFile::change`.
   void shorten_history();
-  /// Throws FileError if rows that `undo` changed cannot be read.
+  /// Throws FileError if rows that `undo` has restored cannot be read.
   void require_intact(UndoneRows rows);
 
   std::filesystem::path path_;
   Database database_;
-  std::vector<std::uint8_t> signature_;  // kept, as every view needs one
+  std::vector<std::uint8_t> signature_;  // buffer, reused for every view
   RecordBytes scratch_;
   Statement insert_view_;
   Statement find_name_;

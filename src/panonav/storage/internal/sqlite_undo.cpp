@@ -1,4 +1,4 @@
-// Taking the last changes of an SQLite file back, by the session extension.
+// Undoes the last changes of an SQLite file, by the session extension.
 
 #define SQLITE_ENABLE_SESSION
 #define SQLITE_ENABLE_PREUPDATE_HOOK
@@ -31,7 +31,7 @@ struct EndSession {
   void operator()(sqlite3_session* session) const noexcept { sqlite3session_delete(session); }
 };
 
-// Bytes that SQLite gave away.
+// Frees bytes that SQLite allocated.
 struct FreeBytes {
   void operator()(void* bytes) const noexcept { sqlite3_free(bytes); }
 };
@@ -47,14 +47,14 @@ struct SqliteBytes {
 constexpr const char* select_history =
     "SELECT id, what, stamp_s, changes, checksum FROM history ORDER BY id DESC";
 
-// Empty also where they are kept no more.
+// Returns the kept rows of a change; empty also if only its description is left.
 std::span<const std::uint8_t> changes_in(const Statement& row) {
   if (row.is_null(3)) return {};
   return row.blob(3);
 }
 
-// Steps to the next change and returns its rows; nullopt: there is none. Checks it, so that only
-// whole changes reach SQLite's reader.
+// Steps to the next change and returns its rows; nullopt if there is none. It checks the change
+// first, so that SQLite's own reader gets only valid ones.
 std::optional<UndoneRows> step_checked(Database& database, Statement& row) {
   if (!row.step()) return std::nullopt;
   const auto changes = changes_in(row);
@@ -73,7 +73,8 @@ double now_s() {
   return std::chrono::duration<double>(since).count();
 }
 
-// Settings are notes on the views, which are checked when they are used: newer ones stay.
+// Newer settings stay, because settings are notes about the views, which are checked when they are
+// used.
 int on_conflict(void* in_the_way, int, sqlite3_changeset_iter* change) {
   const char* table = nullptr;
   int columns = 0;

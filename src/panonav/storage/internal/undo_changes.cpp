@@ -18,7 +18,7 @@ namespace {
 /// Types of a field in a changeset.
 enum class FieldType : std::uint8_t { missing = 0, integer, real, text, blob, null };
 
-/// Column of a table that can be undone.
+/// A column of a table that can be undone.
 struct Column {
   FieldType type;  ///< `null`: any type
   bool is_key = false;
@@ -35,7 +35,7 @@ struct UndoTable {
   std::vector<Column> columns;
 };
 
-/// Tables whose rows are kept, with the columns that `create_schema` gives them.
+/// Tables whose changed rows are kept, with the columns of `create_schema`.
 const std::array<UndoTable, 8>& undo_tables() {
   static const std::array<UndoTable, 8> tables{{
       {"views",
@@ -166,7 +166,7 @@ class ChangeReader {
     note(row);
   }
 
-  /// Columns that did not change are missing from both rows, but for the key of the old one.
+  /// Unchanged columns are missing in both rows, except the key, which the old row has.
   void check_update(const std::vector<Field>& old_row, const std::vector<Field>& new_row) {
     for (std::size_t i = 0; i < old_row.size(); ++i) {
       const Column& column = table_->columns[i];

@@ -11,21 +11,22 @@
 
 namespace panonav {
 
-/// Returns the names of the tables whose rows `undo` brings back, each with a zero byte behind it.
+/// Returns the names of the tables whose rows `undo` restores; each name is followed by a zero byte
+/// in memory.
 [[nodiscard]] std::vector<std::string_view> undo_table_names();
 
-/// Rows that kept changes would bring back, replace or drop.
+/// Rows that undoing a change would add, replace or remove.
 struct UndoneRows {
-  std::vector<ViewId> views;  ///< of all tables, ends of links too; with repetitions
+  std::vector<ViewId> views;  ///< from all tables, also ends of links; repeated
   std::set<std::string, std::less<>> maps;
   std::set<std::string, std::less<>> routes;
 };
 
-/// Reads kept changes of a memory file (a changeset of SQLite's session extension,
-/// sqlite.org/sessionintro.html) to their last byte, and returns their rows: files of others must
-/// not reach SQLite's own reader unchecked. Throws Error that states the fault unless each change
-/// is one of a table that can be undone, with all of its columns, their types and its key, and
-/// nothing follows. Cost: one pass over the bytes.
+/// Parses a kept change of a memory file (a changeset of SQLite's session extension,
+/// sqlite.org/sessionintro.html) completely, and returns its rows. Unchecked files from others must
+/// not reach SQLite's own reader. Throws Error with the fault unless each row is of a table that
+/// can be undone and has all of its columns, types and its key, and nothing follows. Cost: one pass
+/// over the bytes.
 [[nodiscard]] UndoneRows read_undo_changes(std::span<const std::uint8_t> changes);
 
 }  // namespace panonav

@@ -31,14 +31,15 @@ struct Marks {
   Mark now{};
 };
 
-// The position of the mark in the file itself, without any log, and the mark.
+// The mark in the file itself, without any log, and its page.
 struct FileMark {
   std::uint32_t page = 0;
   Mark now{};
 };
 
-// The only row of the table `log` in its only page (SQLite's file format, section 1.6): a leaf with
-// one cell of 36 bytes and row id 1, whose record of 4 bytes says: id, two blobs of 16 bytes.
+// Returns the marks of the only row of the table `log`, in its only page (SQLite's file format,
+// section 1.6): a leaf with one cell of 36 bytes and row id 1. The record begins with a head of 4
+// bytes: id, and two blobs of 16 bytes.
 std::optional<Marks> find_marks(std::span<const std::uint8_t> page) {
   constexpr std::array<std::uint8_t, 6> head{36, 1, 4, 0, 44, 44};
   if (page[0] != 0x0D || page[3] != 0 || page[4] != 1) return std::nullopt;
@@ -54,8 +55,8 @@ std::optional<Marks> find_marks(std::span<const std::uint8_t> page) {
 
 FileMark read_file_mark(const fs::path& file) {
   Database database(file, DatabaseMode::immutable);
-  // A writer that was killed while the log went into the file may have left it shorter than its
-  // first page says; with this, SQLite reads it nevertheless.
+  // If a writer was killed while it copied the log into the file, the file may be shorter than its
+  // first page states; with this setting SQLite reads it nevertheless.
   sqlite3_db_config(database.handle(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
   database.execute("PRAGMA writable_schema=ON");
   Statement root(database,
@@ -74,8 +75,8 @@ FileMark read_file_mark(const fs::path& file) {
   return mark;
 }
 
-// Reads a log as SQLite does (file format, section 4): frames count as far as salts and running
-// checksums hold, and up to the last one that ends a change.
+// Reads a log as SQLite does (file format, section 4): frames are valid as long as salts and
+// running checksums match, up to the last frame that ends a change.
 class LogReader {
  public:
   explicit LogReader(const fs::path& log) : in_(log, std::ios::binary) {
@@ -95,8 +96,8 @@ class LogReader {
 
   struct Content {
     std::size_t changes = 0;
-    bool starts_with_mark = false;  // the first change holds one
-    std::vector<Marks> marks;       // of all changes
+    bool starts_with_mark = false;  // the first change has a mark
+    std::vector<Marks> marks;       // of all complete changes
   };
   Content read_all(std::uint32_t page_of_marks) {
     Content content;
@@ -151,7 +152,7 @@ class LogReader {
 bool is_own_log(const fs::path& file, const fs::path& log) {
   const auto mark = read_file_mark(file);
   const auto content = LogReader(log).read_all(mark.page);
-  if (content.changes == 0) return true;  // SQLite finds nothing in it either
+  if (content.changes == 0) return true;  // SQLite uses nothing of it either
   if (!content.starts_with_mark) return false;
   return mark.now == content.marks.front().before ||
          std::ranges::any_of(content.marks, [&](const Marks& m) { return m.now == mark.now; });
@@ -176,12 +177,12 @@ void require_own_log(const fs::path& file) {
                         "; remove the log if the file is a backup, or put back the file that the "
                         "log belongs to");
   };
-  // Files in that mode belong to other programs, whose changes are not marked.
+  // A journal belongs to another program, whose changes have no marks.
   const fs::path journal = beside("-journal");
   if (size(journal) > 0 && std::ifstream(journal).peek() != 0) refuse(journal);
 
   const fs::path log = beside("-wal");
-  // A writer may move its log into the file between the two checks.
+  // Repeated, because a writer may move its log into the file between the two checks.
   constexpr int max_looks = 20;
   constexpr std::chrono::milliseconds pause(20);
   for (int look = 0; look < max_looks; ++look) {
