@@ -43,10 +43,11 @@ struct PlaceModel {
 /// Learns the model from the memory itself; no other scene and no label is needed.
 ///
 /// A view mirrored left to right shows a place that does not exist, so its best match has the
-/// difference reached by chance. The threshold is the mean of two medians: of the best difference
-/// of real views and of mirrored ones. In a corridor, mirrored views do find a match; therefore the
-/// threshold is at least the smallest of `related_share` times the median difference between any
-/// views, `unrelated_difference` and, if positions are known, `nearest_view_difference`.
+/// difference reached by chance. `threshold` is the mean of the median best difference of real
+/// views and that of mirrored views. In a corridor, mirrored views do find a match, and this mean
+/// is too small. `threshold` is therefore at least the smallest of three values: `related_share`
+/// times the median difference between any views, `unrelated_difference`, and
+/// `nearest_view_difference` if positions are known.
 ///
 /// Throws OptionError. Cost: two comparisons of columns for each pair of views: 0.2 s for the
 /// defaults and a memory of 1000 views.

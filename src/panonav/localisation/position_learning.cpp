@@ -91,7 +91,8 @@ void leave_out(const ColumnRanking& ranking, const NeighbourSupport& support, Vi
     std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
   }
   support.rank_by_support(ranking.profiles(view), ranked, excluded);
-  // The nearest view must have a pose, as in an answer.
+  // `Localiser` computes a position only if the best match has a pose, so only such are learnt
+  // from.
   const auto begins_posed = [&](std::span<const RankedMatch> matches) {
     return !matches.empty() && memory.info(matches[0].match.view).pose;
   };

@@ -15,8 +15,8 @@ struct MemoryExport {
   std::size_t pictures = 0;
   /// Number of exported images with other names than their views, which cannot be file names.
   std::size_t renamed = 0;
-  /// True if the data set has positions, which requires one for each image. Otherwise positions are
-  /// only in views.csv.
+  /// True if the data set has positions, that is, if each exported view has a position. Otherwise
+  /// positions are only in the file views.csv.
   bool positions = false;
   bool headings = false;  ///< like `positions`; false without them
   bool stamps = false;    ///< like `positions`

@@ -25,10 +25,10 @@ struct Direction2 {
 /// Returns `count` directions, equally spaced from the x axis counter-clockwise.
 [[nodiscard]] std::vector<Direction2> equal_directions(std::size_t count);
 
-/// Finds the crossing nearest to `viewpoint` for each of `directions`, which must be those of
-/// `equal_directions` [Y03 eq. 5, for paths of any shape]. Light in the plane of the path that
-/// reaches the viewpoint has passed the crossing or would pass it later; the nearest crossing has
-/// the fewest objects in between. `path`: poses of the lines from `first` on. Throws nothing. Cost:
+/// Finds for each of `directions`, which must be those of `equal_directions`, where the line of
+/// sight through `viewpoint` crosses the path next to it [Y03 eq. 5, for paths of any shape]. The
+/// image recorded at a crossing shows the line of sight; at the nearest crossing the fewest objects
+/// are in between. `path`: poses of the lines from `first` on. Throws nothing. Cost:
 /// O(path + directions).
 void find_crossings(std::span<const Pose2> path, std::size_t first, Point2 viewpoint,
                     std::span<const Direction2> directions, std::span<RouteCrossing> crossings);
