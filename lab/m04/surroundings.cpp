@@ -100,8 +100,7 @@ Directional predict_extents(const simulation::PlaceRecording& place, const Pose2
       }
     }
     for (std::size_t k = 0; k < count; ++k) {
-      // The change parallel to the component alters its magnitude, the perpendicular change its
-      // phase.
+      // Parallel to the component the change alters its magnitude, perpendicular its phase.
       const Complex unit =
           std::polar(1.0, -static_cast<double>(signature.phase_rad(y, static_cast<int>(k))));
       const double per_x = (along_x[k] * unit).real();

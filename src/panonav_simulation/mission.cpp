@@ -49,8 +49,7 @@ VisualMemory make_empty_memory(const std::vector<FourierSignature>& views) {
           views.front().elevations()};
 }
 
-// Records a route along the mapped poses, from the first one in the map's largest component to the
-// last one before a gap.
+// Records a route along the poses of the map's largest component up to a gap.
 RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& poses,
                            const TopologicalMap& map, std::uint64_t seed, Executor& executor) {
   struct RouteStop {
@@ -220,8 +219,7 @@ void MissionRobot::command(const Velocity& velocity) {
   const Pose2 step = sample_step(commanded, motion_, random_);
   const Pose2 there = pose_ * step;
   if (!has_clear_path(pose_.position(), there.position())) {
-    // In contact, the robot rotates but does not move. Contact during a rotation on the spot is no
-    // evidence of an obstacle ahead.
+    // In contact, the robot only rotates. A rotation on the spot shows no obstacle ahead.
     obstacle_ |= commanded.x_m != 0.0 || commanded.y_m != 0.0;
     pose_.heading_rad = there.heading_rad;
     odometry_ = odometry_ * Pose2{0.0, 0.0, commanded.heading_rad};
@@ -242,8 +240,7 @@ std::optional<double> MissionRobot::find_free_direction(double direct_rad, doubl
     detour_side_ = 0;
     return direct_rad;
   }
-  // Search up to 90 degrees on each side only: beyond that the robot would turn back, and the
-  // navigator must learn that the path is blocked.
+  // Beyond 90 degrees it would turn back, and the navigator must learn of the blocked path.
   constexpr int directions_per_side = 6;
   const auto free_direction = find_open_direction(
       direct_rad, directions_per_side, detour_side_,
@@ -259,8 +256,7 @@ bool MissionRobot::take_contact() noexcept {
 
 namespace {
 
-// Drives to a point at nominal speed until the robot arrives, is stopped by contact or runs out of
-// time. Returns true if it was stopped.
+// Drives to a point until the robot arrives or time runs out; true if contact stopped it.
 bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, double distance_m) {
   Point2 target{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
   constexpr double near_m = 0.003;
@@ -278,8 +274,7 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
   return false;
 }
 
-/// Monte-Carlo localisation that returns the reference nearest to its estimate, or nullopt while it
-/// is not localised.
+/// Localises by particles; returns the nearest reference, nullopt while it is not localised.
 class NearestReferenceEstimator {
  public:
   NearestReferenceEstimator(const VisualMemory& memory, const OdometryNoise& odometry)

@@ -139,9 +139,7 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
         ++solid_count;
       }
     }
-    // Flat bodies are walls if the object has no solid body (a screen); otherwise they are faces,
-    // as of a shelf.
-    if (solid_count == 0)
+    if (solid_count == 0)  // else they are faces, as of a shelf
       walls.lines.insert(walls.lines.end(), flat_outlines.begin(), flat_outlines.end());
   }
   return {furniture, walls};

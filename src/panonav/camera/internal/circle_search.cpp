@@ -316,8 +316,7 @@ CircleScore score_circle(const EdgeField& field, const FieldCircle& circle,
                          EdgeAveraging averaging) {
   const int count = sample_count(circle.radius, 3.0);
   SectorScore total;
-  // Steps around the circle by rotating a unit vector; after 720 steps the rounding error is below
-  // 1e-12.
+  // Steps around the circle by rotating a unit vector; rounding stays below 1e-12.
   const double step_cosine = std::cos(2 * std::numbers::pi / count);
   const double step_sine = std::sin(2 * std::numbers::pi / count);
   double next_cosine = 1;
