@@ -69,10 +69,7 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
   options.max_held_views = static_cast<std::size_t>(arguments.max_held_views);
   if (arguments.token_file) options.token = read_token(*arguments.token_file);
   options.localiser = arguments.localiser;
-  options.note = [&](const std::string& line) {
-    const std::lock_guard lock(mutex);
-    session.note(line);
-  };
+  options.note = [&](const std::string& line) { session.note(line); };
   std::vector<server::ServedMemory> memories;
   for (const std::string& memory : arguments.memories)
     memories.push_back(parse_served_memory(memory));

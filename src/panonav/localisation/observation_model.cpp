@@ -17,6 +17,7 @@
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/sample.hpp"
+#include "panonav/memory/view_index.hpp"
 
 namespace panonav {
 
@@ -49,29 +50,14 @@ constexpr double median_heading_errors = 3.0;
 /// scenes.
 constexpr double max_heading_error_rad = std::numbers::pi / 4.0;
 
-struct Site {
-  ViewId view;
-  Point2 position;
-  std::optional<double> heading_rad;
-};
-
-std::vector<Site> collect_posed_sites(const VisualMemory& memory) {
-  std::vector<Site> sites;
-  for (const ViewId view : memory.views()) {
-    if (const auto& pose = memory.info(view).pose) {
-      sites.push_back({view, pose->position(), pose->heading_rad});
-    }
-  }
-  return sites;
-}
-
 /// Returns the nearest other sites, ascending by distance.
-std::vector<std::uint32_t> find_nearest_sites(std::span<const Site> sites, std::size_t own,
+std::vector<std::uint32_t> find_nearest_sites(std::span<const PosedView> sites, std::size_t own,
                                               std::size_t count) {
   std::vector<std::pair<double, std::uint32_t>> found;
   found.reserve(sites.size());
   for (std::uint32_t s = 0; s < sites.size(); ++s) {
-    if (s != own) found.emplace_back(distance(sites[s].position, sites[own].position), s);
+    if (s != own)
+      found.emplace_back(distance(sites[s].pose.position(), sites[own].pose.position()), s);
   }
   count = std::min(count, found.size());
   std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count), found.end());
@@ -83,22 +69,22 @@ std::vector<std::uint32_t> find_nearest_sites(std::span<const Site> sites, std::
 /// A view left out of the memory. Compares it with other views on demand and keeps the results.
 class LeftOutView {
  public:
-  LeftOutView(const ColumnRanking& ranking, std::span<const Site> sites, std::size_t own)
+  LeftOutView(const ColumnRanking& ranking, std::span<const PosedView> sites, std::size_t own)
       : ranking_(&ranking),
         sites_(sites),
-        profiles_(ranking.profiles(sites[own].view)),
+        profiles_(ranking.profiles(sites[own].id)),
         matches_(sites.size()) {}
 
   const ColumnMatch& match(std::size_t site) {
     if (!matches_[site]) {
-      matches_[site] = match_columns(profiles_, ranking_->profiles(sites_[site].view));
+      matches_[site] = match_columns(profiles_, ranking_->profiles(sites_[site].id));
     }
     return *matches_[site];
   }
 
  private:
   const ColumnRanking* ranking_;
-  std::span<const Site> sites_;
+  std::span<const PosedView> sites_;
   ColumnProfiles profiles_;
   std::vector<std::optional<ColumnMatch>> matches_;
 };
@@ -178,15 +164,15 @@ double fit_sharpness(std::span<const Explained> views) {
 class LearningSample {
  public:
   LearningSample(const ColumnRanking& ranking, const LearningOptions& options)
-      : sites_(collect_posed_sites(ranking.memory())) {
+      : sites_(HeldViewIndex(ranking.memory()).posed_views()) {
     require(sites_.size() >= static_cast<std::size_t>(ObservationModel::min_views),
             "views with a position in the memory", static_cast<double>(sites_.size()),
             ">= " + to_text(ObservationModel::min_views));
     std::vector<Point2> positions;
     std::vector<ViewId> views;
-    for (const Site& site : sites_) {
-      positions.push_back(site.position);
-      views.push_back(site.view);
+    for (const PosedView& site : sites_) {
+      positions.push_back(site.pose.position());
+      views.push_back(site.id);
     }
     spacing_m_ = VoronoiCells(positions).spacing_m();
     require(spacing_m_ > 0.0, "spacing of the memory's positions", spacing_m_, "> 0 m");
@@ -218,7 +204,8 @@ class LearningSample {
     std::vector<double> far;
     for (std::size_t i = 0; i < own_.size(); ++i) {
       for (const std::uint32_t c : candidates_) {
-        if (distance(sites_[c].position, sites_[own_[i]].position) < far_spacings * spacing_m_) {
+        if (distance(sites_[c].pose.position(), sites_[own_[i]].pose.position()) <
+            far_spacings * spacing_m_) {
           continue;
         }
         far.push_back(left_out_[i].match(c).difference);
@@ -233,16 +220,16 @@ class LearningSample {
     std::vector<std::pair<double, double>> curve;
     std::vector<double> heading_errors;
     for (std::size_t i = 0; i < own_.size(); ++i) {
-      const Site& here = sites_[own_[i]];
+      const PosedView& here = sites_[own_[i]];
       for (const std::uint32_t s : find_nearest_sites(sites_, own_[i], fitted_sites)) {
-        const double distance_m = distance(sites_[s].position, here.position);
+        const double distance_m = distance(sites_[s].pose.position(), here.pose.position());
         if (distance_m > fitted_spacings * spacing_m_) break;
         const ColumnMatch& match = left_out_[i].match(s);
         curve.emplace_back(distance_m, to_similarity(match, model.far_difference));
-        if (distance_m <= adjacent_site_spacings * spacing_m_ && here.heading_rad &&
-            sites_[s].heading_rad) {
-          heading_errors.push_back(std::abs(
-              angle_difference(*sites_[s].heading_rad + match.heading_rad, *here.heading_rad)));
+        if (distance_m <= adjacent_site_spacings * spacing_m_ && here.pose.heading_rad &&
+            sites_[s].pose.heading_rad) {
+          heading_errors.push_back(std::abs(angle_difference(
+              *sites_[s].pose.heading_rad + match.heading_rad, *here.pose.heading_rad)));
         }
       }
     }
@@ -281,8 +268,8 @@ class LearningSample {
     double square = 0.0;
     for (const std::uint32_t s : near_[where]) {
       if (s == own_[i]) continue;
-      const double expected =
-          std::exp(-distance(sites_[s].position, sites_[where].position) / model.range_m);
+      const double expected = std::exp(
+          -distance(sites_[s].pose.position(), sites_[where].pose.position()) / model.range_m);
       square += expected * expected;
       product +=
           expected * std::max(0.0, to_similarity(left_out_[i].match(s), model.far_difference));
@@ -290,7 +277,7 @@ class LearningSample {
     return square > 0.0 ? product * product / square : 0.0;
   }
 
-  std::vector<Site> sites_;
+  std::vector<PosedView> sites_;
   double spacing_m_ = 0.0;
   std::vector<std::uint32_t> own_;                // sites of the left-out views
   std::vector<LeftOutView> left_out_;             // these views

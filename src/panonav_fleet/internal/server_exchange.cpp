@@ -211,14 +211,13 @@ ServerLinks ServerExchange::read_links_in_blocks(const KeptAreas& areas,
           block_of_l + " = ANY(" + (areas ? "$4)" : "$2)"),
       bound.add(blocks));
   for (int i = 0; i < rows.size(); ++i) {
-    tables_.accept_row(std::nullopt, [&] {
-      const std::pair ends(read_view_id(rows, i, 0), read_view_id(rows, i, 1));
-      const bool is_accepted = tables_.accept_row(std::nullopt, [&] {
-        links.accepted.push_back(tables_.checked(
-            LinkRow{ends.first, ends.second, rows.integer(i, 2), rows.integer(i, 3)}));
-      });
-      if (!is_accepted) links.left_out.insert(ends);
+    std::optional<std::pair<ViewId, ViewId>> ends;  // nullopt: ids that no view has
+    const bool is_accepted = tables_.accept_row(std::nullopt, [&] {
+      ends.emplace(read_view_id(rows, i, 0), read_view_id(rows, i, 1));
+      links.accepted.push_back(tables_.checked(
+          LinkRow{ends->first, ends->second, rows.integer(i, 2), rows.integer(i, 3)}));
     });
+    if (!is_accepted && ends) links.left_out.insert(*ends);
   }
   return links;
 }
