@@ -52,15 +52,26 @@ void ViewLikelihood::update_sites() {
     site.heading_rad = site.reference_heading_rad;
   }
   require(!sites.empty(), "views with a pose", 0.0, ">= 1");
-  sites_ = std::move(sites);
+  sites_.swap(sites);
   differences_.assign(sites_.size(), 0.0);
-  profiles_.clear();
-  profiles_.resize(sites_.size());
-  cached_profiles_ = 0;
+  keep_profiles(sites);
   compared_sites_.clear();
   signature_.reset();
   view_.reset();
   index_sites();
+}
+
+void ViewLikelihood::keep_profiles(std::span<const Site> former_sites) {
+  std::vector<std::optional<ColumnProfiles>> kept(sites_.size());
+  cached_profiles_ = 0;
+  for (std::size_t i = 0; i < former_sites.size(); ++i) {
+    if (!profiles_[i]) continue;
+    const auto site = site_of(former_sites[i].view);
+    if (!site) continue;
+    kept[*site] = std::move(profiles_[i]);
+    ++cached_profiles_;
+  }
+  profiles_ = std::move(kept);
 }
 
 void ViewLikelihood::index_sites() {

@@ -96,6 +96,8 @@ class ViewLikelihood {
     double weight;
   };
   void index_sites();
+  /// Keeps the cached profiles of views that still have a site: signatures never change.
+  void keep_profiles(std::span<const Site> former_sites);
   void load_profiles(std::span<const std::uint32_t> sites);
   void compare_loaded(std::uint32_t site);
   /// Fills `groups_`, in the order of their first particles, and `group_of_`.
