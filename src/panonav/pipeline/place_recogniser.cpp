@@ -179,12 +179,10 @@ struct PlaceRecogniser::Implementation {
 PlaceRecogniser::PlaceRecogniser(const std::filesystem::path& memory,
                                  const PlaceRecogniserOptions& options) {
   const MemoryFile file = MemoryFile::open(memory, Access::read_only);
-  const bool is_held =
-      options.areas || !is_server_address(memory) || file.views().size() <= options.max_held_views;
-  implementation_ =
-      is_held ? std::make_unique<Implementation>(file, options)
-              : std::make_unique<Implementation>(find_memory_scheme(memory)->open_index(memory),
-                                                 file, memory, options);
+  auto index = options.areas ? nullptr : open_index_if_large(memory, file, options.max_held_views);
+  implementation_ = index
+                        ? std::make_unique<Implementation>(std::move(index), file, memory, options)
+                        : std::make_unique<Implementation>(file, options);
 }
 PlaceRecogniser::PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options)
     : implementation_(std::make_unique<Implementation>(file, options)) {}

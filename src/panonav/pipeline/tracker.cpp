@@ -17,7 +17,8 @@ namespace panonav {
 
 namespace {
 
-void require_positions(const MemoryFile& file, std::size_t posed) {
+void require_positions(const MemoryFile& file, const VisualMemory& memory) {
+  const std::size_t posed = HeldViewIndex(memory).posed_views().size();
   if (posed >= static_cast<std::size_t>(ObservationModel::min_views)) return;
   throw FileError(file.path().string(),
                   "holds " + std::to_string(posed) + " views with a position; allowed: " +
@@ -34,7 +35,7 @@ bool can_use_stored_models(const TrackerOptions& options) {
 
 MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& memory,
                                    const TrackerOptions& options) {
-  require_positions(file, HeldViewIndex(memory).posed_views().size());
+  require_positions(file, memory);
   validate(options.filter);
   try {
     if (can_use_stored_models(options)) {
@@ -72,12 +73,11 @@ ObservationModel find_model(const MemoryFile& file, const IndexedMemory& memory,
 
 MonteCarloLocaliser make_localiser(const MemoryFile& file, const IndexedMemory& memory,
                                    const TrackerOptions& options) {
-  require_positions(file, memory.index()->posed_views().size());
   validate(options.filter);
   try {
     return {[&memory] { return memory.index(); }, file.header().shape,
             find_model(file, memory, options), options.filter, options.odometry};
-  } catch (const ContractError& error) {
+  } catch (const ContractError& error) {  // too few views with positions, or all in one place
     throw FileError(file.path().string(), error.what());
   }
 }
@@ -98,11 +98,9 @@ struct Tracker::Implementation {
   static std::unique_ptr<Implementation> make(const std::filesystem::path& memory,
                                               const TrackerOptions& options) {
     const MemoryFile file = MemoryFile::open(memory, Access::read_only);
-    if (!is_server_address(memory) || file.info().views <= options.max_held_views) {
-      return std::make_unique<Implementation>(file, options);
-    }
-    return std::make_unique<Implementation>(find_memory_scheme(memory)->open_index(memory), file,
-                                            options);
+    auto index = open_index_if_large(memory, file, options.max_held_views);
+    return index ? std::make_unique<Implementation>(std::move(index), file, options)
+                 : std::make_unique<Implementation>(file, options);
   }
 
   std::optional<VisualMemory> memory;      // nullopt: not held

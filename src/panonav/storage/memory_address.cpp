@@ -87,6 +87,14 @@ std::shared_ptr<const MemoryScheme> find_memory_scheme(const std::filesystem::pa
                       "'; allowed: the path of a memory file");
 }
 
+std::unique_ptr<IndexedMemory> open_index_if_large(const std::filesystem::path& memory,
+                                                   const MemoryFile& file,
+                                                   std::size_t max_held_views) {
+  const auto scheme = find_registered_scheme(memory);
+  if (!scheme || file.views().size() <= max_held_views) return nullptr;
+  return scheme->open_index(memory);
+}
+
 bool is_server_address(const std::filesystem::path& memory) {
   return find_registered_scheme(memory) != nullptr;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -66,5 +67,11 @@ void report_left_out(const std::filesystem::path& memory, const MemoryFile::Faul
 /// of the address is not registered.
 [[nodiscard]] std::shared_ptr<const MemoryScheme> find_memory_scheme(
     const std::filesystem::path& memory);
+
+/// Opens the index of a memory on a server that has more than `max_held_views` views; nullptr for
+/// smaller ones and for files, which are loaded. `file`: the open memory. Throws FileError if the
+/// server cannot be reached. Cost: reading all ids.
+[[nodiscard]] std::unique_ptr<IndexedMemory> open_index_if_large(
+    const std::filesystem::path& memory, const MemoryFile& file, std::size_t max_held_views);
 
 }  // namespace panonav
