@@ -3,7 +3,7 @@
 # panonav_module(NAME [APART] [SOURCES ...] [DEPENDS modules of ours ...] [LINK public libraries ...]
 #                [LINK_PRIVATE libraries that no public header shows ...] [PACKAGES that find those ...])
 # Makes the static library panonav_NAME with the alias panonav::NAME of the sources beside the CMake file and in its
-# folder `internal`, unless SOURCES names others. Headers are included as "panonav/NAME/x.hpp", those of an outbuilding
+# folder `internal`, unless SOURCES names others. Headers are included as "panonav/NAME/x.hpp", those of a component
 # (a folder of src) as "panonav_NAME/x.hpp"; those in `internal` are the module's own and are not installed. Each module
 # has an export set of its own, so that users of a module need only the packages of that module and of those before it.
 # With BUILD_SHARED_LIBS the modules are parts of one libpanonav (panonav_one_library), and panonav::NAME is that library
