@@ -34,8 +34,8 @@ struct Arguments::Implementation {
     std::string why;
   };
   std::vector<ArgumentInfo> infos = {};
-  std::vector<SetValue> value_setters = {};  ///< one for each of the infos
-  std::deque<Section> sections = {};         ///< a deque, as value_setters refer to its elements
+  std::vector<ValueSetter> value_setters = {};  ///< one for each of the infos
+  std::deque<Section> sections = {};            ///< a deque, as value_setters refer to its elements
   std::vector<Refusal> refusals = {};
   std::set<std::string, std::less<>> typed = {};  ///< flags
   /// Values typed for the flags of `allow_in_config_files`; nullopt: not set.
@@ -87,7 +87,7 @@ Arguments::Arguments() : implementation_(std::make_unique<Implementation>()) {}
 Arguments::~Arguments() = default;
 
 ArgumentInfo& Arguments::add(const std::string& declared, const std::string& value,
-                             const std::string& help, SetValue set_value) {
+                             const std::string& help, ValueSetter value_setter) {
   ArgumentInfo info;
   info.name = long_flag(declared);
   const std::size_t comma = declared.find(',');
@@ -95,7 +95,7 @@ ArgumentInfo& Arguments::add(const std::string& declared, const std::string& val
   const std::size_t blank = declared.find(' ');
   info.value = blank == std::string::npos ? value : declared.substr(blank + 1);
   info.help = help;
-  implementation_->value_setters.push_back(std::move(set_value));
+  implementation_->value_setters.push_back(std::move(value_setter));
   return implementation_->infos.emplace_back(std::move(info));
 }
 
@@ -266,7 +266,6 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb,
     });
   };
   std::vector<std::string> positional_words;
-  std::vector<bool> is_typed(infos.size(), false);
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     if (word == "--") {
@@ -295,16 +294,16 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb,
       values.push_back(words[++i]);
     }
     const auto number = static_cast<std::size_t>(found - infos.begin());
-    if (is_typed[number] && value_count > 0) throw UsageError(found->name + " is given twice");
-    is_typed[number] = true;
-    implementation_->typed.insert(found->name);
+    const bool is_first = implementation_->typed.insert(found->name).second;
+    if (!is_first && value_count > 0) throw UsageError(found->name + " is given twice");
     implementation_->set_value(number, values);
     const auto plain = implementation_->plain.find(found->name);
     if (plain != implementation_->plain.end()) plain->second = values.front();
   }
   read_positionals(positional_words, verb, allow_missing);
   for (std::size_t i = 0; i < infos.size() && !allow_missing; ++i) {
-    if (infos[i].required && !infos[i].positional() && !is_typed[i]) {
+    if (infos[i].required && !infos[i].positional() &&
+        !implementation_->typed.contains(infos[i].name)) {
       throw UsageError(infos[i].name + " is required");
     }
   }

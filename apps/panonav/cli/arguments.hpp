@@ -131,9 +131,9 @@ class Arguments {
   [[nodiscard]] bool is_set(const std::string& section, const std::string& name = "") const;
 
   /// Makes `resolve` throw UsageError if one of the options was typed and `used` returns false.
-  /// `why` ends the message ("without --areas"). An entry is a flag, or "[section]" for all options
-  /// of a section. Options in a --config file are not rejected, as the file may serve several
-  /// verbs.
+  /// `why` ends the message ("without --areas"). An entry is a flag, or "[section]" for all
+  /// options of a section. Options in a --config file are not rejected, as the file may serve
+  /// several verbs.
   void reject_options_unless(std::vector<std::string> options, std::function<bool()> used,
                              std::string why);
   /// Throws UsageError if one of the options was typed. For conditions that are known only after
@@ -170,9 +170,9 @@ class Arguments {
 
  private:
   using Visit = std::function<void(OptionVisitor&)>;
-  using SetValue = std::function<void(std::span<const std::string>)>;
+  using ValueSetter = std::function<void(std::span<const std::string>)>;
   ArgumentInfo& add(const std::string& declared, const std::string& value, const std::string& help,
-                    SetValue set_value);
+                    ValueSetter value_setter);
   void add_section(const std::string& section, const std::string& prefix, Visit visit,
                    std::function<void()> check);
   void require_equal(const std::string& section, const Visit& typed, const Visit& stored,

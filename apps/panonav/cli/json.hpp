@@ -32,6 +32,12 @@ template <class Value>
   return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", to_json_or_null(pose.heading_rad)}};
 }
 
+/// Returns null if there is no pose.
+template <class Pose>
+[[nodiscard]] ordered_json pose_json(const std::optional<Pose>& pose) {
+  return pose ? pose_json(*pose) : ordered_json();
+}
+
 /// Returns the document as one line of text. Bytes that are not valid UTF-8 become the replacement
 /// character U+FFFD.
 [[nodiscard]] inline std::string json_line(const ordered_json& document) {

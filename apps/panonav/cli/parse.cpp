@@ -76,9 +76,9 @@ std::vector<std::string> verb_names() {
 
 const Verb& find_named_verb(std::span<const Verb> verbs, const std::vector<std::string>& words) {
   const Verb& verb = find_required_verb(verbs, words);
-  const std::size_t own_count = split_verb(verb.name).second.empty() ? 1 : 2;
-  if (words.size() > own_count)
-    throw UsageError("'" + words[own_count] + "' is one argument too many");
+  const std::size_t word_count = split_verb(verb.name).second.empty() ? 1 : 2;
+  if (words.size() > word_count)
+    throw UsageError("'" + words[word_count] + "' is one argument too many");
   return verb;
 }
 
@@ -94,12 +94,13 @@ struct DeclaredVerb {
   CommonArguments common;
   Arguments arguments;
   Run run;
-  std::size_t own_count = 0;  ///< number of the verb's own arguments; common ones follow them
-  bool ignored = false;       ///< unused target of --help, which `parse` handles itself
+  std::size_t own_argument_count =
+      0;                 ///< number of the verb's own arguments; common ones follow them
+  bool ignored = false;  ///< unused target of --help, which `parse` handles itself
 
   [[nodiscard]] Description description(const Verb& verb) const {
     Description description{verb, arguments.infos()};
-    for (std::size_t i = own_count; i < description.arguments.size(); ++i) {
+    for (std::size_t i = own_argument_count; i < description.arguments.size(); ++i) {
       description.arguments[i].of_every_verb = true;
     }
     return description;
@@ -111,7 +112,7 @@ std::shared_ptr<DeclaredVerb> declare(const Verb& verb) {
   auto& arguments = declared->arguments;
   auto& common = declared->common;
   declared->run = verb.declare(arguments);
-  declared->own_count = arguments.infos().size();
+  declared->own_argument_count = arguments.infos().size();
   arguments.flag("--json", common.session.json, "Print results as JSON on standard output");
   arguments.flag("-q,--quiet", common.session.quiet,
                  "Print only results and errors: no progress, no notes and no \"Next:\" lines");

@@ -12,8 +12,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 
-/// Included by each verb's file, which defines the function NAME_verb; CMake puts it into the list
-/// of all verbs.
+/// Included by each verb's file, which defines the function NAME_verb; CMake puts it into the
+/// list of all verbs.
 namespace panonav::command {
 
 /// Registers the components of this build (recordings, fleet, ...) with the library; called once,

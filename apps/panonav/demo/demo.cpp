@@ -212,7 +212,7 @@ void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
       "The recordings and the memory of this run are in the folder of this page. Every command has "
       "the option --help.");
   const std::string memory = path_in_out("office.panonav");
-  const simulation::SimulatedWorldOptions seen = demo_world_options(options, 0);
+  const simulation::SimulatedWorldOptions world_options = demo_world_options(options, 0);
   std::string mission;
   for (const std::string& word : navigation.first_mission) mission += " " + word;
   page.add_commands(
@@ -227,8 +227,9 @@ void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
        "panonav home view_00000.png " + recordings.query_run.entries.front().path.string() +
            " --memory " + memory + " --report " + path_in_out("way_home"),
        "panonav navigate " + memory + " --scene office --scene-seed " +
-           std::to_string(seen.simulation.scene.scene_seed) + " --exposure " +
-           format_number(seen.sensor.exposure) + mission + " --picture " + path_in_out("path.svg"),
+           std::to_string(world_options.simulation.scene.scene_seed) + " --exposure " +
+           format_number(world_options.sensor.exposure) + mission + " --picture " +
+           path_in_out("path.svg"),
        "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
            (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
 }
@@ -347,9 +348,9 @@ MemoryFile memorise_run(const Dataset& run, const fs::path& path, Executor& exec
   {
     Memoriser memoriser(path, {.source = run.source});
     DatasetObservations source(run, executor);
-    std::vector<Observation> seen;
-    while (auto observation = source.next()) seen.push_back(std::move(*observation));
-    memoriser.add(std::move(seen), executor);
+    std::vector<Observation> observations;
+    while (auto observation = source.next()) observations.push_back(std::move(*observation));
+    memoriser.add(std::move(observations), executor);
     memoriser.finish(executor);
   }
   return MemoryFile::open(path, Access::read_write);

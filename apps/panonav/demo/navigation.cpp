@@ -169,10 +169,11 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
                            const SharedEncoder& encoder, const PlannerOptions& options, ViewId goal,
                            const simulation::MissionRun& run) {
   const simulation::SimulatedWorldOptions& world_options = recordings.office_world->options();
-  std::optional<Panorama> seen;
+  std::optional<Panorama> last_panorama;
   const auto take_view = simulation::make_view_sensor(
       place.renderer, recordings.true_camera, world_options.frame, world_options.sensor, encoder,
-      nullptr, [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
+      nullptr,
+      [&](const Image& /*picture*/, const Panorama& panorama) { last_panorama = panorama; });
   AreaPlanner planner(remembered.graph, options);
   planner.set_goal(goal);
   viewer::RunPage page("A mission", run.decisions.size());
@@ -191,7 +192,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
       moment.values.emplace_back("event", std::move(name));
     }
     const FourierSignature signature = take_view(pose, i);
-    moment.panorama = std::exchange(seen, std::nullopt);
+    moment.panorama = std::exchange(last_panorama, std::nullopt);
     if (decision.nearest) {
       moment.values.emplace_back("best_match", remembered.memory.info(*decision.nearest).name);
       moment.best_match = file.thumbnail(*decision.nearest).value_or(std::vector<std::uint8_t>{});

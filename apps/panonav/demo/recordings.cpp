@@ -234,7 +234,7 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   simulation::SimulatedWorldOptions grid = demo_world_options(options, 0);
   grid.recording.path = simulation::RecordingPath::grid;
   grid.recording.spacing_m = options.spacing_m();
-  const simulation::RecordingOptions random_recording{
+  const simulation::RecordingOptions random_recording_options{
       .path = simulation::RecordingPath::random,
       .heading = simulation::RecordingHeading::random,
       .poses = options.query_count()};
@@ -242,9 +242,9 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
     return demo_world_options(options, stream).simulation.scene.seed;
   };
   const PlannedRun office = plan(make_world("office", grid, executor));
-  const PlannedRun queries = plan(office.world.with(random_recording, seed_of(1)));
+  const PlannedRun queries = plan(office.world.with(random_recording_options, seed_of(1)));
   const PlannedRun elsewhere = plan(make_world("lab", demo_world_options(options, 2), executor)
-                                        .with(random_recording, seed_of(2)));
+                                        .with(random_recording_options, seed_of(2)));
   const simulation::SimulatedWorld corridor =
       make_world("corridor", demo_world_options(options, 5), executor);
   const PlannedRun ring = plan_remembered_ring(corridor, seed_of(5));

@@ -28,12 +28,12 @@ Springs choose_springs(const Lattice& lattice) {
   const bool is_thinned = all.size() > max_unthinned_springs;
   if (is_thinned)
     std::ranges::stable_sort(all, {}, [](const auto* spring) { return spring->length; });
-  std::vector<int> of(lattice.nodes.size(), 0);
+  std::vector<int> spring_counts(lattice.nodes.size(), 0);
   Springs shown;
   for (const Lattice::Spring* spring : all) {
-    if (is_thinned && of[spring->a] >= 2 && of[spring->b] >= 2) continue;
-    ++of[spring->a];
-    ++of[spring->b];
+    if (is_thinned && spring_counts[spring->a] >= 2 && spring_counts[spring->b] >= 2) continue;
+    ++spring_counts[spring->a];
+    ++spring_counts[spring->b];
     shown.emplace_back(spring->a, spring->b);
   }
   return shown;
@@ -80,8 +80,8 @@ LatticeStepCallback LatticeSteps::step_callback() {
   };
 }
 
-viewer::MapAnimation LatticeSteps::unfold(const Lattice& lattice,
-                                          const VisualMemory& memory) const {
+viewer::MapAnimation LatticeSteps::make_animation(const Lattice& lattice,
+                                                  const VisualMemory& memory) const {
   const auto end = align_to_truth(lattice, memory);
   const Springs springs = choose_springs(lattice);
   constexpr std::size_t max_coordinates = 600'000;
@@ -89,7 +89,7 @@ viewer::MapAnimation LatticeSteps::unfold(const Lattice& lattice,
   const std::size_t frames =
       std::clamp<std::size_t>(max_coordinates / coordinates_per_frame, 10, 100);
   viewer::MapAnimation map{.title = "Arrangement, step by step"};
-  const std::string of = " of " + std::to_string(count_);
+  const std::string of_all = " of " + std::to_string(count_);
   const auto add = [&](const std::string& title, const std::vector<std::optional<Point2>>& places,
                        const std::vector<std::size_t>& components) {
     // Finds the largest group of the drawn views.
@@ -99,25 +99,25 @@ viewer::MapAnimation LatticeSteps::unfold(const Lattice& lattice,
     }
     const auto largest =
         std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; });
-    viewer::MapLayer held{.label = "springs", .colour = viewer::PlotColour::light_grey};
+    viewer::MapLayer spring_layer{.label = "springs", .colour = viewer::PlotColour::light_grey};
     viewer::MapLayer views{.label = "largest group", .colour = viewer::PlotColour::blue};
     viewer::MapLayer others{.label = "other groups", .colour = viewer::PlotColour::orange};
     for (const auto& [a, b] : springs) {
       if (!places[a] || !places[b] || components[a] != components[b]) continue;
-      held.lines.push_back({*places[a], *places[b]});
+      spring_layer.lines.push_back({*places[a], *places[b]});
     }
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (!places[i]) continue;
       (components[i] == largest->first ? views : others).circles.push_back(*places[i]);
     }
-    map.frames.push_back({.title = title, .layers = {held, others, views}});
+    map.frames.push_back({.title = title, .layers = {spring_layer, others, views}});
     if (!lattice.metric && !has_true_positions(lattice, memory)) {
       map.frames.back().unit = "median distance to the nearest view";
     }
   };
   const std::size_t step = steps_.size() / frames + 1;
   for (std::size_t i = 0; i < steps_.size(); i += step) {
-    add("step " + std::to_string(steps_[i].number + 1) + of,
+    add("step " + std::to_string(steps_[i].number + 1) + of_all,
         align_to_end(steps_[i].poses, steps_[i].components, end), steps_[i].components);
   }
   std::vector<std::size_t> components;
@@ -158,7 +158,7 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
       "views agree on the relative position of the groups. Each group is drawn at its final "
       "position, with its shape at that step.");
   page.add_plots(
-      {{steps.unfold(lattice, memory),
+      {{steps.make_animation(lattice, memory),
         "Grey lines are springs: pairs of views with an estimated distance and direction"}});
   if (comparison) {
     page.begin_section("Comparison with the true positions");

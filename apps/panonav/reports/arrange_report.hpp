@@ -20,8 +20,8 @@ class LatticeSteps {
   /// Returns the steps as an animated map. Each group of views is aligned with its final position,
   /// but keeps the shape of the step; groups of one or two views are not drawn. Large arrangements
   /// get fewer steps and only the shortest springs of each view, so that the page stays small.
-  [[nodiscard]] viewer::MapAnimation unfold(const Lattice& lattice,
-                                            const VisualMemory& memory) const;
+  [[nodiscard]] viewer::MapAnimation make_animation(const Lattice& lattice,
+                                                    const VisualMemory& memory) const;
 
  private:
   struct Step {

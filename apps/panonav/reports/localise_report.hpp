@@ -22,8 +22,8 @@ struct LocalisedQuery {
 };
 
 /// Writes a page with a map and each query above its best match, rotated to the same heading. Shows
-/// 200 queries at equal intervals and a table of the first 500. `panorama(i)` returns the panorama
-/// of query i. Throws FileError.
+/// 200 queries at equal intervals and a table of the first 500. `panorama(i)` returns the
+/// panorama of query i. Throws FileError.
 void write_localise_report(const std::filesystem::path& folder, const MemoryFile& file,
                            const PlaceRecogniser& recogniser,
                            const std::vector<LocalisedQuery>& queries,

@@ -115,8 +115,8 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
 std::size_t count_shown_particles(std::size_t images) {
   constexpr std::size_t max_particles = 300;
   constexpr std::size_t min_particles = 30;
-  constexpr std::size_t max_particles_of_page = 300000;
-  return std::clamp(max_particles_of_page / std::max<std::size_t>(1, images), min_particles,
+  constexpr std::size_t max_particles_per_page = 300000;
+  return std::clamp(max_particles_per_page / std::max<std::size_t>(1, images), min_particles,
                     max_particles);
 }
 

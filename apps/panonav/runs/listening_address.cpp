@@ -1,4 +1,4 @@
-#include "runs/listening_place.hpp"
+#include "runs/listening_address.hpp"
 
 #include <arpa/inet.h>
 

@@ -171,7 +171,7 @@ std::string describe_events(const LiveCounts& counts, std::size_t moments_left_o
   add(counts.skipped + counts.source.damaged, "could not be read");
   add(counts.source.dropped, "were skipped because they came too fast");
   add(counts.source.interruptions, "interruptions of the source");
-  add(counts.lines_left_out, "lines were not printed because the reader was too slow");
+  add(counts.dropped_lines, "lines were not printed because the reader was too slow");
   add(moments_left_out, "moments were not recorded because the disk was too slow");
   if (!counts.delays_ms.empty()) {
     text += "; from arrival to answer " + format_fixed(quantile(counts.delays_ms, 0.5), 1) +
@@ -272,7 +272,7 @@ std::optional<double> LiveRun::decoding_ms() const {
 const LiveCounts& LiveRun::finish() {
   auto& self = *implementation_;
   self.printer.drain_and_join();
-  self.counts.lines_left_out = self.printer.dropped_lines();
+  self.counts.dropped_lines = self.printer.dropped_lines();
   if (self.live != nullptr) self.counts.source = self.live->live().counts();
   return self.counts;
 }

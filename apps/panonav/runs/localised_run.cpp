@@ -127,9 +127,9 @@ class RunMoments {
     if (record.needs_images()) moment.best_match = load_best_match(*answer.place, *file_);
     // Adds all views to the record again only after one eighth more were added, as this costs time,
     // or if the memory was read again and has new ids.
-    if (memory_.views() > recorded_views_ + recorded_views_ / 8 ||
+    if (memory_.views() > recorded_view_count_ + recorded_view_count_ / 8 ||
         recogniser != shown_recogniser_) {
-      recorded_views_ = memory_.views();
+      recorded_view_count_ = memory_.views();
       shown_recogniser_ = recogniser;
       shown_.emplace(recogniser->memory());
       shown_->add_to(moment);
@@ -147,14 +147,14 @@ class RunMoments {
   std::string path_;
   std::optional<MemoryFile> file_;  // nullopt before the first views of a new memory
   std::size_t moment_count_ = 0;
-  std::size_t recorded_views_ = 0;  // number of views in the record
+  std::size_t recorded_view_count_ = 0;  // number of views in the record
   std::optional<ShownReferences> shown_;
   const PlaceRecogniser* shown_recogniser_ = nullptr;
 };
 
 /// Returns the layout of the memory's images; nullopt if there is no memory yet and --add creates
-/// it. Throws FileError if there is no memory otherwise, an error on options that differ from those
-/// of the memory.
+/// it. Throws FileError if there is no memory otherwise, an error on options that differ
+/// from those of the memory.
 std::optional<PictureSource> find_remembered_source(const Arguments& declared,
                                                     const LocaliseArguments& arguments) {
   if (!memory_exists(arguments.memory)) {

@@ -8,7 +8,7 @@
 #include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
-#include "runs/listening_place.hpp"
+#include "runs/listening_address.hpp"
 
 namespace panonav::command {
 
@@ -47,26 +47,27 @@ void declare_view(Arguments& arguments, RunRecordArguments& record) {
                    "with ADDRESS:PORT, other computers in this network can also open the page");
 }
 
-RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read,
+RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::string> inputs,
                      bool live, Session& session, const ViewerOptions& viewer_options)
     : session_(session), live_(live) {
   if (arguments.file) {
     recorder_.emplace(*arguments.file, recordings::RunRecorderOptions{.wait = !live});
   }
   if (arguments.view) {
-    const ListeningAddress place = parse_listening_address("--view", *arguments.view);
+    const ListeningAddress listening = parse_listening_address("--view", *arguments.view);
     viewer::ViewServerOptions options;
-    options.address = place.address;
-    options.port = place.port;
-    options.title = "panonav: " + (read.empty() ? std::string() : mask_credentials(read.front()));
+    options.address = listening.address;
+    options.port = listening.port;
+    options.title =
+        "panonav: " + (inputs.empty() ? std::string() : mask_credentials(inputs.front()));
     options.replay = !live;
     options.takes = viewer_options.takes;
     if (!viewer_options.memory.empty())
       options.thumbnail = make_thumbnail_reader(viewer_options.memory);
     viewer_.emplace(options);
-    if (!place.is_local()) {
+    if (!listening.is_local()) {
       session_.note(
-          "warning: the page is sent to the network of " + place.address +
+          "warning: the page is sent to the network of " + listening.address +
           " without encryption: others in this network can read the page and its address");
     }
     session_.prompt("Open " + viewer_->url() + " in a browser" +

@@ -37,10 +37,10 @@ class RunRecord {
   };
 
   /// Opens the file and starts the page, if requested. If the disk or a viewer is too slow, a live
-  /// run leaves out moments; any other run waits. `read` are the inputs of the run; the first one
+  /// run leaves out moments; any other run waits. `inputs`: of the run; the first one
   /// is the title of the page. Throws UsageError on an invalid address, FileError if the file
   /// cannot be created.
-  RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read, bool live,
+  RunRecord(const RunRecordArguments& arguments, std::span<const std::string> inputs, bool live,
             Session& session, const ViewerOptions& viewer_options);
 
   /// Adds all following moments to the page, too. The page must outlive this object.
@@ -70,8 +70,8 @@ class RunRecord {
   bool failed_ = false;
 };
 
-/// Returns the thumbnail of the most similar view; empty if there is none. Finds the view by name,
-/// as views that were just added have other ids in the file.
+/// Returns the thumbnail of the most similar view; empty if there is none. Finds the view by
+/// name, as views that were just added have other ids in the file.
 [[nodiscard]] std::vector<std::uint8_t> load_best_match(const Place& place, const MemoryFile& file);
 
 }  // namespace panonav::command

@@ -39,14 +39,14 @@ void GrowingMap::add_to(recordings::RunMoment& moment, const TopologicalMap& map
   moment.values = {{"places", std::to_string(map.nodes.size())},
                    {"closures", std::to_string(closures)}};
   if (map.nodes.empty()) return;
-  if (closures > closure_count_shown_) moment.values.emplace_back("event", "a loop is closed");
+  if (closures > shown_closure_count_) moment.values.emplace_back("event", "a loop is closed");
   const std::size_t component = map.nodes.back().component;
   transform_to_component(moment, map, component);
-  if (closures == closure_count_shown_ &&
-      map.nodes.size() <= node_count_shown_ + node_count_shown_ / 20)
+  if (closures == shown_closure_count_ &&
+      map.nodes.size() <= shown_node_count_ + shown_node_count_ / 20)
     return;
-  closure_count_shown_ = closures;
-  node_count_shown_ = map.nodes.size();
+  shown_closure_count_ = closures;
+  shown_node_count_ = map.nodes.size();
   add_component(moment, map, component, names_);
 }
 

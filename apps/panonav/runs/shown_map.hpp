@@ -36,8 +36,8 @@ class GrowingMap {
   std::vector<std::optional<ReferencePose>> truths_;  // true poses, one per node
   std::optional<ReferencePose> truth_;                // true pose of the last observation
   bool last_is_node_ = false;
-  std::size_t node_count_shown_ = 0;
-  std::size_t closure_count_shown_ = 0;
+  std::size_t shown_node_count_ = 0;
+  std::size_t shown_closure_count_ = 0;
 };
 
 }  // namespace panonav::command

@@ -20,8 +20,8 @@ class ShownReferences {
   /// Adds positions, names and Voronoi cells of all views to the moment. Needed for the first
   /// moment and whenever the views have changed.
   void add_to(recordings::RunMoment& moment) const;
-  /// Adds the dissimilarities between `view` and its 1000 most similar references. Cost: one search
-  /// of the memory.
+  /// Adds the dissimilarities between `view` and its 1000 most similar references. Cost: one
+  /// search of the memory.
   void compare(recordings::RunMoment& moment, const VisualMemory& memory,
                const PackedSignature& view) const;
 

@@ -8,6 +8,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/open_input.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {
@@ -100,10 +101,7 @@ std::vector<DatasetEntry> choose_entries(const std::string& input,
   }
   constexpr std::size_t max_pictures = 64;
   std::optional<PictureSource> default_source;
-  std::error_code ignored;
-  if (!std::filesystem::exists(std::filesystem::path(input) / "dataset.toml", ignored)) {
-    default_source.emplace();
-  }
+  if (!has_dataset_file(input)) default_source.emplace();
   std::vector<DatasetEntry> all =
       open_recording(input, arguments.pictures, default_source, session).entries;
   if (all.size() <= max_pictures) return all;
@@ -357,19 +355,19 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.options("mirror_search", values->search);
   arguments.show_in_help({"--profile", "--inner-elevation-deg", "--rim-elevation-deg",
                           "--direction", "--forward-angle-deg"});
-  const auto has_profile = [values](int profile) {
+  const auto make_profile_check = [values](int profile) {
     return [values, profile] { return values->mirror.profile == profile; };
   };
-  arguments.reject_options_unless({"--inner-elevation-deg"}, has_profile(0),
+  arguments.reject_options_unless({"--inner-elevation-deg"}, make_profile_check(0),
                                   "without --profile equiangular");
-  arguments.reject_options_unless({"--mirror-a-mm", "--mirror-b-mm"}, has_profile(1),
+  arguments.reject_options_unless({"--mirror-a-mm", "--mirror-b-mm"}, make_profile_check(1),
                                   "without --profile hyperboloidal");
-  arguments.reject_options_unless({"--xi"}, has_profile(2), "without --profile unified");
-  arguments.reject_options_unless({"[lenses]"}, has_profile(dual_fisheye_profile),
+  arguments.reject_options_unless({"--xi"}, make_profile_check(2), "without --profile unified");
+  arguments.reject_options_unless({"[lenses]"}, make_profile_check(dual_fisheye_profile),
                                   "without --profile dual-fisheye");
   arguments.reject_options_unless(
       {"--rim-elevation-deg", "--forward-angle-deg", "--inner-radius-px", "[mirror_search]"},
-      [has_profile] { return !has_profile(dual_fisheye_profile)(); },
+      [make_profile_check] { return !make_profile_check(dual_fisheye_profile)(); },
       "with --profile dual-fisheye");
   arguments.declare_outputs({"--out", "--overlay"});
   return [values, &arguments](Session& session) { return calibrate(arguments, *values, session); };

@@ -1,6 +1,7 @@
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/recording.hpp"
 #include "panonav_recordings/recording_conversion.hpp"
 #include "runs/recording.hpp"
@@ -30,11 +31,8 @@ std::string describe_fields(const Dataset::Fields& done) {
 }
 
 ExitCode convert(const ConvertArguments& arguments, Session& session) {
-  std::error_code ignored;
-  const bool is_to_recording = fs::path(arguments.output).extension() == ".mcap";
-  if (!is_to_recording && (fs::exists(fs::path(arguments.input) / "dataset.toml", ignored) ||
-                           (fs::is_directory(arguments.input, ignored) &&
-                            !recordings::is_recording(arguments.input)))) {
+  const bool is_mcap_output = fs::path(arguments.output).extension() == ".mcap";
+  if (!is_mcap_output && (has_dataset_file(arguments.input) || can_have_table(arguments.input))) {
     throw UsageError(arguments.output +
                      " does not end in .mcap; a folder is converted to a recording, and a "
                      "recording to a folder");
@@ -44,12 +42,12 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
   default_source.layout.elevations = ElevationBand{-1.0, 1.0};
   const Dataset dataset =
       open_recording(arguments.input, arguments.pictures,
-                     is_to_recording ? std::optional(default_source) : std::nullopt, session);
+                     is_mcap_output ? std::optional(default_source) : std::nullopt, session);
   Progress progress(session, "converting", dataset.entries.size());
   const auto advance = [&] { progress.advance(); };
   const Dataset::Fields done =
-      is_to_recording ? recordings::convert_to_recording(dataset, arguments.output, advance)
-                      : recordings::convert_to_dataset(dataset, arguments.output, advance);
+      is_mcap_output ? recordings::convert_to_recording(dataset, arguments.output, advance)
+                     : recordings::convert_to_dataset(dataset, arguments.output, advance);
   progress.clear();
   if (session.json()) {
     session.print(json_line(ordered_json{{"input", arguments.input},
@@ -64,7 +62,7 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
   }
   session.print(session.bold(std::to_string(dataset.entries.size())) + " images of " +
                 arguments.input + " in " + arguments.output + describe_fields(done));
-  if (is_to_recording && !done.stamps) {
+  if (is_mcap_output && !done.stamps) {
     session.print(
         "Some images have no stamp. The images are stored with an interval of one second.");
   }

@@ -4,6 +4,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/open_input.hpp"
 #include "panonav/pipeline/view_list.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "reports/home_answer.hpp"
@@ -67,7 +68,7 @@ std::string format_line(const HomeAnswer& answer, Session& session) {
 std::optional<PictureSource> find_folder_source(const std::string& picture) {
   const fs::path folder = fs::path(picture).parent_path();
   std::error_code ignored;
-  if (!fs::is_regular_file(picture, ignored) || !fs::exists(folder / "dataset.toml", ignored)) {
+  if (!fs::is_regular_file(picture, ignored) || !has_dataset_file(folder)) {
     return std::nullopt;
   }
   return read_dataset(folder.empty() ? fs::path(".") : folder).source;

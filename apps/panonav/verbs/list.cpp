@@ -19,7 +19,7 @@ ordered_json to_json(const ViewRecord& record) {
   const auto& [view, info, links, thumbnail, component] = record;
   return {{"id", view.value},
           {"name", info.name},
-          {"pose", info.pose ? pose_json(*info.pose) : ordered_json()},
+          {"pose", pose_json(info.pose)},
           {"stamp_s", to_json_or_null(info.stamp_s)},
           {"links", links},
           {"connected_component", to_json_or_null(component)},

@@ -37,12 +37,12 @@ void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
 /// positions.
 void reject_options_without_effect(const Arguments& arguments, const std::string& file,
                                    const VisualMemory& memory) {
-  const auto with_position = std::ranges::count_if(
+  const auto position_count = std::ranges::count_if(
       memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
-  if (with_position == 0) {
+  if (position_count == 0) {
     arguments.reject_options({"--reach-m", "--outdated-within-m"},
                              "as " + file + " contains no positions");
-  } else if (with_position == std::ssize(memory.views())) {
+  } else if (position_count == std::ssize(memory.views())) {
     arguments.reject_options({"--reach-links"},
                              "as " + file + " contains the positions of all views");
   }

@@ -29,7 +29,7 @@ std::string parameter_name(const ArgumentInfo& info) {
 }
 
 /// Returns the word after a flag, or the default value of the flag.
-std::string find_value_or_initial(std::span<const std::string> words,
+std::string find_value_or_default(std::span<const std::string> words,
                                   std::span<const ArgumentInfo> infos, const std::string& flag) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (words[i] == flag && i + 1 < words.size()) return words[i + 1];
@@ -43,8 +43,8 @@ std::string find_value_or_initial(std::span<const std::string> words,
 std::vector<std::string> translate_ros_arguments(std::span<const std::string> typed,
                                                  std::span<const ArgumentInfo> infos) {
   const auto ros_arguments =
-      ros2::read_ros_arguments(typed, find_value_or_initial(typed, infos, "--node-name"),
-                               find_value_or_initial(typed, infos, "--namespace"));
+      ros2::read_ros_arguments(typed, find_value_or_default(typed, infos, "--node-name"),
+                               find_value_or_default(typed, infos, "--namespace"));
   std::vector<std::string> words = ros_arguments.words;
   const auto is_typed = [&](const std::string& flag) {
     return std::ranges::any_of(ros_arguments.words, [&](const std::string& word) {

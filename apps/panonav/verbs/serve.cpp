@@ -9,7 +9,7 @@
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_scheme.hpp"
 #include "panonav_server/localisation_server.hpp"
-#include "runs/listening_place.hpp"
+#include "runs/listening_address.hpp"
 
 namespace panonav::command {
 

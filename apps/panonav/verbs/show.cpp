@@ -141,7 +141,7 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
   ordered_json shown{{"memory", arguments.memory},
                      {"id", view.value},
                      {"name", info.name},
-                     {"pose", info.pose ? pose_json(*info.pose) : ordered_json()},
+                     {"pose", pose_json(info.pose)},
                      {"stamp_s", to_json_or_null(info.stamp_s)},
                      {"signature_bytes", 2 * file.header().shape.size()},
                      {"thumbnail", nullptr},

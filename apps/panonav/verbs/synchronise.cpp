@@ -93,9 +93,10 @@ ExitCode synchronise(const SynchroniseArguments& arguments, Session& session) {
   session.print(arguments.memory + " and " + arguments.server + ": " + describe_report(report) +
                 ". " + arguments.memory + " holds " + std::to_string(report.views) + " views.");
   if (report.conflicts > 0) {
-    session.note(std::to_string(report.conflicts) +
-                 " changes of this file were discarded, because others had changed or removed the "
-                 "same views first");
+    session.note((report.conflicts == 1
+                      ? "1 change of this file was"
+                      : std::to_string(report.conflicts) + " changes of this file were") +
+                 " discarded, because others had changed or removed the same views first");
   }
   if (report.restored) {
     session.note(

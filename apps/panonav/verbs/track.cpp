@@ -104,7 +104,7 @@ ordered_json to_json(const TrackedImage& image) {
   return {{"file", image.file},
           {"stamp_s", to_json_or_null(image.stamp_s)},
           {"state", name_of(estimate.state)},
-          {"pose", estimate.pose ? pose_json(*estimate.pose) : ordered_json()},
+          {"pose", pose_json(estimate.pose)},
           {"inside", estimate.inside},
           {"probability", estimate.probability},
           {"modes", std::move(modes)},
@@ -115,7 +115,7 @@ ordered_json to_json(const TrackedImage& image) {
           {"injected", estimate.injected},
           {"difference_here", to_json_or_null(estimate.difference_here)},
           {"difference_anywhere", to_json_or_null(estimate.difference_anywhere)},
-          {"ground_truth", image.truth ? pose_json(*image.truth) : ordered_json()}};
+          {"ground_truth", pose_json(image.truth)}};
 }
 
 std::string format_position(const Pose2& pose) {
