@@ -1,10 +1,11 @@
 // Learns the coefficients of `place_probability` on built-in scenes and prints them: 32 places,
-// each remembered with all and with few references, of all and of few components,
-// asked for its own places, as memorised and with other light and a tenth hidden, for places of
-// other variants of its scene and for places of other scenes. Logistic regression; own places,
-// variants and other scenes count a third each. First the coefficients of the columns, then those
-// of the local features, from the queries at which the columns leave doubt by the coefficients that
-// are in use: where the former have changed, run again with them. About eight minutes.
+// each remembered with all and with few references, of all and of few
+// components, asked for its own places, as memorised and with other light and a tenth hidden, for
+// places of other variants of its scene and for places of other scenes. Logistic regression; own
+// places, variants and other scenes count a third each. First the coefficients of the columns,
+// then those of the local features, from the queries at which the columns leave doubt by the
+// coefficients that are in use: where the former have changed, run again with them. About eight
+// minutes.
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -220,8 +221,8 @@ Vector<feature_term_count> learn_of_features(
   return weights;
 }
 
-// Prints the weighted number of answers in each tenth, the share of own places, and the known share
-// of each scene.
+// Prints the weighted number of answers in each tenth, the share of own places, and the known
+// share of each scene.
 template <class Probability>
 void report(const char* title, const std::vector<Sample>& samples, const Probability& probability) {
   const std::array<double, 3> counts = counts_of(samples);

@@ -128,8 +128,8 @@ Panorama rotate_to_zero_phase(const Panorama& view) {
   return rotate_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
 }
 
-// Compares principal components of views rotated to zero phase. Eigenimages depend on the heading,
-// so the papers that use them rotate the views to a canonical heading first.
+// Compares principal components of views rotated to zero phase. Eigenimages depend on the
+// heading, so the papers that use them rotate the views to a canonical heading first.
 class EigenimageRecogniser final : public RivalRecogniser {
  public:
   explicit EigenimageRecogniser(int dimensions) : dimensions_(dimensions) {
@@ -164,8 +164,8 @@ class EigenimageRecogniser final : public RivalRecogniser {
       return (coefficients_.col(static_cast<Eigen::Index>(i)) - coefficients).squaredNorm();
     });
   }
-  /// Returns the bytes of the coefficients of one view, plus the eigenimages divided by the number
-  /// of views.
+  /// Returns the bytes of the coefficients of one view, plus the eigenimages divided by the
+  /// number of views.
   [[nodiscard]] double bytes_per_view() const override {
     if (coefficients_.cols() == 0) return 0.0;
     return 4.0 * static_cast<double>(coefficients_.rows()) +

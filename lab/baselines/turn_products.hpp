@@ -16,8 +16,8 @@ namespace panonav::lab {
 /// and writes the largest of each row. `periodic` holds columns + stride values, value i + columns
 /// the same as value i: turns from `columns` on repeat the first ones. Rounding: a few units of
 /// 1e-7 times the sum of the absolute terms. Throws ContractError on other sizes. Cost: rows *
-/// columns * stride multiplications and additions, in registers of `instructions`; the baseline is
-/// as fast as this machine allows, so the comparison of run times is fair.
+/// columns * stride multiplications and additions, in registers of `instructions`; the baseline
+/// is as fast as this machine allows, so the comparison of run times is fair.
 void turn_products(std::span<const float> rows, std::size_t columns,
                    std::span<const float> periodic, std::span<float> products,
                    std::span<float> largest,

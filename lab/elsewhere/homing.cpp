@@ -43,8 +43,8 @@ HomingResult compute_home(const Panorama& goal, const Panorama& current) {
   return HomingGuide(Observation(goal), PictureSource{}).home(Observation(current));
 }
 
-/// Returns the angle between `direction_rad`, in the frame of a robot at `from`, and the direction
-/// of `to`.
+/// Returns the angle between `direction_rad`, in the frame of a robot at `from`, and the
+/// direction of `to`.
 double direction_error_rad(double direction_rad, const Pose2& from, const Pose2& to) {
   const double truth = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
   return std::abs(angle_difference(direction_rad + from.heading_rad, truth));

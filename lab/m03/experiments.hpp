@@ -51,8 +51,8 @@ struct OfficeRuns {
 /// are shorter.
 [[nodiscard]] std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step = 0);
-/// Makes the series of median errors against the number of images, with the 5 % and 95 % quantiles
-/// as bars; `shift` is added to all x, so that bars of several series do not overlap.
+/// Makes the series of median errors against the number of images, with the 5 % and 95 %
+/// quantiles as bars; `shift` is added to all x, so that bars of several series do not overlap.
 [[nodiscard]] viewer::Series make_error_series(const std::string& label,
                                                std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step, double shift);

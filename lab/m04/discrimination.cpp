@@ -188,8 +188,8 @@ class Discrimination final : public Experiment {
            hundredths(high) + " times as much; so more components help";
   }
 
-  // Compares, per band of components, how much hidden azimuths change a view with how much a step
-  // of one spacing does.
+  // Compares, per band of components, how much hidden azimuths change a view with how much a
+  // step of one spacing does.
   void compare_disturbance(const simulation::PlaceRecording& place,
                            const std::vector<FourierSignature>& clean,
                            const std::vector<FourierSignature>& hidden,

@@ -71,8 +71,8 @@ struct Arena : simulation::SimulatedPlace {
 /// arena.
 [[nodiscard]] HomingSurveyOptions survey_options(const Arena& arena);
 
-/// Surveys the home view of every `goal_stride`-th place of the first recording against all places
-/// of the second. `rule` receives the indices of goal and place.
+/// Surveys the home view of every `goal_stride`-th place of the first recording against all
+/// places of the second. `rule` receives the indices of goal and place.
 [[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule,
                                         Executor& executor, std::size_t goal_stride = 1);
 [[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const FourierHomingOptions& homing,

@@ -106,8 +106,8 @@ class ChainFollower {
                 const HomingPursuitOptions& pursuit = {});
 
   /// Decides the next motion after the motion `moved` since the last view
-  /// (robot_old_from_robot_new, by its odometry; ignored for the first view). Throws ContractError
-  /// as `home_vector`.
+  /// (robot_old_from_robot_new, by its odometry; ignored for the first view). Throws
+  /// ContractError as `home_vector`.
   [[nodiscard]] ChainDecision decide(const HomingView& current, const Pose2& moved);
 
  private:

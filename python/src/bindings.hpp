@@ -31,8 +31,8 @@ namespace py = pybind11;
 
 // Arrays. A wrong dtype, shape or kind throws ContractError that names the argument `what`.
 
-/// Views uint8 pixels of shape (rows, columns) or (rows, columns, 3) without a copy if the pixels
-/// of each row are contiguous; otherwise copies the array. Any row stride is allowed.
+/// Views uint8 pixels of shape (rows, columns) or (rows, columns, 3) without a copy if the
+/// pixels of each row are contiguous; otherwise copies the array. Any row stride is allowed.
 class PictureArray {
  public:
   PictureArray(const py::handle& array, const char* what);

@@ -6,8 +6,8 @@
 
 namespace panonav::python {
 
-/// `VisualMemory` and `MemoryFile` for Python. A file has one connection, which reading uses, too,
-/// so nearly all its functions use `change`.
+/// `VisualMemory` and `MemoryFile` for Python. A file has one connection, which reading uses,
+/// too, so nearly all its functions use `change`.
 using SharedMemory = Shared<VisualMemory>;
 using SharedFile = Shared<MemoryFile>;
 

@@ -50,8 +50,8 @@ class PlaceSearch final : public IndexedMemory {
     [[nodiscard]] std::size_t size()
         const noexcept override;  ///< Returns the number of sketched views.
     /// Searches, as `VisualMemory::search`, the sketched views that the memory still has. It needs
-    /// one or two statements, more if many views look similar. Uses all cores while no other search
-    /// of this memory runs.
+    /// one or two statements, more if many views look similar. Uses all cores while no other
+    /// search of this memory runs.
     [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options,
                                       const SearchMask& mask) override;
     /// Loads those of the views that the memory has, without links, by one statement; views that

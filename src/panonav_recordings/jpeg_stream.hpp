@@ -12,8 +12,8 @@
 namespace panonav::recordings {
 
 /// Cuts a stream of JPEG pictures that follow each other ("MJPEG") into pictures. It follows the
-/// segments of a picture, so that a thumbnail within does not end it; bytes between pictures, such
-/// as the heads of a multipart stream, are skipped. Memory: one picture, at most `max_bytes`.
+/// segments of a picture, so that a thumbnail within does not end it; bytes between pictures,
+/// such as the heads of a multipart stream, are skipped. Memory: one picture, at most `max_bytes`.
 class JpegStream {
  public:
   /// Largest size of a picture; larger ones are refused.

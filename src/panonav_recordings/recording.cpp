@@ -234,8 +234,8 @@ FileKind detect_kind(const fs::path& path) {
   if (text.starts_with(bag_magic)) return FileKind::bag;
   if (text.starts_with("#ROSBAG V") || text.starts_with("#ROSRECORD V")) return FileKind::old_bag;
   if (text.starts_with("\x28\xB5\x2F\xFD") && path.extension() == ".zstd") return FileKind::packed;
-  // SQLite files have an application id at byte 68. It is 0 in files of rosbag2, but not in those
-  // of other programs, such as memory files.
+  // SQLite files have an application id at byte 68. It is 0 in files of rosbag2, but not
+  // in those of other programs, such as memory files.
   constexpr std::size_t mark_at = 68;
   if (text.starts_with(std::string_view("SQLite format 3\0", 16)) &&
       text.substr(mark_at, 4) == std::string_view("\0\0\0\0", 4)) {

@@ -193,8 +193,8 @@ class WorldReader {
     for (const pugi::xml_node& part : parent) add_part(part, part, place);
   }
 
-  // Adds one part. `placed_by` is the part itself, or the <include> whose name and pose replace
-  // those of the part.
+  // Adds one part. `placed_by` is the part itself, or the <include> whose name and pose
+  // replace those of the part.
   void add_part(pugi::xml_node part, pugi::xml_node placed_by, const ElementContext& place) {
     const std::string kind = part.name();
     const std::string& object = place.origin.object;

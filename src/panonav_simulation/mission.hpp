@@ -71,8 +71,8 @@ struct RememberedPlace {
 /// Records views along a drive and maps them by visual odometry and loop closure, with lengths from
 /// `wheels` [F11 section 4]. The memory gets the poses of the map's largest component. If the place
 /// has lines, the robot also records a route along this component up to its first gap: a line at
-/// least every 10 cm [Y03 section 2.2], with poses interpolated between those of the map's views,
-/// so that both are in the same frame.
+/// least every 10 cm [Y03 section 2.2], with poses interpolated between those of the map's
+/// views, so that both are in the same frame.
 [[nodiscard]] RememberedPlace memorise_drive(const MissionPlace& place,
                                              const std::vector<Pose2>& poses,
                                              const OdometryNoise& wheels, std::uint64_t seed,

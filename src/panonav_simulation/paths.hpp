@@ -102,8 +102,8 @@ struct RandomWalkOptions {
 
 /// Walks in straight steps with small random turns; if the next step is not free, the robot turns
 /// to a random direction instead. The heading of a pose is the direction of the step to it. Stops
-/// early if no free step is found. Throws ContractError if `start` is not free or an option is out
-/// of range.
+/// early if no free step is found. Throws ContractError if `start` is not free or an option is
+/// out of range.
 [[nodiscard]] inline std::vector<Pose2> random_walk(const Pose2& start,
                                                     const FreePredicate& is_free,
                                                     const RandomWalkOptions& options,

@@ -92,8 +92,8 @@ struct Scene {
 };
 
 /// Throws ContractError, which names the mesh and its fault: an index out of range, not as many
-/// texture coordinates as vertices, or a coordinate that is not finite or out of reach. Lights out
-/// of range throw, too.
+/// texture coordinates as vertices, or a coordinate that is not finite or out of reach. Lights
+/// out of range throw, too.
 void validate(const Scene& scene);
 using panonav::validate;  // for options
 

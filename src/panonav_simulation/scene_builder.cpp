@@ -186,8 +186,8 @@ void SceneBuilder::add_ceiling(int material, Point2 low, Point2 high, double hei
 
 Footing SceneBuilder::place_movable(const Footing& planned, double radius_m,
                                     const FloorArea& room) {
-  // Draw the same random numbers for every object, so that one object's motion does not change that
-  // of the next.
+  // Draw the same random numbers for every object, so that one object's motion does not change
+  // that of the next.
   const bool moves = moved_random_.uniform() < variation_.moved_objects;
   Footing found = planned;
   bool placed = false;

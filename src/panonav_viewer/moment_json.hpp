@@ -21,8 +21,8 @@ namespace panonav::viewer {
 /// empty text if there are none.
 [[nodiscard]] std::string retained_to_json(const recordings::RunMoment& moment);
 
-/// The newest version of each retained part of a run (shown until it is replaced), and the number
-/// of replacements.
+/// The newest version of each retained part of a run (shown until it is replaced), and the
+/// number of replacements.
 struct RetainedParts {
   recordings::RunMoment moment;
   std::size_t times = 0;

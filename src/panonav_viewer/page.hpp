@@ -64,8 +64,8 @@ class RunPage {
   RetainedParts retained_;
 };
 
-/// Returns an HTML page with embedded styles and scripts. `body` is HTML; `generator` is the name
-/// of the program and may be empty.
+/// Returns an HTML page with embedded styles and scripts. `body` is HTML; `generator` is the
+/// name of the program and may be empty.
 [[nodiscard]] std::string make_page(std::string_view title, std::string_view generator,
                                     std::string body);
 

@@ -48,8 +48,8 @@ struct Bounds {
   }
   [[nodiscard]] double width() const { return high.x_m - low.x_m; }
   [[nodiscard]] double height() const { return high.y_m - low.y_m; }
-  /// Adds a margin and extends the shorter side, so that the rectangle is at most 5 times as wide
-  /// as high, and at most 1.2 times as high as wide.
+  /// Adds a margin and extends the shorter side, so that the rectangle is at most 5 times as
+  /// wide as high, and at most 1.2 times as high as wide.
   void add_margin() {
     if (!(low.x_m <= high.x_m)) low = high = {};
     const double side = std::max({width(), height(), 1e-6 * std::abs(low.x_m), 1e-9});

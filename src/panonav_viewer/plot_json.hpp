@@ -7,8 +7,8 @@
 #include "panonav_viewer/picture_plot.hpp"
 #include "panonav_viewer/plot.hpp"
 
-/// Plots as JSON for the page's scripts, with numbers rounded to six digits. Throws ContractError
-/// as `write_plot`.
+/// Plots as JSON for the page's scripts, with numbers rounded to six digits. Throws
+/// ContractError as `write_plot`.
 namespace panonav::viewer {
 
 /// Returns the name of the CSS variable of a colour: "vermilion" for --vermilion.

@@ -8,8 +8,8 @@
 namespace panonav::viewer {
 
 /// Returns a map of a scene as the background of a plot: objects as the outlines of their convex
-/// bodies (slanted screens, round tree crowns), and walls as sections at the height of the camera,
-/// so that doors are open.
+/// bodies (slanted screens, round tree crowns), and walls as sections at the height of the
+/// camera, so that doors are open.
 [[nodiscard]] std::vector<MapLayer> scene_layers(const simulation::Scene& scene);
 
 /// Returns the map of `scene_layers` as lines; closed outlines end at their first point.

@@ -66,8 +66,8 @@ TEST(LowVarianceResample, RefusesWeightsThatAreNone) {
                ContractError);
 }
 
-// The bound of Fox 2003 holds when 2 n times the divergence of n draws is below the 0.99 quantile
-// of chi squared with bins - 1 degrees of freedom; checked by drawing.
+// The bound of Fox 2003 holds when 2 n times the divergence of n draws is below the 0.99
+// quantile of chi squared with bins - 1 degrees of freedom; checked by drawing.
 TEST(KldSampleSize, DrawsOfThatSizeAreWithinTheError) {
   constexpr std::size_t bins = 20;
   constexpr double error = 0.05;

@@ -413,8 +413,8 @@ TEST(HomingView, HorizonViewIsTheMeanOfTheRowsAroundTheHorizon) {
   }
 }
 
-/// Pictures of nothing: white noise, noise smoothed along rows, columns or both, and surroundings
-/// of the spectrum of rooms.
+/// Pictures of nothing: white noise, noise smoothed along rows, columns or both, and
+/// surroundings of the spectrum of rooms.
 Panorama picture_of_nothing(int kind, std::uint64_t seed) {
   Random random(seed, static_cast<std::uint64_t>(kind));
   if (kind >= 4) return seen_from(random_surroundings(seed, kind == 4 ? 0.0 : 3.0), 0, 0, 0, 24);

@@ -48,8 +48,8 @@ void expect_views(const MemoryFile& file) {
 }
 
 // data/version_1.panonav is as the library wrote it, and stays as it is: five views with numbers
-// that follow from those of the view, a map, a route, two changes that can be undone, and the state
-// of a synchronisation with a server.
+// that follow from those of the view, a map, a route, two changes that can be undone, and the
+// state of a synchronisation with a server.
 TEST(GoldenMemoryFile, IsReadAndGrows) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder / "m.panonav";

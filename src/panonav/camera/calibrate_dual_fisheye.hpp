@@ -40,10 +40,10 @@ struct DualFisheyeCalibration {
   std::vector<double> turns_rad;  ///< of each picture against the first, in [-pi, pi)
 };
 
-/// Finds the lenses of a dual fisheye camera (centres, focal lengths, distortion, rotations, fields
-/// of view, gain) from pictures taken at one place while the camera is rotated about a vertical
-/// axis. Patches that both lenses see, or one lens in two pictures, are matched by normalised
-/// correlation; all parameters and the yaws are estimated by robust least squares
+/// Finds the lenses of a dual fisheye camera (centres, focal lengths, distortion, rotations,
+/// fields of view, gain) from pictures taken at one place while the camera is rotated about a
+/// vertical axis. Patches that both lenses see, or one lens in two pictures, are matched by
+/// normalised correlation; all parameters and the yaws are estimated by robust least squares
 /// (Levenberg-Marquardt) with weak priors from typical cameras (docs/equations.md). If the pictures
 /// do not determine the camera, returns one line with the reason. Throws ContractError on no
 /// picture, different sizes, or a height below 64 px. Results are bit-identical for any number of

@@ -26,8 +26,8 @@ constexpr int coarse_field_side_px = 200;
 constexpr int max_climbed_circles = 48;
 /// Largest number of circles of the middle field that are fitted in the image, best first.
 constexpr int max_fitted_circles = 8;
-/// Circles are duplicates if their centres and radii differ by less than this in total, in pixels
-/// of the middle field.
+/// Circles are duplicates if their centres and radii differ by less than this in total, in
+/// pixels of the middle field.
 constexpr double same_circle_px = 3.0;
 
 /// Largest width of a plain ring around the mirror, as a share of its outer radius: a wider plain

@@ -61,9 +61,10 @@ void visit_options(MirrorCircle::SearchOptions& options, OptionVisitor& visitor)
 /// all centres and radii, refined to a fraction of a pixel by a robust fit. In several images,
 /// edges that move average out. A plain ring around the mirror is excluded. Returns nullopt if no
 /// circle reaches `min_quality`. Limits: other round objects that fill the picture are taken for a
-/// mirror; a mirror in patterned surroundings may be missed; a ring with almost as much structure
-/// as the scene is included in the mirror. Throws ContractError when there is no image, sizes
-/// differ, or a side is shorter than 32 px; OptionError. Cost: 0.4 s for an image of 640 x 480.
+/// mirror; a mirror in patterned surroundings may be missed; a ring with almost as much
+/// structure as the scene is included in the mirror. Throws ContractError when there is no image,
+/// sizes differ, or a side is shorter than 32 px; OptionError. Cost: 0.4 s for an image of 640 x
+/// 480.
 [[nodiscard]] std::optional<MirrorCircle> find_mirror(
     std::span<const ImageView> images, const MirrorCircle::SearchOptions& options = {});
 

@@ -20,8 +20,8 @@ std::optional<double> elevation_at(const HyperboloidalModel& model, double radiu
   const double a = model.a_mm;
   const double b = model.b_mm;
   const double f = model.focal_length_px;
-  // At radii of f a / b or more the camera's ray does not meet the mirror: it is at least as flat
-  // as the asymptotes.
+  // At radii of f a / b or more the camera's ray does not meet the mirror: it is at least as
+  // flat as the asymptotes.
   if (!(radius_px >= 0) || !(radius_px * b < f * a)) return std::nullopt;
   const double c = std::hypot(a, b);
   // [Y03 eq. 3] with numerator and denominator multiplied by hypot(r, f), and both negated, so that

@@ -24,9 +24,9 @@ struct MirrorKnowledge {
 [[nodiscard]] Camera camera_from_mirror(const MirrorCircle& mirror,
                                         const MirrorKnowledge& knowledge);
 
-/// Fits the focal length so that `elevation_rad` is seen `radius_px` from the centre, as on the rim
-/// of a mirror whose edge shows a known elevation. Throws ContractError unless the model sees that
-/// elevation and radius_px > 0.
+/// Fits the focal length so that `elevation_rad` is seen `radius_px` from the centre, as on the
+/// rim of a mirror whose edge shows a known elevation. Throws ContractError unless the model sees
+/// that elevation and radius_px > 0.
 [[nodiscard]] HyperboloidalModel fit_focal_length(HyperboloidalModel model, double radius_px,
                                                   double elevation_rad);
 /// Fits the focal length of a unified model in the same way, with the same exceptions.

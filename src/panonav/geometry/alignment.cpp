@@ -19,8 +19,8 @@ Point2 centroid(std::span<const Point2> points) {
   return {sum.x_m / n, sum.y_m / n};
 }
 
-// In the plane two complex correlations replace the 2 x 2 singular value decomposition: with points
-// as complex numbers, |sum conj(a) b| = s_1 + s_2 of a proper rotation, |sum a b| that of a
+// In the plane two complex correlations replace the 2 x 2 singular value decomposition: with
+// points as complex numbers, |sum conj(a) b| = s_1 + s_2 of a proper rotation, |sum a b| that of a
 // reflection.
 struct Correlations {
   double proper_real = 0.0, proper_imaginary = 0.0;

@@ -179,8 +179,8 @@ double VoronoiCells::median_spacing_m() const {
     const double here = sweep_coordinate(sites_[site]);
     std::size_t below = sweep_rank_[site];
     std::size_t above = sweep_rank_[site] + 1;
-    // Searches outwards on both sides until no further site can be nearer than the second-nearest
-    // so far.
+    // Searches outwards on both sides until no further site can be nearer than the
+    // second-nearest so far.
     while (below > 0 && here - sweep_coordinate(sites_[sites_by_sweep_[below - 1]]) < nearest[1]) {
       consider(sites_by_sweep_[--below]);
       if (above < sites_.size()) consider(sites_by_sweep_[above++]);

@@ -65,8 +65,8 @@ using SurveyProgress = std::function<void(double fraction)>;
                                          const SurveyProgress& progress = {});
 
 /// Averages the homeward component by distance [S06 eq. 48]. Bin i contains the distances from (i -
-/// 0.5) bin_m to (i + 0.5) bin_m, so that the distances on a grid of this spacing are in the middle
-/// of bins. Throws ContractError unless bin_m > 0 and there are at most 100,000 bins.
+/// 0.5) bin_m to (i + 0.5) bin_m, so that the distances on a grid of this spacing are in the
+/// middle of bins. Throws ContractError unless bin_m > 0 and there are at most 100,000 bins.
 [[nodiscard]] std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey,
                                                                   double bin_m = 0.025);
 

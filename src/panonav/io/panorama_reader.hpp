@@ -14,9 +14,9 @@
 
 namespace panonav {
 
-/// Turns the pictures of one recording into panoramic cylinders of one shape. The unwarping table
-/// of mirror pictures is computed once, at construction. Several threads may use one reader at a
-/// time.
+/// Turns the pictures of one recording into panoramic cylinders of one shape. The unwarping
+/// table of mirror pictures is computed once, at construction. Several threads may use one reader
+/// at a time.
 class PanoramaReader {
  public:
   /// If rows or columns of `shape` are 0, the pictures' own number is kept (80 x 512 for mirror

@@ -7,10 +7,10 @@
 
 namespace panonav::kernels {
 
-/// Finds, for each descriptor of `a` (four words of 64 bits), the index of the nearest descriptor
-/// of `b` by Hamming distance, and vice versa; of equally near ones the first. If one list is
-/// empty, the results of the other are not written. Throws ContractError on inconsistent sizes and
-/// on more than `max_descriptors` descriptors.
+/// Finds, for each descriptor of `a` (four words of 64 bits), the index of the nearest
+/// descriptor of `b` by Hamming distance, and vice versa; of equally near ones the first. If one
+/// list is empty, the results of the other are not written. Throws ContractError on inconsistent
+/// sizes and on more than `max_descriptors` descriptors.
 void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b,
                          std::span<std::uint16_t> nearest_of_a,
                          std::span<std::uint16_t> nearest_of_b, Instructions instructions);

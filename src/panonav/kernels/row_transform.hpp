@@ -11,11 +11,11 @@ namespace panonav::kernels {
 /// Computes the first Fourier components of rows of equal length:
 ///   real(k) + j imaginary(k) = 2 / columns * sum_c value[c] exp(-j 2 pi k c / columns),  k = 0 ..
 ///   components - 1.
-/// Columns c, columns - c and columns / 2 -+ c have equal sines and cosines but for the sign,
-/// so each row is first folded to a quarter of its length (with an odd number of columns to a
-/// half). The sums of components are then computed in the lanes of a vector. Cost:
-/// rows * (columns + components * columns / 2) additions, and components * columns / 2
-/// multiplications. Rounding: some 1e-7 times the mean absolute value of the row.
+/// Columns c, columns - c and columns / 2 -+ c have equal sines and cosines but for the
+/// sign, so each row is first folded to a quarter of its length (with an odd number of columns to a
+/// half). The sums of components are then computed in the lanes of a vector. Cost: rows * (columns
+/// + components * columns / 2) additions, and components * columns / 2 multiplications. Rounding:
+/// some 1e-7 times the mean absolute value of the row.
 class RowTransform {
  public:
   /// Throws ContractError unless columns >= 4 and 1 <= components <= columns / 2.

@@ -31,8 +31,8 @@ constexpr int searched_views = 16;                ///< views that the search fin
 constexpr int searched_views_when_localised = 4;  ///< the same while localised
 constexpr std::size_t max_followed_sites = 256;   ///< compared references near the particles
 constexpr std::size_t max_followed_sites_when_localised = 16;
-/// A reference is compared if the particles around it have at least this share of the weight: five
-/// of 5000 particles.
+/// A reference is compared if the particles around it have at least this share of the weight:
+/// five of 5000 particles.
 constexpr double min_followed_weight = 1e-3;
 
 // Probabilities from one image to the next (docs/decisions.md, particle injection).

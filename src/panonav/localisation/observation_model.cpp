@@ -128,8 +128,8 @@ double fit_range(std::span<const std::pair<double, double>> distance_and_similar
 using Explained = std::vector<double>;
 
 // Fits the sharpness that maximises the probability of the true positions of the left-out views
-// among all candidates. The logarithm of this probability is concave in the sharpness, so bisection
-// of its slope finds the maximum.
+// among all candidates. The logarithm of this probability is concave in the sharpness, so
+// bisection of its slope finds the maximum.
 double fit_sharpness(std::span<const Explained> views) {
   std::vector<double> own;
   for (const Explained& view : views) own.push_back(view.front());

@@ -21,8 +21,8 @@ struct ObservationModel {
   double spacing_m = 0.0;       ///< between references
   double far_difference = 0.6;  ///< median difference of two distant views
   double range_m = 0.0;         ///< distance at which the similarity has fallen to 1/e
-  /// Log-likelihood of a view per unit of squared explained similarity: half the inverse variance
-  /// of a similarity around its expected value.
+  /// Log-likelihood of a view per unit of squared explained similarity: half the inverse
+  /// variance of a similarity around its expected value.
   double sharpness = 0.0;
   double heading_width_rad =
       0.0;  ///< largest heading difference at which a reference explains a view

@@ -57,8 +57,8 @@ struct PlaceModel {
 /// Number of terms by columns in `place_probability`.
 inline constexpr int column_term_count = 6;
 /// Returns the regression terms by columns: 1 and the logarithms of five numbers: the best
-/// difference divided by that of chance, the best difference divided by the tenth best, the number
-/// of views, the difference over all columns divided by 0.5 (at least 1), and the number of
+/// difference divided by that of chance, the best difference divided by the tenth best, the
+/// number of views, the difference over all columns divided by 0.5 (at least 1), and the number of
 /// components divided by 15. Views and components are clamped to the range of the training data.
 /// The difference is divided by that of chance because scenes of little contrast always differ
 /// little.
@@ -95,8 +95,8 @@ inline constexpr int feature_term_count = 4;
 class PlaceCriterion {
  public:
   /// Keeps the column profiles of the views that `sample_reference_views` returns. The ranking must
-  /// outlive *this. `views`: number of views of the whole memory if the ranking's memory is a part
-  /// of it that includes these views; 0 if the ranking's memory is the whole.
+  /// outlive *this. `views`: number of views of the whole memory if the ranking's memory is a
+  /// part of it that includes these views; 0 if the ranking's memory is the whole.
   explicit PlaceCriterion(const ColumnRanking& ranking, std::size_t views = 0);
   /// Loads the sampled views from a memory that is not held in RAM; loads no others later.
   explicit PlaceCriterion(const ViewSource& source);
@@ -107,11 +107,12 @@ class PlaceCriterion {
   [[nodiscard]] PlaceEvidence evidence(const PackedSignature& query,
                                        std::span<const RankedMatch> matches,
                                        const SearchMask& mask = {}) const;
-  /// Collects evidence by local features: compares the query with the first `verified_candidates`
-  /// of `matches`, best first, unless their `verified_features` are known. The number expected by
-  /// chance is measured on the first 12 sampled views that have features and are not excluded, the
-  /// number of neighbours on the best match and the first 12 others. nullopt if the query, the
-  /// first match or all sampled views have no features. Cost: 0.1 ms for each compared view.
+  /// Collects evidence by local features: compares the query with the first
+  /// `verified_candidates` of `matches`, best first, unless their `verified_features` are known.
+  /// The number expected by chance is measured on the first 12 sampled views that have features and
+  /// are not excluded, the number of neighbours on the best match and the first 12 others. nullopt
+  /// if the query, the first match or all sampled views have no features. Cost: 0.1 ms for each
+  /// compared view.
   [[nodiscard]] std::optional<PlaceEvidence::Features> feature_evidence(
       const LocalFeatures& query, const LocalFeatures& mirrored_query,
       const FeatureSource& features, std::span<const RankedMatch> matches,

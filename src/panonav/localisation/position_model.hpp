@@ -35,8 +35,8 @@ struct PositionModel {
   /// The same ratio if a half circle is empty: the place may be outside the outermost references.
   double edge_radius_m_per_deviation = 0.0;
   double spacing_m = 0.0;  ///< of the posed views
-  /// The position may be that of a lookalike if the best match's difference is at least this share
-  /// of the difference of the best match elsewhere (more than 3 spacings away). nullopt if
+  /// The position may be that of a lookalike if the best match's difference is at least this
+  /// share of the difference of the best match elsewhere (more than 3 spacings away). nullopt if
   /// lookalikes are rare.
   std::optional<double> ambiguous_from;
   double ambiguous_radius_m = 0.0;  ///< lower limit of the radius from `ambiguous_from` on

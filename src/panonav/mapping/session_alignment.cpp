@@ -18,8 +18,9 @@ namespace {
 constexpr double match_position_deviation_m = 0.1;
 constexpr double match_heading_deviation_rad = 0.05;
 /// Standard deviations of the motion between two nodes of an optimised map: position and heading
-/// per metre (m/m, rad/m), and both at length 0 (m, rad). The first two are a quarter and a half of
-/// those of a single step (`MappingOptions`), as steps and closures around have corrected it.
+/// per metre (m/m, rad/m), and both at length 0 (m, rad). The first two are a quarter and a
+/// half of those of a single step (`MappingOptions`), as steps and closures around have corrected
+/// it.
 constexpr double edge_position_deviation = 0.02;
 constexpr double edge_turn_deviation = 0.01;
 constexpr double min_edge_position_deviation_m = 0.005;

@@ -75,9 +75,9 @@ struct SearchResult {
   std::uint64_t views_in_full = 0;  ///< number of views that were compared in full
 };
 
-/// The reference views that a robot remembers. Views keep their id for ever; ids grow in the order
-/// of appending. Invariant: all signatures have one shape and one full scale. Reading from several
-/// threads at once is safe; changing is not.
+/// The reference views that a robot remembers. Views keep their id for ever; ids grow in the
+/// order of appending. Invariant: all signatures have one shape and one full scale. Reading from
+/// several threads at once is safe; changing is not.
 class VisualMemory {
  public:
   /// One level of hierarchical localisation [M04 section 2.3]: the candidate views that remain

@@ -106,10 +106,10 @@ struct Candidate {
   bool joins_only = false;  // kept only if it joins two components
 };
 
-// Makes edges with lengths in units of the local spacing of the references. The unit of phases and
-// of the arrangement differs between places, because similarity falls faster with distance where
-// objects are near. The length of a kept spring comes from the arrangement, which combines the
-// directions of all springs around; that of a rejected spring from its phases.
+// Makes edges with lengths in units of the local spacing of the references. The unit of phases
+// and of the arrangement differs between places, because similarity falls faster with distance
+// where objects are near. The length of a kept spring comes from the arrangement, which combines
+// the directions of all springs around; that of a rejected spring from its phases.
 std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
                                        const std::vector<Spring>& springs, double min_weight) {
   const auto is_rejected = [&](const Spring& spring) {

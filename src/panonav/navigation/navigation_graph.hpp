@@ -36,8 +36,8 @@ class NavigationGraph {
   };
 
   /// `views`: ascending. Of several edges between two views, uses the first. Throws ContractError
-  /// if an edge has an unknown view or joins a view to itself, or if a number is not finite or out
-  /// of range.
+  /// if an edge has an unknown view or joins a view to itself, or if a number is not finite or
+  /// out of range.
   NavigationGraph(std::vector<ViewId> views, std::vector<Edge> edges);
 
   [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }  ///< Number of nodes.
@@ -68,8 +68,8 @@ class NavigationGraph {
 [[nodiscard]] std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
                                                     std::span<const std::size_t> from, int links);
 
-/// Largest difference between the directions of an edge as computed from its two views: 45 degrees,
-/// as in `arrange`.
+/// Largest difference between the directions of an edge as computed from its two views: 45
+/// degrees, as in `arrange`.
 inline constexpr double max_disagreement_rad = 0.78539816339744831;
 
 /// Computes an edge for each link from the phases of its two views by their home vectors [M04

@@ -154,8 +154,8 @@ class Navigator {
 
   /// The planner with its graph, its areas and the edges blocked now.
   [[nodiscard]] const AreaPlanner& planner() const noexcept;
-  /// Returns the number of loaded views: those in and around the current area, and prefetched views
-  /// of the next area.
+  /// Returns the number of loaded views: those in and around the current area, and prefetched
+  /// views of the next area.
   [[nodiscard]] std::size_t loaded_views() const noexcept;
 
  private:

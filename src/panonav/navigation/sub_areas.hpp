@@ -39,9 +39,9 @@ struct SubAreas {
                                          const SubAreaOptions& options = {});
 
 /// Returns 1 for each node at most `links` edges away from a narrow gate, as doors are; 0 for the
-/// others. A border of two areas is narrow if it has at most sqrt(n) edges, where n is the number
-/// of views of the smaller area. In open space, a border is about sqrt(n) views long and has three
-/// times as many edges.
+/// others. A border of two areas is narrow if it has at most sqrt(n) edges, where n is the
+/// number of views of the smaller area. In open space, a border is about sqrt(n) views long and has
+/// three times as many edges.
 [[nodiscard]] std::vector<std::uint8_t> find_bottlenecks(const NavigationGraph& graph,
                                                          const SubAreas& areas, int links);
 

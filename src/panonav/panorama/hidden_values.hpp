@@ -20,9 +20,9 @@ namespace panonav {
 /// Replaces the hidden values of each row by linear interpolation, round the cylinder, between the
 /// visible values on both sides of the gap. For rows whose power spectrum falls as 1 / f^2, as in
 /// natural images, this estimate has the smallest mean squared error; and it leaves no edge at the
-/// ends of the gap, which would turn with the robot. A row without visible values becomes the mean
-/// of all visible values. Throws ContractError unless `hidden` has one entry for each value and one
-/// of them is 0.
+/// ends of the gap, which would turn with the robot. A row without visible values becomes the
+/// mean of all visible values. Throws ContractError unless `hidden` has one entry for each value
+/// and one of them is 0.
 void fill_hidden_values(Panorama& panorama, std::span<const std::uint8_t> hidden);
 
 }  // namespace panonav

@@ -36,8 +36,8 @@ void visit_options(PreprocessingOptions& options, OptionVisitor& visitor);
 /// Throws ContractError when the masks leave none of `rows` rows.
 void require_unmasked_rows(const PreprocessingOptions& options, int rows);
 
-/// Applies the steps. Throws ContractError when the masks leave no row; OptionError on options out
-/// of range.
+/// Applies the steps. Throws ContractError when the masks leave no row; OptionError on options
+/// out of range.
 [[nodiscard]] Panorama preprocess(Panorama panorama, const PreprocessingOptions& options);
 
 }  // namespace panonav

@@ -19,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns a hash of the recording's names, poses, stamps, file sizes and times, and of the layout
-/// of its images.
+/// Returns a hash of the recording's names, poses, stamps, file sizes and times, and of the
+/// layout of its images.
 std::string compute_fingerprint(const Dataset& recording, const MemoryFile& memory) {
   RecordBytes bytes;
   MemoryHeader read_as = memory.header();

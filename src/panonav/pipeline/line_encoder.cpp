@@ -16,8 +16,8 @@ std::string make_parameter_name(const std::string& name) {
   return "route." + name;
 }
 
-/// Chooses a cylinder with only the rows needed for the line, and with four columns for each column
-/// of the line, at most 4096.
+/// Chooses a cylinder with only the rows needed for the line, and with four columns for each
+/// column of the line, at most 4096.
 PanoramaShape choose_line_panorama_shape(const PictureSource& pictures, const RouteSource& route) {
   if (pictures.kind == PictureKind::panorama) return {};
   constexpr int rows = 5;

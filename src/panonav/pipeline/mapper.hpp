@@ -71,8 +71,8 @@ class Mapper {
   /// Encodes and adds the next observation.
   bool add(const Observation& observation) { return add(encode(observation)); }
 
-  /// Adds all observations of a recording and finishes. Calls `mapped` after each picture. Throws
-  /// as `add`, and FileError on a picture that cannot be read.
+  /// Adds all observations of a recording and finishes. Calls `mapped` after each picture.
+  /// Throws as `add`, and FileError on a picture that cannot be read.
   Result map(const Dataset& recording, Executor& executor,
              const std::function<void()>& mapped = {});
 

@@ -17,8 +17,8 @@ namespace panonav {
 ///   updater.observe(observation, panorama, recogniser.localise(observation));
 ///   updater.finish("update from monday");
 /// All changes of a run are one transaction, which `MemoryFile::undo` reverts. If the robot's place
-/// was never certain, the file stays unchanged. Holds the whole memory in RAM, and 10 kB for each
-/// of at most 128 pictures and each added one.
+/// was never certain, the file stays unchanged. Holds the whole memory in RAM, and 10 kB for
+/// each of at most 128 pictures and each added one.
 class MemoryUpdater {
  public:
   /// Throws FileError if the file cannot be written or has too few views with positions and

@@ -41,9 +41,9 @@ struct PlaceRecogniserOptions {
 ///   panonav::PlaceRecogniser recogniser("office.panonav");
 ///   auto place = recogniser.localise(panonav::read_image("view.jpg"));
 ///   if (place.known) std::cout << place.position->x_m << ' ' << place.position->y_m << '\n';
-/// (`position` is empty only for memories whose views have no poses.) If the stored models are not
-/// those of the present views (`learn_and_store_models`), learns new ones, which takes seconds for
-/// a large memory. Several threads may use one object concurrently.
+/// (`position` is empty only for memories whose views have no poses.) If the stored models are
+/// not those of the present views (`learn_and_store_models`), learns new ones, which takes seconds
+/// for a large memory. Several threads may use one object concurrently.
 ///
 /// Holds the whole memory, or an index of a large memory on a server: the results are the same
 /// except `bytes_read`. A memory that is not held and has more than

@@ -66,8 +66,8 @@ NavigationGraph load_requested_graph(
   }
 }
 
-/// Returns the route with the views near it. Route and views must have been recorded with the poses
-/// of the same data set.
+/// Returns the route with the views near it. Route and views must have been recorded with the
+/// poses of the same data set.
 KnownRoute load_known_route(const MemoryFileViews& source, const std::string& name,
                             const KnownRouteOptions& options) {
   const MemoryFile& file = source.file();

@@ -15,8 +15,8 @@ struct ChanceMatch {
   double deviation = 0.0;  ///< standard deviation of the matches with noise
 
   /// True if noise would match as well in fewer than 1 of 100 cases, so that the views have
-  /// something in common. False for views without structure, or if all noise matches equally well,
-  /// as with one frequency.
+  /// something in common. False for views without structure, or if all noise matches equally
+  /// well, as with one frequency.
   [[nodiscard]] bool is_beyond_chance() const noexcept;
   /// Probability, 0 .. 1, that the home vector points home within 45 degrees, from the number of
   /// deviations by which the match exceeds chance. Learnt from views of built-in scenes: equally

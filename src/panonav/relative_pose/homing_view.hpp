@@ -14,9 +14,9 @@ namespace panonav {
 /// A view in the form that homing needs: the Fourier coefficients a_k, b_k of every row [S06 eq.
 /// 10, 12, 13],
 ///   I(phi) ~ a_0/2 + sum_k a_k cos(k phi) + b_k sin(k phi),   k = 0 .. components - 1.
-/// One row for S06's horizon band, or all rows of a panorama. Stored component-major (k, then row),
-/// so that loops over the rows of a component run over neighbouring numbers. Invariant: rows >= 1,
-/// components >= 2, all finite, b_0 = 0.
+/// One row for S06's horizon band, or all rows of a panorama. Stored component-major (k, then
+/// row), so that loops over the rows of a component run over neighbouring numbers. Invariant: rows
+/// >= 1, components >= 2, all finite, b_0 = 0.
 class HomingView {
  public:
   /// Throws ContractError.

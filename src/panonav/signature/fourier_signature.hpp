@@ -25,9 +25,9 @@ struct SignatureShape {
 
 /// The first Fourier components of every row of a panoramic cylinder [M04 section 2.1, S06 eq.
 /// 10-13]: I_y(phi) ~ a_0/2 + sum_k A_k cos(k phi + psi_k). Magnitudes do not change when the robot
-/// turns on the spot; phases psi_k change by k times the turn. Stored component-major (k, then y),
-/// so that the first m components are a prefix. Invariant: rows, components >= 1; magnitudes finite
-/// and >= 0; phases in [-pi, pi), 0 where the magnitude is 0.
+/// turns on the spot; phases psi_k change by k times the turn. Stored component-major (k, then
+/// y), so that the first m components are a prefix. Invariant: rows, components >= 1; magnitudes
+/// finite and >= 0; phases in [-pi, pi), 0 where the magnitude is 0.
 class FourierSignature {
  public:
   /// Throws ContractError.

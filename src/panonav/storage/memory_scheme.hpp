@@ -63,8 +63,8 @@ void set_left_out_handler(LeftOutHandler handler);
 /// Calls the handler of `set_left_out_handler`; for schemes.
 void report_left_out(const std::filesystem::path& memory, const MemoryFile::Fault& row);
 
-/// Returns the scheme of an address; nullptr for the path of a file. Throws FileError if the scheme
-/// of the address is not registered.
+/// Returns the scheme of an address; nullptr for the path of a file. Throws FileError if the
+/// scheme of the address is not registered.
 [[nodiscard]] std::shared_ptr<const MemoryScheme> find_memory_scheme(
     const std::filesystem::path& memory);
 

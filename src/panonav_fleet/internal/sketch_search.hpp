@@ -20,8 +20,8 @@ struct LiveSegment {
   [[nodiscard]] bool has(std::size_t row) const { return (live[row / 64] >> (row % 64) & 1U) != 0; }
 };
 
-/// Searches segments for the `top` views nearest to a query as `ViewSketches::search`; `components`
-/// of them are compared. The caller must have checked query, mask and components.
+/// Searches segments for the `top` views nearest to a query as `ViewSketches::search`;
+/// `components` of them are compared. The caller must have checked query, mask and components.
 [[nodiscard]] SearchResult search_segments(const SegmentLayout& layout,
                                            std::span<const LiveSegment> segments,
                                            const PackedSignature& query, int components,

@@ -268,8 +268,8 @@ std::span<const std::uint32_t> SketchSegment::compute_cell_bounds(
 SketchSegment::Encoded::Encoded(const SegmentLayout& layout)
     : values(layout.dimensions(2)), mask(layout.dimensions(2)) {}
 
-// The sums of all views are within the scale, so the part of the query's sum outside of it is part
-// of the distance.
+// The sums of all views are within the scale, so the part of the query's sum outside of it is
+// part of the distance.
 void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
                               const SegmentQuery& query, int level,
                               std::span<const std::uint32_t> rows, Encoded& room,

@@ -39,8 +39,8 @@ class ViewSketches {
   [[nodiscard]] std::vector<ViewId> views() const;      ///< Ascending. Cost: a sort.
 
   /// Adds new views with their magnitudes, one view after the other. Views that are added together
-  /// should be of nearby places: searches are faster then. Throws ContractError on another number
-  /// of magnitudes. Cost: some microseconds a view.
+  /// should be of nearby places: searches are faster then. Throws ContractError on another
+  /// number of magnitudes. Cost: some microseconds a view.
   void insert(std::span<const ViewId> views, std::span<const std::uint8_t> magnitudes);
   /// Adds all views of `other`, none of which may be present already. Throws ContractError on
   /// another shape.

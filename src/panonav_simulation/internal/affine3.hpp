@@ -6,8 +6,8 @@
 
 namespace panonav::simulation {
 
-/// An affine transform, p_in_a = matrix * p_in_b + translation, for poses, scales and mirror images
-/// of scene parts. The matrix is row-major.
+/// An affine transform, p_in_a = matrix * p_in_b + translation, for poses, scales and mirror
+/// images of scene parts. The matrix is row-major.
 struct Affine3 {
   std::array<double, 9> matrix{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
   Vector3 translation;

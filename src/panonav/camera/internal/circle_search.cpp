@@ -463,8 +463,8 @@ std::optional<CircleFit> fit_circle(std::span<const SmoothPlanes> images,
   require(!images.empty(), "number of images", 0, "at least 1");
   FieldCircle circle = start;
   CircleFit fit;
-  // Half-widths of the search window, in px: first the error of the coarse search, last the width
-  // of an edge.
+  // Half-widths of the search window, in px: first the error of the coarse search, last the
+  // width of an edge.
   for (const double reach :
        {std::max(4.0, 0.03 * start.radius), std::max(3.0, 0.01 * start.radius), 2.5, 2.5}) {
     const int count = sample_count(circle.radius, 1.5);

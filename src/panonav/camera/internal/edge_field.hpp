@@ -28,8 +28,9 @@ struct SmoothPlanes {
 
 /// Strength and direction of the edge at each pixel: weight * (cos 2t, sin 2t), where t is the
 /// angle of the gradient (u right, v down) and the weight is in [0, 1). In colour images the
-/// channel with the strongest edge is used. Doubled angles make the polarity of an edge irrelevant,
-/// so that fields of several images can be averaged: static edges remain, moving ones average out.
+/// channel with the strongest edge is used. Doubled angles make the polarity of an edge
+/// irrelevant, so that fields of several images can be averaged: static edges remain, moving ones
+/// average out.
 struct EdgeField {
   int width = 0;
   int height = 0;

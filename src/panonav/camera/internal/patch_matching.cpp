@@ -28,8 +28,8 @@ Plane make_plane(const SmoothPlanes& smooth, int reduction) {
   return {reduction, smooth.width, smooth.height, &smooth.channels[0]};
 }
 
-/// Half-width of a patch, which has 15 x 15 values: at the finest level about 5 degrees in pictures
-/// of 1280 x 640.
+/// Half-width of a patch, which has 15 x 15 values: at the finest level about 5 degrees in
+/// pictures of 1280 x 640.
 constexpr int patch_radius = 7;
 constexpr int patch_side = 2 * patch_radius + 1;
 /// Smallest standard deviation of a patch, in grey levels: weaker ones are dominated by 8-bit

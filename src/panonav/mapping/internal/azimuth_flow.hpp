@@ -5,9 +5,10 @@
 namespace panonav {
 
 /// The shift of directions from one view to the next, over azimuth phi of the later view:
-///   g(phi) = turn + a1 cos phi + b1 sin phi + a2 cos 2 phi + b2 sin 2 phi,
-/// so that a thing at phi in the later view was at phi + g(phi) before. The first harmonic is the
-/// displacement among things all equally far; the second one shows on which side things are nearer.
+///   g(phi) = turn + a1 cos phi + b1 sin phi + a2 cos 2 phi + b2 sin 2
+/// phi, so that a thing at phi in the later view was at phi + g(phi) before. The first harmonic is
+/// the displacement among things all equally far; the second one shows on which side things are
+/// nearer.
 struct AzimuthFlow {
   double g0 = 0.0;
   double a1 = 0.0;
@@ -20,10 +21,10 @@ struct AzimuthFlow {
   /// distance of things (mean of inverse distances).
   [[nodiscard]] double direction_rad() const noexcept;
   [[nodiscard]] double length() const noexcept;
-  /// Heading of the later view minus heading of the earlier one. Things that are nearer on one side
-  /// of the path shift more there, which looks like a rotation. The second harmonic shows the size
-  /// of this error: for inverse distances rho0 + rho1 cos(phi - phi1) and a travel of v it has the
-  /// amplitude v rho1 / 2 and the phase of the nearer side.
+  /// Heading of the later view minus heading of the earlier one. Things that are nearer on one
+  /// side of the path shift more there, which looks like a rotation. The second harmonic shows the
+  /// size of this error: for inverse distances rho0 + rho1 cos(phi - phi1) and a travel of v it has
+  /// the amplitude v rho1 / 2 and the phase of the nearer side.
   [[nodiscard]] double turn_rad() const noexcept;
 };
 

@@ -81,8 +81,8 @@ class ComponentAverage {
   }
 
  private:
-  /// Solves for the changes of the unknowns. `missing(k)`: residual of link k; `weight(k)`: weight
-  /// of its square.
+  /// Solves for the changes of the unknowns. `missing(k)`: residual of link k; `weight(k)`:
+  /// weight of its square.
   template <class Missing, class Weight>
   std::optional<Eigen::VectorXd> solve(const Missing& missing, const Weight& weight) {
     const int unknowns = static_cast<int>(unknown_.size()) - 1;

@@ -20,8 +20,8 @@ constexpr double p_chance = 0.2;
 /// Probability that, of two right links of a view, the longer one joins the more similar views; it
 /// is 0.5 if one link is wrong.
 constexpr double p_discordant = 0.15;
-/// Smallest ratio of the lengths of two links whose similarities are compared; it exceeds the error
-/// of lengths.
+/// Smallest ratio of the lengths of two links whose similarities are compared; it exceeds the
+/// error of lengths.
 constexpr double min_longer_ratio = 1.2;
 /// Probability that adjacent views agree on their relative pose. a in docs/equations.md.
 constexpr double p_adjacent_agree = 0.7;
@@ -84,8 +84,8 @@ class LinksBetween {
                near_distance_in_links * layout_.typical_length();
   }
 
-  /// Returns the log-likelihood ratio of the similarity of a link's views against that of the links
-  /// of the same views, inside their components, that are clearly longer in the layout.
+  /// Returns the log-likelihood ratio of the similarity of a link's views against that of the
+  /// links of the same views, inside their components, that are clearly longer in the layout.
   [[nodiscard]] double concordance(const ComponentLayout::Ends& ends, double layout_length,
                                    double residual) const {
     double longer = 0.0;

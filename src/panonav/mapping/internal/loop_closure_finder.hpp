@@ -39,10 +39,11 @@ class LoopClosureFinder {
 
   /// Returns the closures that have become certain with the last of `nodes`, whose view is the
   /// latest of the memory. While the robot drives along a known path, its first certain closure
-  /// comes with those of the nodes just before; after that, each node adds its own. `poses`: poses
-  /// of the nodes in the map so far, which distinguish places and check the sequence. `scale_m`:
-  /// metric scale of visual displacements. Throws ContractError on different numbers of nodes and
-  /// poses. Cost: two searches of the memory and, where there are candidates, 0.3 ms for each.
+  /// comes with those of the nodes just before; after that, each node adds its own. `poses`:
+  /// poses of the nodes in the map so far, which distinguish places and check the sequence.
+  /// `scale_m`: metric scale of visual displacements. Throws ContractError on different numbers of
+  /// nodes and poses. Cost: two searches of the memory and, where there are candidates, 0.3 ms for
+  /// each.
   [[nodiscard]] std::vector<LoopClosure> find(std::span<const PathNode> nodes,
                                               std::span<const Pose2> poses,
                                               const OdometryView& view, double scale_m);

@@ -35,9 +35,9 @@ struct ArrivalScale {
 
 /// Returns half of the home vector's length and half of the difference between the goal and a
 /// reference next to it (the median of the three shortest home vectors). The difference grows first
-/// with the square of distance and later more slowly, so half of it is reached at no more than 0.7
-/// of the spacing; the home vector is the stricter test. Throws ContractError when the goal is not
-/// in the graph.
+/// with the square of distance and later more slowly, so half of it is reached at no more than
+/// 0.7 of the spacing; the home vector is the stricter test. Throws ContractError when the goal is
+/// not in the graph.
 [[nodiscard]] ArrivalScale learn_arrival_scale(const ViewSource& source,
                                                const NavigationGraph& graph, ViewId goal);
 

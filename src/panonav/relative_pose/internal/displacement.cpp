@@ -17,9 +17,9 @@ namespace {
 /// Frequencies of the tables, 0 included.
 constexpr std::size_t size = max_displaced_frequencies + 1;
 
-/// Relative penalty on the difference of displacements at the first ring; at ring n it is n^2 times
-/// as large. Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office (seed
-/// 901).
+/// Relative penalty on the difference of displacements at the first ring; at ring n it is n^2
+/// times as large. Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office
+/// (seed 901).
 constexpr float far_penalty = 0.01F;
 
 double ring_radius(int ring) {
