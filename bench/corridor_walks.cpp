@@ -84,8 +84,8 @@ Corridor make_corridor() {
   Corridor corridor;
   corridor.place = record(seed, executor);
   corridor.remembered = lab::make_tracking_place(corridor.place, executor);
-  corridor.clean = walks(corridor, lab::clean_condition(), executor);
-  corridor.hard = walks(corridor, lab::hard_condition(), executor);
+  corridor.clean = walks(corridor, lab::make_clean_condition(), executor);
+  corridor.hard = walks(corridor, lab::make_hard_condition(), executor);
   for (const simulation::PlacedView& reference : corridor.place.references) {
     corridor.mapped_from.push_back(reference.pose);
     corridor.map_scans.push_back(scan_at(*corridor.place.renderer, reference.pose));

@@ -25,7 +25,7 @@ struct Corridor {
   simulation::PlaceRecording place;
   std::shared_ptr<const lab::TrackingPlace> remembered;
   std::vector<Walk> clean;         ///< as memorised
-  std::vector<Walk> hard;          ///< light, objects and sensor changed (`hard_condition`)
+  std::vector<Walk> hard;          ///< light, objects and sensor changed (`make_hard_condition`)
   std::vector<Pose2> mapped_from;  ///< where the scans for a rival's map were taken
   std::vector<RangeScan> map_scans;
 };

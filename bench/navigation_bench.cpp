@@ -141,7 +141,7 @@ void look(benchmark::State& state, bool border, bool from_file, bool all = false
         state.SetIterationTime(passed.count());
         bytes_read += static_cast<double>(decision.bytes_read);
       }
-      max_loaded = std::max(max_loaded, navigator.loaded_views());
+      max_loaded = std::max(max_loaded, navigator.loaded_view_count());
     }
   }
   state.counters["kB_read"] =

@@ -270,7 +270,7 @@ int main() {
                                     .queries = queries,
                                     .columns = 256},
                                    executor);
-      std::vector<simulation::PlacedView> disturbed = simulation::retake_queries(
+      std::vector<simulation::PlacedView> disturbed = simulation::recapture_queries(
           recording, lab::place_conditions()[1].sensor, 7919 * (v + 1), executor);
       places.push_back({k, std::move(recording), std::move(disturbed)});
       std::fprintf(stderr, "%s %zu\n", kinds[k].scene, v + 1);

@@ -102,7 +102,7 @@ ReproductionPlan plan_elsewhere(const Experiments& context) {
   }
   plan.push_back({200.0, [=] { elsewhere->reproduce_merging(); }});
   if (!options.floors) return plan;
-  for (const std::string& world : simulation::find_all_worlds(options.data)) {
+  for (const std::string& world : simulation::list_available_worlds(options.data)) {
     for (const double spacing_m : {0.5, 0.3}) {
       plan.push_back({60.0, [=] { elsewhere->reproduce_floor(world, spacing_m); }});
     }

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string>
 
-#include "lab/baselines/turn_products.hpp"
+#include "lab/baselines/rotation_products.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 
@@ -71,9 +71,9 @@ ExpectedImageHoming::ExpectedImageHoming(int columns, int max_positions)
     positions_.push_back({static_cast<float>(xi), static_cast<float>(eta)});
     for (int i = 0; i < columns; ++i) {
       const double azimuth = i / pixels_per_radian;
-      const double seen =
+      const double pixel_position =
           i + pixels_per_radian * (eta * std::cos(azimuth) - xi * std::sin(azimuth));
-      const int pixel = static_cast<int>(std::nearbyint(seen)) % columns;
+      const int pixel = static_cast<int>(std::nearbyint(pixel_position)) % columns;
       table_.push_back(static_cast<std::uint16_t>(pixel < 0 ? pixel + columns : pixel));
     }
   }
@@ -96,22 +96,23 @@ struct ZeroMeanRow {
 };
 
 // Writes the view expected from a position to `row`; returns its energy after subtracting its mean.
-float compute_expected_row(std::span<const float> flat, const std::uint16_t* seen, float* row) {
-  const std::size_t columns = flat.size();
+float compute_expected_row(std::span<const float> current, const std::uint16_t* pixel_indices,
+                           float* row) {
+  const std::size_t columns = current.size();
   // Four independent partial sums, so that no addition waits for another.
   std::array<float, 4> sums{};
   std::array<float, 4> squares{};
   std::size_t i = 0;
   for (; i + 4 <= columns; i += 4) {
     for (std::size_t j = 0; j < 4; ++j) {
-      const float value = flat[seen[i + j]];
+      const float value = current[pixel_indices[i + j]];
       row[i + j] = value;
       sums[j] += value;
       squares[j] += value * value;
     }
   }
   for (; i < columns; ++i) {
-    row[i] = flat[seen[i]];
+    row[i] = current[pixel_indices[i]];
     sums[0] += row[i];
     squares[0] += row[i] * row[i];
   }
@@ -142,12 +143,12 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
   require_row(home);
   require_row(current);
   const auto columns = static_cast<std::size_t>(columns_);
-  const std::size_t stride = turn_products_stride(columns);
+  const std::size_t stride = rotation_products_stride(columns);
   ZeroMeanRow periodic(home);
   for (std::size_t i = 0; i < stride; ++i) periodic.values.push_back(periodic.values[i]);
-  const ZeroMeanRow flat(current);
+  const ZeroMeanRow zero_mean_current(current);
   // Pixel values are of the order of 1, so energies this small are rounding errors.
-  if (!(periodic.energy * flat.energy > 1e-20)) return {};
+  if (!(periodic.energy * zero_mean_current.energy > 1e-20)) return {};
   std::vector<float> expected(positions_per_block * columns);
   std::vector<float> products(positions_per_block * stride);
   HomeVector vector;
@@ -157,14 +158,17 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
     std::array<float, positions_per_block> energies{};
     std::array<float, positions_per_block> largest{};
     for (std::size_t p = 0; p < count; ++p) {
-      energies[p] = compute_expected_row(flat.values, expected_pixel_indices(first + p).data(),
-                                         expected.data() + p * columns);
+      energies[p] =
+          compute_expected_row(zero_mean_current.values, expected_pixel_indices(first + p).data(),
+                               expected.data() + p * columns);
     }
-    turn_products(std::span(expected).first(count * columns), columns, periodic.values,
-                  std::span(products).first(count * stride), std::span(largest).first(count));
+    compute_rotation_products(std::span(expected).first(count * columns), columns, periodic.values,
+                              std::span(products).first(count * stride),
+                              std::span(largest).first(count));
     if (first == 0) {
       vector.correlation = std::clamp(
-          static_cast<double>(largest[0]) / std::sqrt(periodic.energy * flat.energy), -1.0, 1.0);
+          static_cast<double>(largest[0]) / std::sqrt(periodic.energy * zero_mean_current.energy),
+          -1.0, 1.0);
     }
     for (std::size_t p = 0; p < count; ++p) {
       const auto difference =

@@ -311,7 +311,7 @@ double difference(const Panorama& a, const Panorama& b) {
 
 }  // namespace
 
-std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
+std::unique_ptr<RivalRecogniser> make_fourier_signature_recogniser(int components) {
   return make_recogniser<FourierSignature>(
       {"Fourier signature",
        [=](const RivalView& view) { return compute_signature(view.panorama, components); },
@@ -320,7 +320,7 @@ std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
 }
 
 // Compares one grey histogram of the whole view; Ulrich and Nourbakhsh use colour histograms.
-std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
+std::unique_ptr<RivalRecogniser> make_grey_histogram_recogniser(int bins) {
   require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
   return make_recogniser<PixelValues>(
       {"grey histogram", [=](const RivalView& view) { return grey_histogram(view.panorama, bins); },
@@ -330,7 +330,7 @@ std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
 
 // Compares colour histograms, which need no phases and no unwarping and do not depend on the
 // heading.
-std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channel) {
+std::unique_ptr<RivalRecogniser> make_colour_histogram_recogniser(int bins_per_channel) {
   require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
           bins_per_channel, "2 .. 32");
   return make_recogniser<PixelValues>(
@@ -339,11 +339,11 @@ std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channe
        [](const PixelValues& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
 }
 
-std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions) {
+std::unique_ptr<RivalRecogniser> make_eigenimage_recogniser(int dimensions) {
   return std::make_unique<EigenimageRecogniser>(dimensions);
 }
 
-std::unique_ptr<RivalRecogniser> zero_phase_recogniser() {
+std::unique_ptr<RivalRecogniser> make_zero_phase_recogniser() {
   return make_recogniser<PixelValues>(
       {"zero-phase representation",
        [](const RivalView& view) {
@@ -353,7 +353,7 @@ std::unique_ptr<RivalRecogniser> zero_phase_recogniser() {
        l1, [](const PixelValues& pixels) { return static_cast<double>(pixels.size()); }});
 }
 
-std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
+std::unique_ptr<RivalRecogniser> make_pixels_over_all_rotations_recogniser() {
   const auto spectra = std::make_shared<RotationSpectra>();
   return make_recogniser<RotationSpectra::Spectrum>(
       {"pixels over all turns",
@@ -362,7 +362,7 @@ std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
        [](const auto& spectrum) { return static_cast<double>(spectrum.pixels); }});
 }
 
-std::unique_ptr<RivalRecogniser> patch_normalised_recogniser() {
+std::unique_ptr<RivalRecogniser> make_patch_normalised_recogniser() {
   return make_recogniser<Panorama>(
       {"patch-normalised pixels",
        [](const RivalView& view) { return normalise_patches(view.panorama); }, difference,

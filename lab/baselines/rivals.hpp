@@ -32,18 +32,19 @@ class RivalRecogniser {
   [[nodiscard]] virtual double bytes_per_view() const = 0;
 };
 
-[[nodiscard]] std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components = 15);
-[[nodiscard]] std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins = 64);
+[[nodiscard]] std::unique_ptr<RivalRecogniser> make_fourier_signature_recogniser(
+    int components = 15);
+[[nodiscard]] std::unique_ptr<RivalRecogniser> make_grey_histogram_recogniser(int bins = 64);
 /// Compares one histogram of RGB colours of the whole view, with bins_per_channel^3 bins.
 /// `memorise` throws ContractError on a view without colour.
-[[nodiscard]] std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(
+[[nodiscard]] std::unique_ptr<RivalRecogniser> make_colour_histogram_recogniser(
     int bins_per_channel = 8);
-[[nodiscard]] std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions = 15);
-[[nodiscard]] std::unique_ptr<RivalRecogniser> zero_phase_recogniser();
-[[nodiscard]] std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser();
+[[nodiscard]] std::unique_ptr<RivalRecogniser> make_eigenimage_recogniser(int dimensions = 15);
+[[nodiscard]] std::unique_ptr<RivalRecogniser> make_zero_phase_recogniser();
+[[nodiscard]] std::unique_ptr<RivalRecogniser> make_pixels_over_all_rotations_recogniser();
 /// Compares small views by the sum of absolute differences, minimised over all rotations; their
 /// pixels are normalised by mean and deviation of the patch around them, as SeqSLAM does [Milford
 /// and Wyeth 2012].
-[[nodiscard]] std::unique_ptr<RivalRecogniser> patch_normalised_recogniser();
+[[nodiscard]] std::unique_ptr<RivalRecogniser> make_patch_normalised_recogniser();
 
 }  // namespace panonav::lab

@@ -75,7 +75,7 @@ RememberedPlace rerecord_memory(simulation::PlaceRecording today, std::uint64_t 
   for (const auto& point : today.free_space->grid(spacing_m)) {
     grid.push_back({point.position.x_m, point.position.y_m, 0.0});
   }
-  today.references = simulation::take_views(today, today.rendering, grid, seed, {}, executor);
+  today.references = simulation::capture_views(today, today.rendering, grid, seed, {}, executor);
   VisualMemory memory = make_memory_of_references(today, executor);
   const Features features = extract_all_features(today, memory);
   return {std::move(memory), features};
@@ -107,9 +107,9 @@ class DrivingRobot {
         goal = find_least_recent(grid, at).value_or(goal);
         last_visit_day_[grid_square(goal)] = day_;
       }
-      const auto way = space.shortest_path(at, goal);
-      if (!way) continue;
-      for (const Point2 next : *way) {
+      const auto path_to_goal = space.shortest_path(at, goal);
+      if (!path_to_goal) continue;
+      for (const Point2 next : *path_to_goal) {
         const double heading_rad = std::atan2(next.y_m - at.y_m, next.x_m - at.x_m);
         double leg_m = distance(at, next);
         while (leg_m >= distance_to_picture_m && static_cast<int>(path.size()) < pictures) {
@@ -181,11 +181,11 @@ DayResult localise_all(const RememberedPlace& remembered,
   return result;
 }
 
-MemoryUpdate::AnsweredView make_answered_view(const Pose2& odometry,
-                                              const PackedSignature& signature,
-                                              const Place& answer) {
-  MemoryUpdate::AnsweredView view{odometry, signature, answer.known_probability, std::nullopt,
-                                  std::nullopt};
+MemoryUpdate::LocalisedView make_localised_view(const Pose2& odometry,
+                                                const PackedSignature& signature,
+                                                const Place& answer) {
+  MemoryUpdate::LocalisedView view{odometry, signature, answer.known_probability, std::nullopt,
+                                   std::nullopt};
   if (answer.position && answer.heading_rad) {
     const Point2 at = answer.position->position();
     view.pose = Pose2{at.x_m, at.y_m, *answer.heading_rad};
@@ -219,7 +219,7 @@ class LearningRobot {
     for (std::size_t i = 0; i < seen.size(); ++i) {
       if (i > 0) odometry.advance(inverse(seen[i - 1].pose) * seen[i].pose);
       signatures.push_back(compute_packed_signature(seen[i].panorama, memory_));
-      update.add(make_answered_view(odometry.pose(), signatures.back(), answers[i]));
+      update.add(make_localised_view(odometry.pose(), signatures.back(), answers[i]));
     }
     MemoryUpdate::Changes changes = update.finish();
     use_ = std::move(changes.use);
@@ -243,7 +243,7 @@ class LearningRobot {
  private:
   VisualMemory memory_;
   std::unique_ptr<RememberedPlace> remembered_;
-  MemoryUpdate::Use use_;
+  MemoryUpdate::UseStatistics use_;
   std::vector<double> errors_m_;
   std::size_t dropped_ = 0;
 };
@@ -289,12 +289,12 @@ class Days {
 
   void run_days() {
     Random light(options_.seed, 91);
-    const int evaluated_every = std::max(1, options_.days / 6);
+    const int evaluation_interval_days = std::max(1, options_.days / 6);
     for (int day = 1; day <= options_.days; ++day) {
       changing_.simulate_day(moved_fraction_per_day);
       const simulation::PlaceRecording today = make_place_today(light.uniform(0.6, 1.2));
       const std::uint64_t seed = options_.seed * 1000003U + static_cast<std::uint64_t>(day) * 1000U;
-      if (day == 1 || day % evaluated_every == 0 || day == options_.days)
+      if (day == 1 || day % evaluation_interval_days == 0 || day == options_.days)
         evaluate_day(today, day, seed);
       if (day == options_.days) break;
       for (DailyRobot& robot : robots_) {
@@ -302,7 +302,7 @@ class Days {
         const auto path =
             robot.driving.simulate_day(*today.free_space, options_.day_pictures, driving);
         robot.learning.learn(
-            simulation::take_views(today, place_.rendering, path, seed, {}, executor()), seed,
+            simulation::capture_views(today, place_.rendering, path, seed, {}, executor()), seed,
             executor());
         robot.max_views = std::max(robot.max_views, robot.learning.views());
       }
@@ -316,16 +316,16 @@ class Days {
                              std::to_string(changing_.movable()) + " objects moved: ";
     Reproduction& result = elsewhere_.result;
     add_rate(result, id + ".without",
-             what + "single images localised within one spacing, without learning", without_.right,
-             query_count());
+             what + "single images localised within one spacing, without learning",
+             unchanged_result_.right, query_count());
     add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again on that day",
-             rerecorded_.right, query_count());
+             rerecorded_result_.right, query_count());
     add_rate(result, id + ".wrong_without",
-             what + "answers farther off than one spacing, without learning", without_.wrong,
-             query_count());
-    if (!without_.errors_m.empty()) {
+             what + "answers farther off than one spacing, without learning",
+             unchanged_result_.wrong, query_count());
+    if (!unchanged_result_.errors_m.empty()) {
       add_median(result, id + ".error_without", what + "error of positions, without learning", "m",
-                 without_.errors_m);
+                 unchanged_result_.errors_m);
     }
     for (const DailyRobot& robot : robots_) report(robot, id + robot.id, what + robot.what + ", ");
     add_plot(result, "days_" + name_ + ".svg",
@@ -333,7 +333,7 @@ class Days {
                  " that are localised within one spacing, while objects move and light changes.",
              viewer::LinePlot{.x_label = "day",
                               .y_label = "localised",
-                              .series = {robots_[0].series, robots_[1].series, without_learning_}});
+                              .series = {robots_[0].series, robots_[1].series, unchanged_series_}});
   }
 
  private:
@@ -361,15 +361,15 @@ class Days {
     for (std::size_t q = 0; q < query_count(); ++q)
       poses.push_back(today.free_space->random_pose(random));
     const auto queries =
-        simulation::take_views(today, place_.rendering, poses, seed + 500, {}, executor());
-    without_ = localise_all(unchanged_, queries, executor());
-    add_point(without_learning_, day, success_rate(without_.right, query_count()));
+        simulation::capture_views(today, place_.rendering, poses, seed + 500, {}, executor());
+    unchanged_result_ = localise_all(unchanged_, queries, executor());
+    add_point(unchanged_series_, day, success_rate(unchanged_result_.right, query_count()));
     for (DailyRobot& robot : robots_) {
       robot.answers = localise_all(robot.learning.remembered(), queries, executor());
       add_point(robot.series, day, success_rate(robot.answers.right, query_count()));
     }
     if (day == options_.days) {
-      rerecorded_ =
+      rerecorded_result_ =
           localise_all(rerecord_memory(today, seed + 50'000, executor()), queries, executor());
     }
   }
@@ -405,9 +405,9 @@ class Days {
   Features features_;
   RememberedPlace unchanged_;
   std::vector<DailyRobot> robots_;
-  viewer::Series without_learning_{.label = "without learning"};
-  DayResult without_;
-  DayResult rerecorded_;
+  viewer::Series unchanged_series_{.label = "without learning"};
+  DayResult unchanged_result_;
+  DayResult rerecorded_result_;
 };
 
 }  // namespace

@@ -50,7 +50,8 @@ double direction_error_rad(double direction_rad, const Pose2& from, const Pose2&
   return std::abs(angle_difference(direction_rad + from.heading_rad, truth));
 }
 
-HomeAnswer find_home(const simulation::PlacedView& goal, const simulation::PlacedView& current) {
+HomeAnswer compute_home_answer(const simulation::PlacedView& goal,
+                               const simulation::PlacedView& current) {
   const HomingResult home = compute_home(goal.panorama, current.panorama);
   HomeAnswer answer{std::nullopt, home.probability};
   if (home.direction_rad) {
@@ -88,23 +89,24 @@ std::vector<const simulation::PlacedView*> collect_views(const simulation::Place
 /// home.
 std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t level_home) {
   std::size_t others = 0;
-  std::size_t away = 0;
-  std::size_t alike = 0;
-  std::size_t wrongly = 0;
+  std::size_t pointing_away = 0;
+  std::size_t more_similar = 0;
+  std::size_t falsely_arrived = 0;
   for (const HomingRun& run : runs) {
     if (run.is_success(arrival_radius_m)) continue;
     ++others;
     const double first_rad = run.vectors.front().direction_rad();
-    away += direction_error_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
-    alike += run.end_difference < run.start_difference ? 1 : 0;
-    wrongly += run.end == HomingRunEnd::arrived ? 1 : 0;
+    pointing_away +=
+        direction_error_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
+    more_similar += run.end_difference < run.start_difference ? 1 : 0;
+    falsely_arrived += run.end == HomingRunEnd::arrived ? 1 : 0;
   }
   return "a level robot comes home in " + std::to_string(level_home) + " of these " +
          std::to_string(runs.size()) + " runs; of the " + std::to_string(others) +
-         " that do not come home, " + std::to_string(away) +
-         " begin with a vector that points away from home, " + std::to_string(alike) +
+         " that do not come home, " + std::to_string(pointing_away) +
+         " begin with a vector that points away from home, " + std::to_string(more_similar) +
          " end where the view is more like that of home than at the start, and " +
-         std::to_string(wrongly) + " say that they arrived";
+         std::to_string(falsely_arrived) + " say that they arrived";
 }
 
 /// Adds the rate of answers that have a direction. `Answer` is HomeAnswer or HomingResult.
@@ -142,7 +144,7 @@ class HomeVectors {
     const auto pairs = sample_pairs(range);
     const auto answers = simulation::make_each(
         elsewhere_.executor, pairs.size(),
-        [&](std::size_t i) { return find_home(*pairs[i].goal, *pairs[i].current); });
+        [&](std::size_t i) { return compute_home_answer(*pairs[i].goal, *pairs[i].current); });
     std::size_t off = 0;
     std::map<std::string, std::size_t> off_in;
     for (std::size_t i = 0; i < answers.size(); ++i) {
@@ -237,8 +239,8 @@ class HomeVectors {
       for (std::size_t found = 0; found < pair_count_ && tries < 200 * pair_count_; ++tries) {
         const simulation::PlacedView* goal = pick_random_view(views);
         const simulation::PlacedView* current = pick_random_view(views);
-        const double far_m = distance(goal->pose.position(), current->pose.position());
-        if (far_m < range.low_m || far_m >= range.high_m) continue;
+        const double distance_m = distance(goal->pose.position(), current->pose.position());
+        if (distance_m < range.low_m || distance_m >= range.high_m) continue;
         // Skip views behind a wall: they show another place.
         if (!place.free_space->is_free_between(goal->pose.position(), current->pose.position())) {
           continue;

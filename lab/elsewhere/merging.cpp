@@ -28,11 +28,11 @@ namespace panonav::lab {
 namespace {
 
 constexpr double walk_spacing_m = 0.1;
-constexpr double same_place_radius_m = 0.5;     // views this near each other show one place
-constexpr double min_shared_fraction = 0.13;    // overlap of walks that share places
-constexpr double max_unshared_fraction = 0.02;  // overlap of walks that share almost no place
-constexpr double wrong_rms_m = 2.0;             // above the drift of both walks
-constexpr std::size_t first_views = 100;        // from which the full scale is learnt
+constexpr double same_place_radius_m = 0.5;    // views this near each other show one place
+constexpr double min_shared_overlap = 0.13;    // overlap of walks that share places
+constexpr double max_disjoint_overlap = 0.02;  // overlap of walks that share almost no place
+constexpr double wrong_rms_m = 2.0;            // above the drift of both walks
+constexpr std::size_t first_views = 100;       // from which the full scale is learnt
 
 /// A random walk with its memory and the map that the robot built from noisy odometry, without
 /// known positions.
@@ -40,12 +40,12 @@ struct Session {
   std::filesystem::path memory;
   std::map<std::string, Point2> truth;  ///< by view name
   [[nodiscard]] double overlap_fraction(const Session& other) const {
-    const auto beside = std::ranges::count_if(truth, [&](const auto& view) {
+    const auto shared_views = std::ranges::count_if(truth, [&](const auto& view) {
       return std::ranges::any_of(other.truth, [&](const auto& one) {
         return distance(one.second, view.second) <= same_place_radius_m;
       });
     });
-    return static_cast<double>(beside) / static_cast<double>(truth.size());
+    return static_cast<double>(shared_views) / static_cast<double>(truth.size());
   }
 };
 
@@ -60,7 +60,8 @@ Session record_walk(const simulation::PlaceRecording& place, const std::string& 
   Session session{folder / (name + ".panonav"), {}};
   std::filesystem::remove(session.memory);
   auto seen = simulation::make_each(executor, planned.size(), [&](std::size_t i) {
-    Observation observation(simulation::take_view(place, planned[i].pose, seed * 1'000'003U + i));
+    Observation observation(
+        simulation::capture_view(place, planned[i].pose, seed * 1'000'003U + i));
     observation.name = name + " " + std::to_string(i);
     observation.odometry = planned[i].odometry;
     return observation;
@@ -90,7 +91,7 @@ std::optional<MergedMapError> try_merge(const Session& first, const Session& sec
                                         const std::filesystem::path& folder) {
   const std::filesystem::path both = folder / "both.panonav";
   std::filesystem::remove(both);
-  std::optional<MergedMapError> joined;
+  std::optional<MergedMapError> error;
   const MergedMemory merged = merge_memories(first.memory, second.memory, both);
   if (merged.alignment) {
     const MemoryFile file = MemoryFile::open(both, Access::read_only);
@@ -106,10 +107,10 @@ std::optional<MergedMapError> try_merge(const Session& first, const Session& sec
       const auto known = first.truth.find(name);
       truth.push_back(known != first.truth.end() ? known->second : second.truth.at(name));
     }
-    joined = {simulation::shape_error(estimate, truth), align(estimate, truth).rms_m};
+    error = {simulation::shape_error(estimate, truth), align(estimate, truth).rms_m};
   }
   std::filesystem::remove(both);
-  return joined;
+  return error;
 }
 
 /// Number of pairs of walks, and how many of them were merged into one map.
@@ -129,14 +130,14 @@ void report_place(const std::string& name, const std::vector<Session>& walks,
   for (std::size_t i = 0; i < walks.size(); ++i) {
     const Session& first = walks[i];
     const Session& second = walks[(i + 1) % walks.size()];
-    const double share = std::max(first.overlap_fraction(second), second.overlap_fraction(first));
+    const double overlap = std::max(first.overlap_fraction(second), second.overlap_fraction(first));
     const auto found = try_merge(first, second, folder);
-    PairCount& alike = share >= min_shared_fraction    ? sharing
-                       : share < max_unshared_fraction ? apart
-                                                       : between;
-    ++alike.all;
+    PairCount& group = overlap >= min_shared_overlap    ? sharing
+                       : overlap < max_disjoint_overlap ? apart
+                                                        : between;
+    ++group.all;
     if (!found) continue;
-    ++alike.joined;
+    ++group.joined;
     wrong += found->rms_m > wrong_rms_m ? 1 : 0;
     worst_shape = std::max(worst_shape, found->shape_difference);
   }

@@ -75,7 +75,7 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
     const auto measured = run_place_experiment(place, conditions, elsewhere.executor);
     for (std::size_t c = 0; c < conditions.size(); ++c) {
       known[c].add(name, measured[c].known, query_count);
-      near[c].add(name, measured[c].nearest_or_next, query_count);
+      near[c].add(name, measured[c].nearest_or_neighbour, query_count);
     }
     inside.add(name, measured[0].inside, query_count);
   }
@@ -100,7 +100,8 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
 
 std::vector<std::string> ElsewhereExperiments::list_ground_names() const {
   std::vector<std::string> names = options.built_in;
-  for (const std::string& world : simulation::find_all_worlds(options.data)) names.push_back(world);
+  for (const std::string& world : simulation::list_available_worlds(options.data))
+    names.push_back(world);
   return names;
 }
 
@@ -157,7 +158,7 @@ void ElsewhereExperiments::reproduce_tracked_poses() {
     const simulation::PlaceRecording& place = ground.variants.front();
     const auto remembered = make_tracking_place(place, executor);
     const auto walks = record_walks(
-        place, *remembered, clean_condition(),
+        place, *remembered, make_clean_condition(),
         {.variants = 1, .runs_each = std::max(1, options.runs / 2), .seed = options.seed},
         executor);
     const auto squares = simulation::make_each(executor, walks.size(), [&](std::size_t i) {

@@ -246,9 +246,9 @@ void ElsewhereExperiments::reproduce_leave_one_out(
   std::string others =
       pictures.add_other("ours without local features", without_features,
                          2.0 * static_cast<double>(recogniser.encoder().header().shape.size()));
-  rivals.insert(rivals.begin(), patch_normalised_recogniser());
-  rivals.insert(rivals.begin(), pixels_over_all_turns_recogniser());
-  rivals.insert(rivals.begin(), fourier_signature_recogniser());
+  rivals.insert(rivals.begin(), make_patch_normalised_recogniser());
+  rivals.insert(rivals.begin(), make_pixels_over_all_rotations_recogniser());
+  rivals.insert(rivals.begin(), make_fourier_signature_recogniser());
   for (const auto& rival : rivals) {
     const auto found = pictures.localise_all(*rival);
     others += ", " + pictures.add_other(rival->name(), found, rival->bytes_per_view());

@@ -199,7 +199,7 @@ struct MirrorImages {
   Unwarper unwarper;
 };
 
-MirrorImages take_mirror_images(const MappingExperiments& f11) {
+MirrorImages capture_mirror_images(const MappingExperiments& f11) {
   const simulation::PlaceRecording place = f11.make_variant("loop", 0);
   Camera camera;
   camera.model = HyperboloidalModel{};
@@ -210,8 +210,8 @@ MirrorImages take_mirror_images(const MappingExperiments& f11) {
   std::vector<Image> images;
   for (const Pose2& pose :
        drive(place, {}, 0.1, static_cast<std::size_t>(std::min(60, f11.options.views)))) {
-    images.push_back(simulation::take_picture(*place.renderer, pose, camera, {}, {}, images.size(),
-                                              f11.executor));
+    images.push_back(simulation::capture_image(*place.renderer, pose, camera, {}, {}, images.size(),
+                                               f11.executor));
   }
   return {std::move(images), Unwarper(camera, {80, 512})};
 }
@@ -251,9 +251,9 @@ struct WorldErrors {
     const VisualOdometryOptions known{.camera_height_m = place.scene.camera_height_m};
     const auto open_map = simulation::map_recording(recording, {.mapping = {.close_loops = false}});
     const auto closed_map = simulation::map_recording(recording, {});
-    const auto ground_open_map = simulation::map_recording(
+    const auto known_height_open_map = simulation::map_recording(
         recording, {.mapping = {.close_loops = false}, .odometry = known});
-    const auto ground_map = simulation::map_recording(recording, {.odometry = known});
+    const auto known_height_map = simulation::map_recording(recording, {.odometry = known});
     const auto wheels_map = simulation::map_recording(recording, {.wheels = true});
     const auto error_of = [](const simulation::MappedRecording& mapped, bool scale) {
       return rms_m(mapped.estimate, mapped.truth, scale);
@@ -261,10 +261,10 @@ struct WorldErrors {
     wheels.push_back(rms_m(positions_of(recording.wheels), open_map.truth, false));
     open.push_back(error_of(open_map, true));
     closed.push_back(error_of(closed_map, true));
-    known_height_open.push_back(error_of(ground_open_map, false));
-    known_height.push_back(error_of(ground_map, false));
+    known_height_open.push_back(error_of(known_height_open_map, false));
+    known_height.push_back(error_of(known_height_map, false));
     with_wheels.push_back(error_of(wheels_map, false));
-    for (const auto* mapped : {&closed_map, &ground_map, &wheels_map}) {
+    for (const auto* mapped : {&closed_map, &known_height_map, &wheels_map}) {
       right += mapped->right_closures;
       wrong += mapped->wrong_closures;
     }
@@ -282,7 +282,7 @@ struct WorldErrors {
     draw("ground truth", viewer::PlotColour::black, truth);
     draw("wheels", viewer::PlotColour::vermilion, std::move(wheel_line));
     draw("views alone", viewer::PlotColour::blue,
-         simulation::align_to(ground_map.estimate, ground_map.truth));
+         simulation::align_to(known_height_map.estimate, known_height_map.truth));
     draw("views, steps from wheels", viewer::PlotColour::green,
          simulation::align_to(wheels_map.estimate, wheels_map.truth));
   }
@@ -298,7 +298,7 @@ struct WorldErrors {
 }  // namespace
 
 void MappingExperiments::measure_step_time() const {
-  const MirrorImages seen = take_mirror_images(*this);
+  const MirrorImages seen = capture_mirror_images(*this);
   const StepTimes default_times = measure_step_times(seen, components);
   add_row(result, "f11.time.step",
           "time of a step from a mirror image of 640 x 480 to a pose, median",

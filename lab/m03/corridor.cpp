@@ -66,10 +66,10 @@ bool is_distinct_object_visible(const simulation::PlaceRecording& place,
     std::vector<bool> seen(things.size());
     for (int elevation = -25; elevation <= 35; elevation += 10) {
       const Direction3 ray = Direction3::from_angles(radians(azimuth), radians(elevation));
-      const double way = place.renderer->distance_along(eye, ray);
-      if (!std::isfinite(way)) continue;
-      const simulation::Vector3 hit{eye.x_m + way * ray.x, eye.y_m + way * ray.y,
-                                    eye.z_m + way * ray.z};
+      const double distance_m = place.renderer->distance_along(eye, ray);
+      if (!std::isfinite(distance_m)) continue;
+      const simulation::Vector3 hit{eye.x_m + distance_m * ray.x, eye.y_m + distance_m * ray.y,
+                                    eye.z_m + distance_m * ray.z};
       for (std::size_t t = 0; t < things.size(); ++t) {
         if (things[t].contains(hit)) seen[t] = true;
       }
@@ -95,12 +95,12 @@ std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& rando
                     p.y_m + (middle.y_m > p.y_m ? lateral_offset_m : -lateral_offset_m)});
   }
   if (backwards) std::ranges::reverse(ring);
-  std::vector<Pose2> way;
+  std::vector<Pose2> corners;
   for (std::size_t i = 0; i <= 2 * ring.size(); ++i) {
     const Point2 p = ring[i % ring.size()];
-    way.push_back({p.x_m, p.y_m, 0.0});
+    corners.push_back({p.x_m, p.y_m, 0.0});
   }
-  const auto dense = simulation::resample(way, 0.01);
+  const auto dense = simulation::resample(corners, 0.01);
   const auto lap = dense.size() / 2;
   const auto start = static_cast<std::size_t>(random.index(lap));
   std::vector<Pose2> poses;
@@ -133,22 +133,22 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
     const std::uint64_t seed = place.seed;
     const auto remembered = make_tracking_place(place, executor);
     const auto things = find_distinct_objects(place.scene);
-    std::vector<std::vector<Pose2>> ways(static_cast<std::size_t>(runs_each));
-    std::vector<std::optional<std::size_t>> first(ways.size());
-    executor.for_chunks(ways.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
+    std::vector<std::vector<Pose2>> paths(static_cast<std::size_t>(runs_each));
+    std::vector<std::optional<std::size_t>> first(paths.size());
+    executor.for_each_chunk(paths.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
       Random random(seed * 1000003U + 70U, r);
-      ways[r] = plan_ring_drive(place.scene, random);
-      for (std::size_t i = 0; i < ways[r].size(); ++i) {
-        if (!is_distinct_object_visible(place, things, ways[r][i].position())) continue;
+      paths[r] = plan_ring_drive(place.scene, random);
+      for (std::size_t i = 0; i < paths[r].size(); ++i) {
+        if (!is_distinct_object_visible(place, things, paths[r][i].position())) continue;
         first[r] = i;
-        ways[r].resize(std::min(ways[r].size(), i + max_images_after));
+        paths[r].resize(std::min(paths[r].size(), i + max_images_after));
         break;
       }
     });
     corridors.first_distinct.insert(corridors.first_distinct.end(), first.begin(), first.end());
     corridors.sets.push_back(make_run_set(
         remembered,
-        record_runs(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
+        record_runs(paths, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
         executor));
     if (s == 0) {
       viewer::MapLayer layer{.label = "stands only once", .colour = viewer::PlotColour::green};
@@ -171,8 +171,8 @@ struct CorridorMeasures {
   std::size_t distinct_runs = 0;  // runs that reach such a view
   std::size_t right = 0;
   std::size_t right_to_end = 0;
-  std::vector<double> ways;        // images before that view, per such run
-  std::vector<double> hypotheses;  // number of modes, per image before it
+  std::vector<double> images_before;  // images before that view, per such run
+  std::vector<double> hypotheses;     // number of modes, per image before it
 
   void add(const TrackedRun& run, std::optional<std::size_t> first) {
     std::optional<std::size_t> found;
@@ -191,7 +191,7 @@ struct CorridorMeasures {
     }
     if (!first) return;  // no distinct object came into view
     ++distinct_runs;
-    ways.push_back(static_cast<double>(*first));
+    images_before.push_back(static_cast<double>(*first));
     right += found && *found < 3 ? 1 : 0;
     right_to_end += found && *found < 3 && !lost_again ? 1 : 0;
   }
@@ -232,7 +232,8 @@ void TrackingExperiments::reproduce_corridor() {
              "corridor: the same, and at all images from the fourth to the tenth",
              measures.right_to_end, measures.distinct_runs);
     add_median(result, "m03.corridor.images_before",
-               "corridor: images before the first distinct place", "images", measures.ways);
+               "corridor: images before the first distinct place", "images",
+               measures.images_before);
   }
   const RunSet& shown = corridors.sets.front();
   const std::size_t last = shown.runs.front().steps.size() - 1;

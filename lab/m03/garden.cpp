@@ -39,11 +39,11 @@ GardenRuns record_gardens(const TrackingExperiments& m03) {
         m03.record_variant("garden", s, garden_spacing_m, options.columns / 2);
     const std::uint64_t seed = place.seed;
     const auto remembered = make_tracking_place(place, executor);
-    std::vector<std::vector<Pose2>> ways;
+    std::vector<std::vector<Pose2>> paths;
     for (int r = 0; r < runs_each; ++r) {
       Random random(seed * 1000003U + 80U, static_cast<std::uint64_t>(r));
       const Pose2 start = place.free_space->random_pose(random);
-      ways.push_back(simulation::random_walk(
+      paths.push_back(simulation::random_walk(
           start, [&](Point2 p) { return place.free_space->is_free(p); },
           {.poses = images, .step_m = garden_spacing_m}, random));
     }
@@ -52,7 +52,7 @@ GardenRuns record_gardens(const TrackingExperiments& m03) {
       const simulation::Scene scene =
           simulation::make_scene("garden", {.seed = seed, .light = lights[l]});
       const simulation::Renderer renderer(scene, simulation::RendererOptions{}, executor);
-      runs[l] = record_runs(ways, place, renderer, *remembered, {}, seed * 100003U + 20'000U * l,
+      runs[l] = record_runs(paths, place, renderer, *remembered, {}, seed * 100003U + 20'000U * l,
                             executor);
     }
     std::vector<TrackingRun> under_clouds = runs[0];

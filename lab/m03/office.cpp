@@ -229,14 +229,14 @@ void TrackingExperiments::record_office(int number) {
     return make_run_set(remembered, record_walks(place, *remembered, condition, walks, executor),
                         executor);
   };
-  OfficeRuns office{
-      viewer::scene_layers(place.scene),
-      walk(clean_condition(), {.variants = 1,
-                               .runs_each = options.variants * options.runs,
-                               .constant_heading = true,
-                               .seed = 1}),
-      walk(hard_condition(), {.variants = options.variants, .runs_each = options.runs, .seed = 2}),
-      {}};
+  OfficeRuns office{viewer::scene_layers(place.scene),
+                    walk(make_clean_condition(), {.variants = 1,
+                                                  .runs_each = options.variants * options.runs,
+                                                  .constant_heading = true,
+                                                  .seed = 1}),
+                    walk(make_hard_condition(),
+                         {.variants = options.variants, .runs_each = options.runs, .seed = 2}),
+                    {}};
   // Carry the robot from each run to another run in the same variant, so that only the position
   // changes.
   std::vector<TrackingRun> kidnapped_runs;

@@ -45,13 +45,13 @@ std::vector<Pose2> plan_excursion(const simulation::FreeSpace& space, double bor
   const Point2 from = sample_free_position(space, low, border_m - 0.5, random);
   const Point2 outside_position = sample_free_position(space, border_m + 2.0, high, random);
   const Point2 to = sample_free_position(space, low, border_m - 0.5, random);
-  std::vector<Pose2> way;
+  std::vector<Pose2> corners;
   for (const auto& [a, b] : {std::pair{from, outside_position}, {outside_position, to}}) {
     for (const Point2 p : space.shortest_path(a, b).value_or(std::vector<Point2>{a, b})) {
-      way.push_back({p.x_m, p.y_m, 0.0});
+      corners.push_back({p.x_m, p.y_m, 0.0});
     }
   }
-  auto poses = simulation::resample(way, m03_spacing_m);
+  auto poses = simulation::resample(corners, m03_spacing_m);
   simulation::face_path(poses);
   for (Pose2& pose : poses) pose.heading_rad = wrap_angle(pose.heading_rad);
   return poses;
@@ -70,24 +70,25 @@ OutsideRuns record_excursions(const TrackingExperiments& m03, const std::string&
     const double border_m = 0.5 * (place.scene.floor_low.x_m + place.scene.floor_high.x_m);
     const auto remembered =
         make_tracking_place(place, executor, [&](Point2 p) { return p.x_m < border_m; });
-    std::vector<std::vector<Pose2>> ways;
+    std::vector<std::vector<Pose2>> paths;
     for (int r = 0; r < runs_each; ++r) {
       Random random(seed * 1000003U + 120U, static_cast<std::uint64_t>(r));
-      ways.push_back(plan_excursion(*place.free_space, border_m, random));
+      paths.push_back(plan_excursion(*place.free_space, border_m, random));
     }
     const auto references = remembered->reference_positions();
-    for (const auto& way : ways) {
+    for (const auto& path : paths) {
       std::vector<double> reference_distances_m;
-      for (const Pose2& pose : way) {
+      for (const Pose2& pose : path) {
         double nearest = std::numeric_limits<double>::infinity();
         for (const Point2 p : references) nearest = std::min(nearest, distance(p, pose.position()));
         reference_distances_m.push_back(nearest);
       }
       outside.reference_distances_m.push_back(std::move(reference_distances_m));
     }
-    RunSet set{remembered,
-               record_runs(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
-               {}};
+    RunSet set{
+        remembered,
+        record_runs(paths, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
+        {}};
     // Images outside the memorised area are no queries for single-image localisation.
     std::vector<TrackingRun> inside = set.runs;
     for (std::size_t r = 0; r < inside.size(); ++r) {
@@ -130,27 +131,27 @@ void add_run(ReportedStates& reports, const TrackedRun& run,
   bool said_lost = false;
   bool said_found = false;
   for (const TrackedImage& image : run) {
-    const double way = reference_distances_m[image.step];
+    const double reference_distance_m = reference_distances_m[image.step];
     const bool is_lost = image.state == LocalisationState::lost;
     const bool is_localised = image.state == LocalisationState::localised;
     if (image.step >= uncounted_images) {
-      const auto bin = std::min(bins - 1, static_cast<std::size_t>(way / bin_m));
+      const auto bin = std::min(bins - 1, static_cast<std::size_t>(reference_distance_m / bin_m));
       ++reports.queries[bin];
       reports.lost[bin] += is_lost ? 1 : 0;
       reports.localised[bin] += is_localised ? 1 : 0;
     }
-    if (way > min_outside_distance_m) {
+    if (reference_distance_m > min_outside_distance_m) {
       left = true;
       ++reports.outside;
       reports.lost_outside += is_lost ? 1 : 0;
       reports.localised_outside += is_localised ? 1 : 0;
       images_outside += said_lost ? 0 : 1;
       said_lost = said_lost || is_lost;
-    } else if (way <= m03_spacing_m && left) {
+    } else if (reference_distance_m <= m03_spacing_m && left) {
       back = true;
       images_back += said_found ? 0 : 1;
       said_found = said_found || (is_localised && image.is_within(m03_spacing_m));
-    } else if (way <= m03_spacing_m && image.step >= uncounted_images) {
+    } else if (reference_distance_m <= m03_spacing_m && image.step >= uncounted_images) {
       ++reports.inside;
       reports.lost_inside += is_lost ? 1 : 0;
     }

@@ -75,8 +75,9 @@ std::vector<std::size_t> plan_grid_walk(const std::vector<RecordedView>& views, 
   while (walk.size() < images) {
     std::vector<std::size_t> next;
     for (std::size_t i = 0; i < views.size(); ++i) {
-      const double way = distance(views[i].pose.position(), views[walk.back()].pose.position());
-      if (!visited[i] && way < 1.5 * spacing_m) next.push_back(i);
+      const double distance_m =
+          distance(views[i].pose.position(), views[walk.back()].pose.position());
+      if (!visited[i] && distance_m < 1.5 * spacing_m) next.push_back(i);
     }
     if (next.empty()) break;
     walk.push_back(next[random.index(next.size())]);
@@ -98,16 +99,16 @@ void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
                                 .columns = options.columns / 2},
                                executor);
   const auto remembered = make_tracking_place(place, executor);
-  RunCondition noisy = clean_condition();
+  RunCondition noisy = make_clean_condition();
   noisy.id = "noisy";
   noisy.name = "the sensor noise of hard";
-  noisy.sensor = hard_condition().sensor;
+  noisy.sensor = make_hard_condition().sensor;
   const WalkOptions walks{.variants = 1,
                           .runs_each = 5 * options.variants * options.runs,
                           .images = 20,
                           .step_m = spacing_m,
                           .seed = 3};
-  for (const RunCondition& condition : {clean_condition(), noisy}) {
+  for (const RunCondition& condition : {make_clean_condition(), noisy}) {
     const std::vector<RunSet> sets{make_run_set(
         remembered, record_walks(place, *remembered, condition, walks, executor), executor)};
     const auto runs = track(sets, FilterSetting{}, seed_of_worlds);

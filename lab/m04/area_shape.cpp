@@ -216,7 +216,7 @@ class AreaShape final : public Experiment {
       grid.push_back({point.position.x_m, point.position.y_m, 0.0});
     }
     const std::uint64_t noise = place.seed * 100003U + 80000U;
-    const auto views = simulation::take_views(place, rendering, grid, noise, {}, executor);
+    const auto views = simulation::capture_views(place, rendering, grid, noise, {}, executor);
     const VisualMemory memory =
         make_memory(views, compute_signatures(views, m04_components, executor));
     const ReferenceAreas areas(memory);
@@ -231,7 +231,8 @@ class AreaShape final : public Experiment {
                         low.y_m + share_y * (high.y_m - low.y_m),
                         random.uniform(-std::numbers::pi, std::numbers::pi)};
       if (!place.free_space->is_free(robot.position())) continue;
-      const Panorama view = simulation::take_view(place, rendering, robot, noise + grid.size() + p);
+      const Panorama view =
+          simulation::capture_view(place, rendering, robot, noise + grid.size() + p);
       const auto levels = localise_hierarchically(
           memory, areas, pack(compute_signature(view, m04_components), memory.full_scale()),
           {.tolerance = area_tolerance});
@@ -359,7 +360,7 @@ class AreaShape final : public Experiment {
 
 }  // namespace
 
-std::unique_ptr<Experiment> area_shape_experiment() {
+std::unique_ptr<Experiment> make_area_shape_experiment() {
   return std::make_unique<AreaShape>();
 }
 

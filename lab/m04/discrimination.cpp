@@ -19,21 +19,21 @@ namespace panonav::lab {
 namespace {
 
 constexpr std::array component_counts{2, 5, 15, 50, 256};
-constexpr std::size_t component_count_number = component_counts.size();
+constexpr std::size_t component_setting_count = component_counts.size();
 constexpr std::size_t index_of_fifteen = 2;
 constexpr std::size_t condition_count = 3;
 constexpr std::size_t hidden_condition = 1;
 constexpr std::size_t band_count = 4;  // components 0 and 1, 2 .. 14, 15 .. 49, 50 .. 255
 
 // Returns the dissimilarities between one query and all references, per number of components.
-std::array<std::vector<double>, component_count_number> dissimilarities(
+std::array<std::vector<double>, component_setting_count> dissimilarities(
     const FourierSignature& query, const std::vector<FourierSignature>& references) {
-  std::array<std::vector<double>, component_count_number> values;
+  std::array<std::vector<double>, component_setting_count> values;
   for (const auto& reference : references) {
     const auto parts = dissimilarity_by_component(query, reference);
     double sum = 0.0;
     std::size_t k = 0;
-    for (std::size_t c = 0; c < component_count_number; ++c) {
+    for (std::size_t c = 0; c < component_setting_count; ++c) {
       for (; k < static_cast<std::size_t>(component_counts[c]); ++k) sum += parts[k];
       values[c].push_back(sum);
     }
@@ -66,20 +66,20 @@ class Discrimination final : public Experiment {
             place.rendering.columns, ">= 512: figure 6 compares 256 components");
     const auto references = compute_signatures(place.references, component_counts.back(), executor);
     const auto clean = compute_signatures(place.queries, component_counts.back(), executor);
-    std::vector<double> sharpness(component_count_number);
-    std::vector<double> contrast(component_count_number);
+    std::vector<double> sharpness(component_setting_count);
+    std::vector<double> contrast(component_setting_count);
     for (std::size_t condition = 0; condition < condition_count; ++condition) {
-      const auto views = take_queries(place, view_conditions()[condition], executor);
+      const auto views = capture_queries(place, view_conditions()[condition], executor);
       const auto queries = compute_signatures(views, component_counts.back(), executor);
       auto values = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
         return dissimilarities(queries[q], references);
       });
-      std::array<double, component_count_number> right{};
+      std::array<double, component_setting_count> right{};
       const auto n = static_cast<double>(queries.size());
       for (std::size_t q = 0; q < queries.size(); ++q) {
         const Point2 position = views[q].pose.position();
         const std::size_t nearest = place.nearest_reference(position);
-        for (std::size_t c = 0; c < component_count_number; ++c) {
+        for (std::size_t c = 0; c < component_setting_count; ++c) {
           const std::size_t found = find_smallest(values[q][c]);
           right[c] += found == nearest ? 1.0 / n : 0.0;
           found_[condition][c] += found == nearest ? 1 : 0;
@@ -92,13 +92,13 @@ class Discrimination final : public Experiment {
         }
       }
       trials_ += condition == 0 ? queries.size() : 0;
-      for (std::size_t c = 0; c < component_count_number; ++c) {
+      for (std::size_t c = 0; c < component_setting_count; ++c) {
         success_by_scene_[condition][c].push_back(right[c]);
       }
       if (condition == 0 && profile_.empty()) store_profile(place, values.front());
       if (condition == hidden_condition) compare_disturbance(place, clean, queries, references);
     }
-    for (std::size_t c = 0; c < component_count_number; ++c) {
+    for (std::size_t c = 0; c < component_setting_count; ++c) {
       sharpness_by_scene_[c].push_back(sharpness[c]);
       contrast_by_scene_[c].push_back(contrast[c]);
     }
@@ -110,16 +110,16 @@ class Discrimination final : public Experiment {
     for (std::size_t condition = 0; condition < condition_count; ++condition) {
       const std::string& name = view_conditions()[condition].name;
       const std::string& id = view_conditions()[condition].id;
-      for (std::size_t c = 0; c < component_count_number; ++c) {
+      for (std::size_t c = 0; c < component_setting_count; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
-        add_row(
-            result, "m04.fig6." + id + ".found_" + component_text(c),
-            "figure 6: nearest reference found with " + component_text(c) + " components, " + name,
-            found, "");
+        add_row(result, "m04.fig6." + id + ".found_" + format_component_count(c),
+                "figure 6: nearest reference found with " + format_component_count(c) +
+                    " components, " + name,
+                found, "");
       }
       for (const std::size_t more : {index_of_fifteen + 1, index_of_fifteen + 2}) {
-        add_difference(condition, "fifteen_against_" + component_text(more),
-                       "15 components less that with " + component_text(more), more,
+        add_difference(condition, "fifteen_against_" + format_component_count(more),
+                       "15 components less that with " + format_component_count(more), more,
                        at_least(-0.02), result);
         if (id == "hidden") result.rows.back().reason = explain_disturbance();
       }
@@ -130,14 +130,15 @@ class Discrimination final : public Experiment {
           "figure 6: distance to the reference found, 15 components, 25 cm grid (median), " + name,
           median_figure(errors_m_[condition][index_of_fifteen]), "m", at_most(0.177));
     }
-    for (std::size_t c = 0; c < component_count_number; ++c) {
-      add_row(result, "m04.fig6.sharpness_" + component_text(c),
+    for (std::size_t c = 0; c < component_setting_count; ++c) {
+      add_row(result, "m04.fig6.sharpness_" + format_component_count(c),
               "figure 6: fall of similarity from the right reference to its neighbours, " +
-                  component_text(c) + " components (share of the whole range; more is sharper)",
+                  format_component_count(c) +
+                  " components (share of the whole range; more is sharper)",
               mean_figure(sharpness_by_scene_[c]), "");
-      add_row(result, "m04.fig6.contrast_" + component_text(c),
+      add_row(result, "m04.fig6.contrast_" + format_component_count(c),
               "figure 6: dissimilarity at the right reference over that of a typical one, " +
-                  component_text(c) + " components (less is better)",
+                  format_component_count(c) + " components (less is better)",
               mean_figure(contrast_by_scene_[c]), "");
     }
     constexpr std::array band_names{"0 and 1", "2 to 14", "15 to 49", "50 to 255"};
@@ -155,7 +156,9 @@ class Discrimination final : public Experiment {
   }
 
  private:
-  static std::string component_text(std::size_t c) { return std::to_string(component_counts[c]); }
+  static std::string format_component_count(std::size_t c) {
+    return std::to_string(component_counts[c]);
+  }
 
   static std::vector<double> difference(const std::vector<double>& a,
                                         const std::vector<double>& b) {
@@ -221,13 +224,13 @@ class Discrimination final : public Experiment {
   }
 
   void store_profile(const simulation::PlaceRecording& place,
-                     const std::array<std::vector<double>, component_count_number>& values) {
+                     const std::array<std::vector<double>, component_setting_count>& values) {
     const simulation::PlacedView& query = place.queries.front();
     const std::size_t nearest = place.nearest_reference(query.pose.position());
     const double row_y_m = place.references[nearest].pose.y_m;
-    for (std::size_t c = 0; c < component_count_number; ++c) {
+    for (std::size_t c = 0; c < component_setting_count; ++c) {
       const auto scaled = similarities(values[c]);
-      viewer::Series line{.label = component_text(c) + " components"};
+      viewer::Series line{.label = format_component_count(c) + " components"};
       for (std::size_t i = 0; i < place.references.size(); ++i) {
         if (std::abs(place.references[i].pose.y_m - row_y_m) < 1e-6) {
           line.add(place.references[i].pose.x_m, scaled[i]);
@@ -261,7 +264,7 @@ class Discrimination final : public Experiment {
                            .x_range = std::pair{1.5, 400.0}};
     for (std::size_t condition = 0; condition < condition_count; ++condition) {
       viewer::Series line{.label = view_conditions()[condition].name};
-      for (std::size_t c = 0; c < component_count_number; ++c) {
+      for (std::size_t c = 0; c < component_setting_count; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
         // Shift the conditions slightly in x, so that their error bars do not hide each other.
         line.add(component_counts[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value);
@@ -277,19 +280,19 @@ class Discrimination final : public Experiment {
   }
 
   std::size_t trials_ = 0;
-  std::array<std::array<std::size_t, component_count_number>, condition_count> found_{};
-  std::array<std::array<std::vector<double>, component_count_number>, condition_count> errors_m_;
-  std::array<std::array<std::vector<double>, component_count_number>, condition_count>
+  std::array<std::array<std::size_t, component_setting_count>, condition_count> found_{};
+  std::array<std::array<std::vector<double>, component_setting_count>, condition_count> errors_m_;
+  std::array<std::array<std::vector<double>, component_setting_count>, condition_count>
       success_by_scene_;
-  std::array<std::vector<double>, component_count_number> sharpness_by_scene_;
-  std::array<std::vector<double>, component_count_number> contrast_by_scene_;
+  std::array<std::vector<double>, component_setting_count> sharpness_by_scene_;
+  std::array<std::vector<double>, component_setting_count> contrast_by_scene_;
   std::array<std::vector<double>, band_count> disturbance_over_step_;
   std::vector<viewer::Series> profile_;
 };
 
 }  // namespace
 
-std::unique_ptr<Experiment> discrimination_experiment() {
+std::unique_ptr<Experiment> make_discrimination_experiment() {
   return std::make_unique<Discrimination>();
 }
 

@@ -117,8 +117,8 @@ class DistanceCurve final : public Experiment {
       add_line(place, from, to, line, sums, executor);
     }
     Curve curve = sums.mean();
-    require(curve.size() >= 50, "length of the straight ways [m]", bin_distance_m(curve.size() - 1),
-            ">= 1 m");
+    require(curve.size() >= 50, "length of the straight lines [m]",
+            bin_distance_m(curve.size() - 1), ">= 1 m");
     // The absolute dissimilarity depends on the place and has no meaning by itself [M04 section
     // 2.2]. It is divided by the level of far views, the mean over the farther half of all
     // distances.
@@ -200,13 +200,14 @@ class DistanceCurve final : public Experiment {
       if (i % repeat_interval == 0) repeated_poses.push_back(poses.back());
     }
     const std::uint64_t noise = place.seed * 100003U + 70000U + 5000U * line;
-    const auto compute_views = [&](const std::vector<Pose2>& from_here, std::uint64_t seed) {
+    const auto compute_signatures_at = [&](const std::vector<Pose2>& from_here,
+                                           std::uint64_t seed) {
       return compute_signatures(
-          simulation::take_views(place, place.rendering, from_here, seed, {}, executor),
+          simulation::capture_views(place, place.rendering, from_here, seed, {}, executor),
           m04_components, executor);
     };
-    const auto views = compute_views(poses, noise);
-    const auto repeated_views = compute_views(repeated_poses, noise + 2500U);
+    const auto views = compute_signatures_at(poses, noise);
+    const auto repeated_views = compute_signatures_at(repeated_poses, noise + 2500U);
     for (std::size_t i = 0; i < views.size(); ++i) {
       // At distance 0 only noise distinguishes the two pictures.
       if (i % repeat_interval == 0)
@@ -308,10 +309,10 @@ class SimilaritySurface final : public Experiment {
 
 }  // namespace
 
-std::unique_ptr<Experiment> distance_curve_experiment() {
+std::unique_ptr<Experiment> make_distance_curve_experiment() {
   return std::make_unique<DistanceCurve>();
 }
-std::unique_ptr<Experiment> similarity_surface_experiment() {
+std::unique_ptr<Experiment> make_similarity_surface_experiment() {
   return std::make_unique<SimilaritySurface>();
 }
 

@@ -22,24 +22,24 @@ class Experiment {
 
 /// [M04] figure 4: change of the signature by a rotation on the spot, compared with a step to the
 /// next reference.
-[[nodiscard]] std::unique_ptr<Experiment> rotational_invariance_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_rotational_invariance_experiment();
 /// [M04] figure 5: power spectrum of one view, and the mean over all views.
-[[nodiscard]] std::unique_ptr<Experiment> power_spectrum_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_power_spectrum_experiment();
 /// [M04] figure 6: discrimination with 2, 5, 15, 50 and 256 components.
-[[nodiscard]] std::unique_ptr<Experiment> discrimination_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_discrimination_experiment();
 /// [M04] figure 7: dissimilarity against distance, its linear range and its saturation.
-[[nodiscard]] std::unique_ptr<Experiment> distance_curve_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_distance_curve_experiment();
 /// [M04] figure 8: similarity at every reference view.
-[[nodiscard]] std::unique_ptr<Experiment> similarity_surface_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_similarity_surface_experiment();
 /// [M04] figure 9: localisation areas that shrink as more components are compared.
-[[nodiscard]] std::unique_ptr<Experiment> hierarchical_areas_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_hierarchical_areas_experiment();
 /// [M04] figure 10: how the shape of localisation areas depends on the surrounding objects, left
 /// open by the authors.
-[[nodiscard]] std::unique_ptr<Experiment> area_shape_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_area_shape_experiment();
 /// [M04] eq. 6: component weights learnt in one place and applied in the next.
-[[nodiscard]] std::unique_ptr<Experiment> component_weights_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_component_weights_experiment();
 /// Compares the place recognition methods that [M04] argues against on the same views.
-[[nodiscard]] std::unique_ptr<Experiment> rivals_experiment();
+[[nodiscard]] std::unique_ptr<Experiment> make_rivals_experiment();
 
 /// [M04] section 3: views arranged by their similarity (figures 12, 15, 16 and 17), in the hall, a
 /// small room and the periodic hall.

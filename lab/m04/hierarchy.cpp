@@ -140,7 +140,7 @@ class HierarchicalAreas final : public Experiment {
 
 }  // namespace
 
-std::unique_ptr<Experiment> hierarchical_areas_experiment() {
+std::unique_ptr<Experiment> make_hierarchical_areas_experiment() {
   return std::make_unique<HierarchicalAreas>();
 }
 

@@ -70,7 +70,7 @@ viewer::MapPlot make_map(const std::string& title, const ViewGrid& grid,
   return {.title = title, .layers = {lines, views}};
 }
 
-std::string with_shape_difference(const std::string& title, double mu) {
+std::string append_shape_difference(const std::string& title, double mu) {
   return title + ", mu " + format_fixed(mu, 4);
 }
 
@@ -160,8 +160,8 @@ class LatticeExperiment {
          "Views of the hall as they were taken and as they arrange themselves, unordered and "
          "without motion: by phases, and by dissimilarity alone as published.",
          {make_map("as taken", grid, positions_of(grid.poses)),
-          make_map(with_shape_difference("phases", ours.shape_difference), grid, ours.aligned),
-          make_map(with_shape_difference("dissimilarity alone", published.with_reflection), grid,
+          make_map(append_shape_difference("phases", ours.shape_difference), grid, ours.aligned),
+          make_map(append_shape_difference("dissimilarity alone", published.with_reflection), grid,
                    published.aligned)});
     draw_curve(curve);
   }
@@ -186,16 +186,17 @@ class LatticeExperiment {
     without.add(blind, true);
     const bool coarse = side == 10;
     std::vector<viewer::MapPlot> panels{
-        make_map(with_shape_difference("motion and phases", ours.shape_difference), grid,
+        make_map(append_shape_difference("motion and phases", ours.shape_difference), grid,
                  ours.aligned),
-        make_map(with_shape_difference("motion without phases", blind.with_reflection), grid,
+        make_map(append_shape_difference("motion without phases", blind.with_reflection), grid,
                  blind.aligned)};
     if (coarse) {
       const auto plain =
           compare_with_grid(grid, arrange(grid.memory, plain_options(), {}, executor_));
       coarse_plain_.add(plain, true);
-      panels.push_back(make_map(with_shape_difference("dissimilarity alone", plain.with_reflection),
-                                grid, plain.aligned));
+      panels.push_back(
+          make_map(append_shape_difference("dissimilarity alone", plain.with_reflection), grid,
+                   plain.aligned));
     }
     if (!drawn) return;
     if (coarse) draw_path(grid);
@@ -234,10 +235,10 @@ class LatticeExperiment {
     viewer::MapLayer views{.label = "reference images"};
     viewer::MapLayer path{.label = "path", .colour = viewer::PlotColour::vermilion};
     viewer::MapLayer arrows{.label = "heading", .colour = viewer::PlotColour::green};
-    auto& way = path.lines.emplace_back();
+    auto& line = path.lines.emplace_back();
     for (const Pose2& pose : grid.poses) {
       views.circles.push_back(pose.position());
-      way.push_back(pose.position());
+      line.push_back(pose.position());
       arrows.lines.push_back({pose.position(), pose * Point2{0.4 * grid.spacing_m, 0.0}});
     }
     add_plot(result_, "fig16_path.svg", "Where the images were taken, along a zigzag.",

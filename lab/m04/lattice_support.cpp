@@ -83,8 +83,8 @@ ViewGrid record_grid(const simulation::PlaceRecording& place, int columns, int r
                           random.uniform(-std::numbers::pi, std::numbers::pi)});
   }
   if (headings == GridHeadings::along_path) simulation::face_path(grid.poses);
-  const auto views = simulation::take_views(place, place.rendering, grid.poses,
-                                            place.seed * 100003U + 90000U, {}, executor);
+  const auto views = simulation::capture_views(place, place.rendering, grid.poses,
+                                               place.seed * 100003U + 90000U, {}, executor);
   grid.memory = make_memory(views, compute_signatures(views, m04_components, executor));
   return grid;
 }

@@ -184,14 +184,14 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
   const auto anchors = sample_views(ids, sampled_views, seed);
   // Consecutive views are neighbours. Each fold is a contiguous run, so that folds share few
   // neighbours.
-  std::vector<MarginMoments> fold(fold_count, MarginMoments(components));
+  std::vector<MarginMoments> folds(fold_count, MarginMoments(components));
   std::size_t used = 0;
   for (std::size_t i = 0; i < anchors.size(); ++i) {
     used +=
-        add_margins(memory, posed, spacing_m, anchors[i], fold[i * fold_count / anchors.size()]);
+        add_margins(memory, posed, spacing_m, anchors[i], folds[i * fold_count / anchors.size()]);
   }
   const bool every_fold =
-      std::ranges::all_of(fold, [](const MarginMoments& m) { return m.count > 0; });
+      std::ranges::all_of(folds, [](const MarginMoments& m) { return m.count > 0; });
   if (used < min_anchors || !every_fold) return std::nullopt;
 
   const auto cross_validated_margin = [&](double penalty) {
@@ -199,14 +199,14 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
     for (std::size_t left_out_fold = 0; left_out_fold < fold_count; ++left_out_fold) {
       MarginMoments others(components);
       for (std::size_t f = 0; f < fold_count; ++f) {
-        if (f != left_out_fold) others.add(fold[f]);
+        if (f != left_out_fold) others.add(folds[f]);
       }
-      sum += signal_to_noise(fold[left_out_fold], solve_weights(others, penalty)) / fold_count;
+      sum += signal_to_noise(folds[left_out_fold], solve_weights(others, penalty)) / fold_count;
     }
     return sum;
   };
   MarginMoments all(components);
-  for (const MarginMoments& m : fold) all.add(m);
+  for (const MarginMoments& m : folds) all.add(m);
   ComponentWeights result;
   double best_penalty = penalty_candidates.back();
   result.margin = result.margin_of_equal_weights = cross_validated_margin(best_penalty);

@@ -16,9 +16,10 @@ using FigureExperiments = std::vector<std::unique_ptr<Experiment>>;
 FigureExperiments make_experiments() {
   FigureExperiments experiments;
   for (auto* const make :
-       {rotational_invariance_experiment, power_spectrum_experiment, discrimination_experiment,
-        distance_curve_experiment, similarity_surface_experiment, hierarchical_areas_experiment,
-        area_shape_experiment, component_weights_experiment, rivals_experiment}) {
+       {make_rotational_invariance_experiment, make_power_spectrum_experiment,
+        make_discrimination_experiment, make_distance_curve_experiment,
+        make_similarity_surface_experiment, make_hierarchical_areas_experiment,
+        make_area_shape_experiment, make_component_weights_experiment, make_rivals_experiment}) {
     experiments.push_back(make());
   }
   return experiments;

@@ -23,11 +23,13 @@ namespace {
 
 using MakeRecogniser = std::unique_ptr<RivalRecogniser> (*)();
 constexpr std::array<MakeRecogniser, 6> rival_factories{
-    [] { return fourier_signature_recogniser(m04_components); },
-    [] { return grey_histogram_recogniser(); }, [] { return colour_histogram_recogniser(); },
+    [] { return make_fourier_signature_recogniser(m04_components); },
+    [] { return make_grey_histogram_recogniser(); },
+    [] { return make_colour_histogram_recogniser(); },
     // One eigenimage coefficient per signature component.
-    [] { return eigenimage_recogniser(m04_components); }, [] { return zero_phase_recogniser(); },
-    [] { return pixels_over_all_turns_recogniser(); }};
+    [] { return make_eigenimage_recogniser(m04_components); },
+    [] { return make_zero_phase_recogniser(); },
+    [] { return make_pixels_over_all_rotations_recogniser(); }};
 constexpr std::size_t rival_count = rival_factories.size();
 // Maximum number of queries per scene, because comparing pixels over all turns is slow.
 constexpr std::size_t max_queries = 20;
@@ -68,7 +70,7 @@ class Rivals final : public Experiment {
     }
     const auto conditions = rival_conditions();
     for (std::size_t condition = 0; condition < conditions.size(); ++condition) {
-      auto views = take_queries(place, conditions[condition], executor);
+      auto views = capture_queries(place, conditions[condition], executor);
       views.resize(std::min(views.size(), max_queries), views.front());
       const auto queries = render_in_colour(place, colour_renderer, views,
                                             conditions[condition].sensor, 95000U, executor);
@@ -174,7 +176,7 @@ class Rivals final : public Experiment {
 
 }  // namespace
 
-std::unique_ptr<Experiment> rivals_experiment() {
+std::unique_ptr<Experiment> make_rivals_experiment() {
   return std::make_unique<Rivals>();
 }
 

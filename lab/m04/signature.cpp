@@ -75,8 +75,8 @@ class RotationalInvariance final : public Experiment {
     // Take a second picture at the same position with another heading and other noise; a shifted
     // copy of the first one would differ too little.
     const auto repeated_signatures =
-        compute_signatures(simulation::take_views(place, place.rendering, turned,
-                                                  place.seed * 100003U + 60000U, {}, executor),
+        compute_signatures(simulation::capture_views(place, place.rendering, turned,
+                                                     place.seed * 100003U + 60000U, {}, executor),
                            m04_components, executor);
     for (std::size_t i = 0; i < reference_indices.size(); ++i) {
       const auto here =
@@ -192,10 +192,10 @@ void reproduce_memory_table(Reproduction& result) {
       8.0 * static_cast<double>(packed.magnitudes.size() + packed.phases.size()));
 }
 
-std::unique_ptr<Experiment> rotational_invariance_experiment() {
+std::unique_ptr<Experiment> make_rotational_invariance_experiment() {
   return std::make_unique<RotationalInvariance>();
 }
-std::unique_ptr<Experiment> power_spectrum_experiment() {
+std::unique_ptr<Experiment> make_power_spectrum_experiment() {
   return std::make_unique<PowerSpectrum>();
 }
 

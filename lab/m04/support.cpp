@@ -17,12 +17,12 @@ const std::array<ViewCondition, 3>& view_conditions() {
   return conditions;
 }
 
-std::vector<simulation::PlacedView> take_queries(const simulation::PlaceRecording& place,
-                                                 const ViewCondition& condition,
-                                                 Executor& executor) {
+std::vector<simulation::PlacedView> capture_queries(const simulation::PlaceRecording& place,
+                                                    const ViewCondition& condition,
+                                                    Executor& executor) {
   if (condition.id == view_conditions().front().id) return place.queries;
-  return simulation::retake_queries(place, condition.sensor, place.seed * 100003U + 50000U,
-                                    executor);
+  return simulation::recapture_queries(place, condition.sensor, place.seed * 100003U + 50000U,
+                                       executor);
 }
 
 std::vector<FourierSignature> compute_signatures(const std::vector<simulation::PlacedView>& views,

@@ -29,7 +29,7 @@ struct ViewCondition {
 
 /// Takes the queries of the place again under `condition`; returns the recorded queries for the
 /// first condition.
-[[nodiscard]] std::vector<simulation::PlacedView> take_queries(
+[[nodiscard]] std::vector<simulation::PlacedView> capture_queries(
     const simulation::PlaceRecording& place, const ViewCondition& condition, Executor& executor);
 
 [[nodiscard]] std::vector<FourierSignature> compute_signatures(

@@ -82,7 +82,7 @@ class WeightsOfComponents final : public Experiment {
     const std::array<std::vector<double>, weighting_count> weights{
         std::vector<double>(previous_weights_->size(), 1.0), *previous_weights_};
     for (std::size_t condition = 0; condition < view_condition_count; ++condition) {
-      const auto views = take_queries(place, view_conditions()[condition], executor);
+      const auto views = capture_queries(place, view_conditions()[condition], executor);
       const auto queries = compute_signatures(views, m04_components, executor);
       std::array<double, weighting_count> right{};
       for (std::size_t q = 0; q < queries.size(); ++q) {
@@ -112,7 +112,7 @@ class WeightsOfComponents final : public Experiment {
 
 }  // namespace
 
-std::unique_ptr<Experiment> component_weights_experiment() {
+std::unique_ptr<Experiment> make_component_weights_experiment() {
   return std::make_unique<WeightsOfComponents>();
 }
 

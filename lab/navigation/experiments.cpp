@@ -84,8 +84,8 @@ void report(const std::string& id, const std::string& what, const MissionResults
            measured.falsely_arrived, measured.runs);
   for (const auto& [end, count] : measured.ends) {
     if (end == NavigationDecision::State::arrived) continue;
-    add_rate(result, id + "." + std::string(name_of(end)),
-             what + ": end as " + std::string(name_of(end)), count, measured.runs);
+    add_rate(result, id + "." + std::string(to_string(end)),
+             what + ": end as " + std::string(to_string(end)), count, measured.runs);
   }
   add_median(result, id + ".steps", what + ": steps", "", measured.steps);
 }
@@ -112,12 +112,12 @@ std::vector<Pose2> plan_exploring_drive(const simulation::MissionPlace& place, s
   simulation::FreeSpaceOptions wide_clearance = simulation::free_space_options(place.scene);
   wide_clearance.robot_radius_m += 0.1;
   const simulation::FreeSpace space(place.scene, wide_clearance);
-  std::vector<Point2> way;
-  while (path_length_m(way) < drive_length_m) {
+  std::vector<Point2> corners;
+  while (path_length_m(corners) < drive_length_m) {
     if (place.scene.tour.empty()) {
-      way.push_back(space.random_pose(random).position());
+      corners.push_back(space.random_pose(random).position());
     } else {
-      way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
+      corners.insert(corners.end(), place.scene.tour.begin(), place.scene.tour.end());
     }
   }
   std::vector<Pose2> poses;
@@ -126,7 +126,7 @@ std::vector<Pose2> plan_exploring_drive(const simulation::MissionPlace& place, s
                                   {.path = simulation::RecordingPath::tour,
                                   .heading = simulation::RecordingHeading::path,
                                   .spacing_m = drive_spacing_m},
-                                  {}, seed, way)) {
+                                  {}, seed, corners)) {
     poses.push_back(pose.pose);
   }
   poses.resize(
@@ -301,7 +301,7 @@ void NavigationExperiments::reproduce_route_missions() const {
     std::string id;
     std::string what;
     MissionResults measures;
-    std::vector<double> off_m;  // from the path of the recorded drive
+    std::vector<double> lateral_distance_m;  // from the path of the recorded drive
   };
   std::vector<MissionKind> kinds{{"route", "with the route recorded on it", {}, {}},
                                  {"without_route", "the same missions without the route", {}, {}}};
@@ -324,10 +324,10 @@ void NavigationExperiments::reproduce_route_missions() const {
       kind.measures.add(runs, 0.5 * remembered.spacing_m);
       for (const simulation::MissionRun& run : runs) {
         for (std::size_t step = 0; step < run.decisions.size(); ++step) {
-          const double off_m =
+          const double lateral_distance_m =
               std::abs(project_onto_route(drive, run.path[step].position()).lateral_m);
-          kind.off_m.push_back(off_m);
-          if (run.decisions[step].on_route) on_route_m.push_back(off_m);
+          kind.lateral_distance_m.push_back(lateral_distance_m);
+          if (run.decisions[step].on_route) on_route_m.push_back(lateral_distance_m);
           for (const NavigationDecision::Event event : run.decisions[step].events) ++events[event];
         }
       }
@@ -339,11 +339,11 @@ void NavigationExperiments::reproduce_route_missions() const {
     report("navigation." + kind.id, map + kind.what, kind.measures, std::nullopt, std::nullopt,
            result);
     add_median(result, "navigation." + kind.id + ".off",
-               map + kind.what + ": distance from the recorded path", "m", kind.off_m);
+               map + kind.what + ": distance from the recorded path", "m", kind.lateral_distance_m);
   }
   const std::string what = map + kinds.front().what;
   add_rate(result, "navigation.route.share", what + ": steps on a leg along the route",
-           on_route_m.size(), kinds.front().off_m.size());
+           on_route_m.size(), kinds.front().lateral_distance_m.size());
   if (on_route_m.empty()) return;
   add_rate(result, "navigation.route.left", what + ": legs that did not come to their end",
            events[NavigationDecision::Event::route_left], events[NavigationDecision::Event::route]);
@@ -358,9 +358,9 @@ void NavigationExperiments::reproduce_blocked_missions() const {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::Scene scene = simulation::make_scene("loop", {.seed = seed});
     const simulation::MissionPlace place = simulation::make_mission_place(scene, executor);
-    const auto way = plan_exploring_drive(place, seed);
+    const auto drive = plan_exploring_drive(place, seed);
     const simulation::RememberedPlace remembered = simulation::memorise_drive(
-        place, way, simulation::make_noisy_wheels(), Random(seed, 1).next(), executor);
+        place, drive, simulation::make_noisy_wheels(), Random(seed, 1).next(), executor);
     double tour_m = 0.0;
     for (std::size_t k = 0; k < scene.tour.size(); ++k) {
       tour_m += distance(scene.tour[k], scene.tour[(k + 1) % scene.tour.size()]);
@@ -372,11 +372,11 @@ void NavigationExperiments::reproduce_blocked_missions() const {
       // the other one on the opposite side of the loop.
       const std::size_t start = random.index(round);
       const std::size_t goal = (start + round / 4) % round;
-      const std::array<Pose2, 2> screens{way[(start + round / 8) % round],
-                                         way[(start + round / 8 + round / 2) % round]};
-      const simulation::Mission mission{remembered.graph.view(goal), way[start], {}};
+      const std::array<Pose2, 2> screens{drive[(start + round / 8) % round],
+                                         drive[(start + round / 8 + round / 2) % round]};
+      const simulation::Mission mission{remembered.graph.view(goal), drive[start], {}};
       const auto width_m =
-          find_blocking_width_m(scene, screens, mission.start.position(), way[goal].position());
+          find_blocking_width_m(scene, screens, mission.start.position(), drive[goal].position());
       if (!width_m) continue;
       for (const bool both : {false, true}) {
         const simulation::MissionPlace now = simulation::make_mission_place(

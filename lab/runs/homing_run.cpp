@@ -17,11 +17,11 @@ HomingPlace make_homing_place(simulation::Scene scene, HomingCamera camera, Exec
   return {simulation::make_place(std::move(scene), executor), camera};
 }
 
-HomingView take_homing_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
+HomingView capture_homing_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
   Executor here(1);
   const HomingCamera& camera = place.camera;
-  const Panorama seen = simulation::take_panorama(*place.renderer, pose, camera.rendering,
-                                                  camera.frame, camera.sensor, seed, here);
+  const Panorama seen = simulation::capture_panorama(*place.renderer, pose, camera.rendering,
+                                                     camera.frame, camera.sensor, seed, here);
   const Tilt measured = camera.levelled ? sample_tilt(camera.frame, seed) : Tilt{};
   return homing_view(compute_signature(level_panorama(seen, measured), camera.components));
 }
@@ -53,7 +53,7 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
   HomingRun run;
   run.goal = goal;
   for (;;) {
-    const HomingView view = take_homing_view(place, robot.pose(), noise_of_views.next());
+    const HomingView view = capture_homing_view(place, robot.pose(), noise_of_views.next());
     const HomingPursuit::Decision decision = pursuit.decide(view);
     if (run.path.empty()) run.start_difference = decision.difference;
     run.path.push_back(robot.pose());
@@ -111,7 +111,7 @@ std::vector<HomingRun> run_home(const HomingPlace& place, const std::vector<Homi
                                 Executor& executor) {
   return simulation::make_each(executor, tasks.size(), [&](std::size_t i) {
     const std::uint64_t task_seed = Random(seed, i).next();
-    const HomingView home = take_homing_view(place, tasks[i].goal, task_seed);
+    const HomingView home = capture_homing_view(place, tasks[i].goal, task_seed);
     return run_home(place, home, tasks[i].goal, tasks[i].start, options, task_seed + 1);
   });
 }

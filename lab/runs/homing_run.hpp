@@ -35,8 +35,8 @@ struct HomingPlace : simulation::SimulatedPlace {
                                             Executor& executor);
 
 /// Renders the robot's view at `pose`. The same pose and seed give the same bits.
-[[nodiscard]] HomingView take_homing_view(const HomingPlace& place, const Pose2& pose,
-                                          std::uint64_t seed);
+[[nodiscard]] HomingView capture_homing_view(const HomingPlace& place, const Pose2& pose,
+                                             std::uint64_t seed);
 
 struct HomingRunOptions {
   /// Error of the wheels, and the drive: a differential robot turns before it drives, a holonomic

@@ -70,13 +70,13 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
   for (const PlaceCondition& condition : conditions) {
     const std::size_t query_count = place.queries.size();
     std::vector<Place> answers(query_count);
-    executor.for_chunks(query_count, 1, [&](std::size_t begin, std::size_t, std::size_t) {
+    executor.for_each_chunk(query_count, 1, [&](std::size_t begin, std::size_t, std::size_t) {
       Executor here(1);
       const simulation::FrameOptions frame{.camera_height_m = place.scene.camera_height_m,
                                            .tilt_rad = condition.tilt_rad};
       const Panorama seen =
-          simulation::take_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
-                                    frame, condition.sensor, seed + begin, here);
+          simulation::capture_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
+                                       frame, condition.sensor, seed + begin, here);
       const Tilt measured = condition.levelled ? sample_tilt(frame, seed + begin) : Tilt{};
       answers[begin] = memorised.localise(level_panorama(seen, measured));
     });
@@ -127,7 +127,7 @@ std::vector<RecognitionRate> measure_recognition_rates(
     const MemorisedPlace memorised(*place, executor);
     for (const simulation::PlaceRecording* const queried : places) {
       std::vector<std::uint8_t> known(queried->queries.size());
-      executor.for_chunks(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+      executor.for_each_chunk(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
         known[i] = memorised.localise(queried->queries[i].panorama).known ? 1 : 0;
       });
       const auto count = static_cast<std::size_t>(std::ranges::count(known, 1));

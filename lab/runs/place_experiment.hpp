@@ -28,7 +28,7 @@ struct PlaceCondition {
 struct PlaceResult {
   std::string condition;
   Proportion nearest;               ///< the best match is the nearest reference
-  Proportion nearest_or_next;       ///< the best match is that one or a grid neighbour of it
+  Proportion nearest_or_neighbour;  ///< the best match is that one or a grid neighbour of it
   Proportion known;                 ///< recognised as a place of the memory
   double heading_median_rad = 0.0;  ///< absolute error by the best match, over all queries
   double heading_p95_rad = 0.0;

@@ -94,7 +94,7 @@ FeatureSource extract_reference_features(const simulation::PlaceRecording& place
 
 QueryFeatures make_query_features(const Panorama& view) {
   return [&view](Handedness handedness) {
-    return extract_features(handedness == Handedness::as_seen ? view : mirror(view));
+    return extract_features(handedness == Handedness::original ? view : mirror(view));
   };
 }
 
@@ -152,11 +152,11 @@ TrackingRun drop_images(TrackingRun run, std::size_t first, std::size_t count) {
   return run;
 }
 
-RunCondition clean_condition() {
+RunCondition make_clean_condition() {
   return {.id = "clean", .name = "clean", .sensor = {}};
 }
 
-RunCondition hard_condition() {
+RunCondition make_hard_condition() {
   return {.id = "hard",
           .name = "hard",
           .light_change = 0.3,
@@ -176,7 +176,7 @@ std::vector<TrackingRun> record_runs(const std::vector<std::vector<Pose2>>& pose
     views[r].resize(poses[r].size());
     for (std::size_t i = 0; i < poses[r].size(); ++i) jobs.emplace_back(r, i);
   }
-  executor.for_chunks(jobs.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
+  executor.for_each_chunk(jobs.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
     Executor here(1);
     for (std::size_t j = begin; j < end; ++j) {
       const auto [r, i] = jobs[j];
@@ -248,7 +248,7 @@ SingleImages localise_single_images(const TrackingPlace& place, std::span<const 
                                     Executor& executor) {
   const auto positions = place.reference_positions();
   std::vector<SingleImages> parts(runs.size());
-  executor.for_chunks(runs.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
+  executor.for_each_chunk(runs.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
     for (const TrackingStep& step : runs[r].steps) {
       if (!step.view) continue;
       const Point2 truth = step.truth.position();

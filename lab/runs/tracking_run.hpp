@@ -120,10 +120,10 @@ struct RunCondition {
 };
 
 /// Returns the condition without any change.
-[[nodiscard]] RunCondition clean_condition();
+[[nodiscard]] RunCondition make_clean_condition();
 /// Returns a condition with light of 0.7 .. 1.3, a tenth of the objects moved, and sensor noise at
 /// which 60 to 80 % of single images are localised correctly.
-[[nodiscard]] RunCondition hard_condition();
+[[nodiscard]] RunCondition make_hard_condition();
 
 struct WalkOptions {
   int variants = 3;               ///< of the scene: light, moved objects; >= 1

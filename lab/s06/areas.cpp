@@ -23,7 +23,7 @@ constexpr std::array<int, 5> compared_frequencies{1, 2, 3, 5, 10};
 double best_single_area(const CatchmentAreas& areas, std::size_t accepted) {
   double best = 0.0;
   for (const int highest : compared_frequencies) {
-    best = std::max(best, areas.at(published_strategy({highest}).label)[accepted]);
+    best = std::max(best, areas.at(make_published_strategy({highest}).label)[accepted]);
   }
   return best;
 }
@@ -32,10 +32,10 @@ double best_single_area(const CatchmentAreas& areas, std::size_t accepted) {
 
 CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys) {
   std::vector<HomingStrategy> strategies{
-      expected_image_strategy(), own_strategy(), published_strategy({2, 4, 10}),
-      published_strategy({10, 4, 2}), published_strategy({1, 2, 3, 4, 6, 10})};
+      make_expected_image_strategy(), make_own_strategy(), make_published_strategy({2, 4, 10}),
+      make_published_strategy({10, 4, 2}), make_published_strategy({1, 2, 3, 4, 6, 10})};
   for (const int highest : compared_frequencies)
-    strategies.push_back(published_strategy({highest}));
+    strategies.push_back(make_published_strategy({highest}));
   CatchmentAreas areas;
   for (const auto& strategy : strategies) {
     const auto values = surveys.compute_areas(strategy, s06_accepted_m);
@@ -49,9 +49,9 @@ CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys) {
 }
 
 void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Experiments& context) {
-  const std::string own = own_strategy().label;
-  const std::string images = expected_image_strategy().label;
-  const std::string many_stages = published_strategy({1, 2, 3, 4, 6, 10}).label;
+  const std::string own = make_own_strategy().label;
+  const std::string images = make_expected_image_strategy().label;
+  const std::string many_stages = make_published_strategy({1, 2, 3, 4, 6, 10}).label;
   for (std::size_t i = 0; i < s06_accepted_m.size(); ++i) {
     const std::string id = format_centimetres_id(s06_accepted_m[i]);
     const std::string within = ", runs that end within " + format_centimetres(s06_accepted_m[i]);
@@ -111,12 +111,12 @@ void report_variant(const std::string& id, const std::string& what, const Catchm
                     Reproduction& result) {
   for (std::size_t i = 0; i < s06_accepted_m.size(); ++i) {
     const std::string within = ", runs that end within " + format_centimetres(s06_accepted_m[i]);
-    const double own = areas.at(own_strategy().label)[i];
+    const double own = areas.at(make_own_strategy().label)[i];
     add_row(
         result,
         "s06." + id + ".own_against_expected_images_" + format_centimetres_id(s06_accepted_m[i]),
         what + ": mean catchment area, our rule over expected images" + within,
-        own / areas.at(expected_image_strategy().label)[i], "");
+        own / areas.at(make_expected_image_strategy().label)[i], "");
     add_row(result,
             "s06." + id + ".own_against_coarse_to_fine_" + format_centimetres_id(s06_accepted_m[i]),
             what + ": mean catchment area, our rule over " + coarse_to_fine + within,
@@ -143,8 +143,8 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
     for (std::size_t i = 0; i < a.size(); ++i) a[i] = a[i] || b[i];
     return a;
   };
-  const auto images = find_catchments(expected_image_strategy());
-  const auto snapshots = find_catchments(published_strategy({3}));
+  const auto images = find_catchments(make_expected_image_strategy());
+  const auto snapshots = find_catchments(make_published_strategy({3}));
 
   double mean_image = 0.0;
   double best_image = 0.0;

@@ -24,7 +24,7 @@ ArenaRecording record_views(const simulation::Renderer& renderer, const simulati
                             const ArenaOptions& options, std::uint64_t stream, Executor& executor) {
   std::vector<std::optional<ArenaView>> views(grid.size());
   std::vector<std::vector<float>> rows(grid.size());
-  executor.for_chunks(grid.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
+  executor.for_each_chunk(grid.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
     Executor here(1);
     for (std::size_t i = begin; i < end; ++i) {
       Random random(options.seed, 2 * i + stream);

@@ -67,7 +67,7 @@ SnapshotChain record_chain(const HomingPlace& place, std::span<const Pose2> rout
   for (std::size_t i = 0; i < route.size(); ++i) {
     const Pose2 before = wheels.pose();
     if (i > 0) wheels.advance(inverse(route[i - 1]) * route[i]);
-    recorder.add(take_homing_view(place, route[i], noise_of_views.next()),
+    recorder.add(capture_homing_view(place, route[i], noise_of_views.next()),
                  inverse(before) * wheels.pose());
   }
   return recorder.finish();
@@ -94,7 +94,7 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
     run.path.push_back(robot.pose());
     run.lateral_m.push_back(simulation::distance_from_route_m(robot.pose().position(), route));
     const ChainDecision decision =
-        follower.decide(take_homing_view(place, robot.pose(), noise_of_views.next()), moved);
+        follower.decide(capture_homing_view(place, robot.pose(), noise_of_views.next()), moved);
     run.state = decision.state;
     if (decision.state != ChainState::following) break;
     const auto direction_rad = robot.find_free_direction(decision.turn_rad, decision.advance_m);
@@ -118,7 +118,7 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
   constexpr std::size_t directions = 2;
   std::vector<SnapshotChain> chains(random_routes.size());
   std::vector<ChainRun> runs(random_routes.size() * directions);
-  executor.for_chunks(
+  executor.for_each_chunk(
       random_routes.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
         for (std::size_t i = begin; i < end; ++i) {
           chains[i] = record_chain(place, random_routes[i], seed + i);

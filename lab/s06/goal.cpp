@@ -23,10 +23,10 @@ class GoalFigures {
       : surveys_(surveys), arena_(surveys.arena()), goal_(goal) {}
 
   [[nodiscard]] const HomingView& home() const {
-    return arena_.homes.views[goal_ * surveys_.goals_every()].view;
+    return arena_.homes.views[goal_ * surveys_.goal_stride()].view;
   }
   [[nodiscard]] Point2 position() const {
-    return arena_.homes.views[goal_ * surveys_.goals_every()].pose.position();
+    return arena_.homes.views[goal_ * surveys_.goal_stride()].pose.position();
   }
   [[nodiscard]] std::vector<double> differences(int highest) const {
     std::vector<double> values;
@@ -173,7 +173,7 @@ std::size_t choose_goal(const HomingSurvey& survey) {
 // Draws figure 9.
 void draw_vectors(GoalFigures& figures, Reproduction& result) {
   const auto differences = figures.differences(5);
-  const auto ends = figures.compute_final_distances(published_strategy({5}));
+  const auto ends = figures.compute_final_distances(make_published_strategy({5}));
   add_plot(result, "figure_09_vectors.svg",
            "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
            "similar "
@@ -191,7 +191,7 @@ void draw_stages(GoalFigures& figures, Reproduction& result) {
   for (const int highest : {2, 4, 10}) {
     const std::string k = "K = " + std::to_string(highest);
     const auto differences = figures.differences(highest);
-    const auto ends = figures.compute_final_distances(published_strategy({highest}));
+    const auto ends = figures.compute_final_distances(make_published_strategy({highest}));
     panels.push_back(make_map(
         k + ": image difference, home vectors", figures.shade_cells(differences, difference_limits),
         figures.draw_home_vectors(published_homing_options(highest, s06_iterations)),
@@ -210,7 +210,7 @@ void draw_stages(GoalFigures& figures, Reproduction& result) {
 void draw_catchments_by_rule(GoalFigures& figures, Reproduction& result) {
   std::vector<viewer::MapPlot> panels;
   for (const HomingStrategy& strategy :
-       {published_strategy({2, 4, 10}), own_strategy(), expected_image_strategy()}) {
+       {make_published_strategy({2, 4, 10}), make_own_strategy(), make_expected_image_strategy()}) {
     const auto ends = figures.compute_final_distances(strategy);
     panels.push_back(make_map(strategy.label, figures.shade_cells(ends, distance_limits),
                               figures.outline_catchment(ends), figures.mark_goal()));

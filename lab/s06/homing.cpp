@@ -52,7 +52,7 @@ void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& resu
           "K = " + std::to_string(highest) + ", N + 1 = " + std::to_string(iterations + 1);
       const HomingSurvey survey =
           survey_arena(surveys.arena(), published_homing_options(highest, iterations), executor,
-                       2 * surveys.goals_every());
+                       2 * surveys.goal_stride());
       by_iterations.series.push_back(make_homeward_series(label, survey, spacing_m));
     }
   }
@@ -119,9 +119,9 @@ viewer::Series make_no_run_series(const HomingSurvey& survey) {
 void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
   viewer::LinePlot single = make_area_plot("Catchment area, one K, 3 solutions a vector");
   for (const int highest : {1, 2, 3, 5, 10}) {
-    single.series.push_back(make_area_series(surveys, published_strategy({highest})));
+    single.series.push_back(make_area_series(surveys, make_published_strategy({highest})));
   }
-  single.series.push_back(make_area_series(surveys, expected_image_strategy()));
+  single.series.push_back(make_area_series(surveys, make_expected_image_strategy()));
   single.series.push_back(make_no_run_series(surveys.survey_expected_images()));
   add_plot(result, "figure_11_areas.svg",
            "[S06] figure 11: mean number of places from which runs end near the goal.", single);
@@ -129,10 +129,10 @@ void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
   viewer::LinePlot staged = make_area_plot("Catchment area, K rising in stages");
   const std::vector<std::vector<int>> sequences{{2}, {2, 4}, {2, 4, 10}, {1, 2, 4, 10}, {10, 4, 2}};
   for (const auto& sequence : sequences) {
-    staged.series.push_back(make_area_series(surveys, published_strategy(sequence)));
+    staged.series.push_back(make_area_series(surveys, make_published_strategy(sequence)));
   }
-  staged.series.push_back(make_area_series(surveys, expected_image_strategy()));
-  staged.series.push_back(make_area_series(surveys, own_strategy()));
+  staged.series.push_back(make_area_series(surveys, make_expected_image_strategy()));
+  staged.series.push_back(make_area_series(surveys, make_own_strategy()));
   add_plot(result, "figure_13_stages.svg",
            "[S06] figure 13: the same when more frequencies count where homing stops, and our rule "
            "in its stages.",
@@ -150,7 +150,7 @@ void draw_iterations(ArenaSurveys& surveys, Executor& executor, Reproduction& re
     for (const int solutions : {1, 2, 3, 5, 8}) {
       const HomingSurvey survey =
           survey_arena(surveys.arena(), published_homing_options(highest, solutions - 1), executor,
-                       4 * surveys.goals_every());
+                       4 * surveys.goal_stride());
       const HomingSurvey* const stage = &survey;
       series.add(solutions,
                  mean_catchment_areas(

@@ -39,8 +39,8 @@ struct ArenaExperiments : Experiments {
   }
 
   CatchmentAreas measure_further_arena(const Arena& arena) const {
-    ArenaSurveys of_arena(arena, static_cast<std::size_t>(options.goals_every_further), executor);
-    return measure_catchment_areas(of_arena);
+    ArenaSurveys surveys(arena, static_cast<std::size_t>(options.goals_every_further), executor);
+    return measure_catchment_areas(surveys);
   }
 
   void add_variant(int number) {

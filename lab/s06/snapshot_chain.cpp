@@ -73,7 +73,7 @@ double bytes_per_metre(const SnapshotChain& chain) noexcept {
 ChainRecorder::ChainRecorder(double max_spacing_m) : max_spacing_m_(max_spacing_m) {}
 
 // True if homing works between the last snapshot and `candidate`, the most recent stored view.
-bool ChainRecorder::can_home_between(const StoredView& candidate) const {
+bool ChainRecorder::can_home_to_and_from(const StoredView& candidate) const {
   const auto agrees = [](const StoredView& from, const StoredView& to) {
     return agrees_with_odometry(from.view, to.view,
                                 inverse(from.snapshot_from_this) * to.snapshot_from_this);
@@ -91,45 +91,45 @@ std::size_t ChainRecorder::add(const HomingView& view, const Pose2& moved) {
     return 1;
   }
   snapshot_from_robot_ = snapshot_from_robot_ * moved;
-  way_m_ += length(moved);
-  if (way_m_ - stored_views_.back().way_m < view_spacing_m) return chain_.size();
+  segment_length_m_ += length(moved);
+  if (segment_length_m_ - stored_views_.back().path_m < view_spacing_m) return chain_.size();
 
-  stored_views_.push_back({view, snapshot_from_robot_, way_m_});
-  const bool too_far = way_m_ > max_spacing_m_;
-  if (!too_far && can_home_between(stored_views_.back())) return chain_.size();
+  stored_views_.push_back({view, snapshot_from_robot_, segment_length_m_});
+  const bool too_far = segment_length_m_ > max_spacing_m_;
+  if (!too_far && can_home_to_and_from(stored_views_.back())) return chain_.size();
   // Take the farthest stored view within a fraction of the distance over which homing worked, but
   // at least `min_spacing_m`.
-  const double reachable_m = stored_views_[stored_views_.size() - 2].way_m;
-  const double max_way_m =
+  const double reachable_m = stored_views_[stored_views_.size() - 2].path_m;
+  const double max_path_m =
       std::max(too_far ? reachable_m : spacing_factor * reachable_m, min_spacing_m);
   std::size_t chosen = 0;
-  for (std::size_t i = 1; i < stored_views_.size() && stored_views_[i].way_m <= max_way_m; ++i)
+  for (std::size_t i = 1; i < stored_views_.size() && stored_views_[i].path_m <= max_path_m; ++i)
     chosen = i;
-  if (chosen == 0 && way_m_ >= min_spacing_m) chosen = 1;
+  if (chosen == 0 && segment_length_m_ >= min_spacing_m) chosen = 1;
   if (chosen > 0) take_snapshot(chosen);
   return chain_.size();
 }
 
 void ChainRecorder::take_snapshot(std::size_t index) {
   const Pose2 old_from_new = stored_views_[index].snapshot_from_this;
-  const double way_m = stored_views_[index].way_m;
-  chain_.push_back({stored_views_[index].view, chain_.back().travelled_m + way_m, old_from_new});
+  const double path_m = stored_views_[index].path_m;
+  chain_.push_back({stored_views_[index].view, chain_.back().travelled_m + path_m, old_from_new});
   stored_views_.erase(stored_views_.begin(),
                       stored_views_.begin() + static_cast<std::ptrdiff_t>(index));
   const Pose2 new_from_old = inverse(old_from_new);
   for (StoredView& view : stored_views_) {
     view.snapshot_from_this = new_from_old * view.snapshot_from_this;
-    view.way_m -= way_m;
+    view.path_m -= path_m;
   }
   snapshot_from_robot_ = new_from_old * snapshot_from_robot_;
-  way_m_ -= way_m;
+  segment_length_m_ -= path_m;
 }
 
 SnapshotChain ChainRecorder::finish() const {
   SnapshotChain chain = chain_;
   if (stored_views_.size() > 1) {
     const StoredView& last = stored_views_.back();
-    chain.push_back({last.view, chain.back().travelled_m + last.way_m, last.snapshot_from_this});
+    chain.push_back({last.view, chain.back().travelled_m + last.path_m, last.snapshot_from_this});
   }
   return chain;
 }
@@ -156,8 +156,9 @@ void ChainFollower::aim_at_next(const Pose2& target_from_robot) {
   target_from_robot_ = inverse(target_from_next) * target_from_robot;
   target_ = next_snapshot(*target_);
   steps_to_target_ = 0;
-  way_m_ = length(*target_from_robot_);
-  max_steps_to_target_ = 3 + 3 * static_cast<int>(std::ceil(way_m_ / pursuit_options_.max_step_m));
+  segment_length_m_ = length(*target_from_robot_);
+  max_steps_to_target_ =
+      3 + 3 * static_cast<int>(std::ceil(segment_length_m_ / pursuit_options_.max_step_m));
 }
 
 bool ChainFollower::contradicts_odometry(const HomeVector& vector) const noexcept {
@@ -197,7 +198,7 @@ bool ChainFollower::aim_at_next_if_reached(const HomingView& current, const Home
   const bool contradicts = contradicts_odometry(vector);
   const bool plausible =
       !target_from_robot_ ||
-      (!contradicts && length(*target_from_robot_) <= std::max(near_m, 0.5 * way_m_));
+      (!contradicts && length(*target_from_robot_) <= std::max(near_m, 0.5 * segment_length_m_));
   const bool is_near = plausible && vector.length() < max_near_vector_length;
   const bool passed = plausible && !is_near &&
                       image_difference(chain_[next_snapshot(*target_)].view, current) <

@@ -61,9 +61,9 @@ class ChainRecorder {
   struct StoredView {
     HomingView view;
     Pose2 snapshot_from_this;
-    double way_m = 0.0;  // distance driven since the snapshot
+    double path_m = 0.0;  // distance driven since the snapshot
   };
-  [[nodiscard]] bool can_home_between(const StoredView& candidate) const;
+  [[nodiscard]] bool can_home_to_and_from(const StoredView& candidate) const;
   void take_snapshot(std::size_t index);
 
   double max_spacing_m_;
@@ -71,7 +71,7 @@ class ChainRecorder {
   std::vector<StoredView> stored_views_;  // the first element is the last snapshot itself
   // Pose and distance driven since the last snapshot, also after views that are not stored.
   Pose2 snapshot_from_robot_;
-  double way_m_ = 0.0;
+  double segment_length_m_ = 0.0;
 };
 
 enum class ChainDirection { forward, back };
@@ -125,7 +125,7 @@ class ChainFollower {
   HomingPursuitOptions pursuit_options_;
   std::optional<std::size_t> target_;       // nullopt before the first view
   std::optional<Pose2> target_from_robot_;  // by odometry; nullopt until a snapshot is reached
-  double way_m_ = 0.0;                      // distance to the target when it was chosen
+  double segment_length_m_ = 0.0;           // distance to the target when it was chosen
   int steps_to_target_ = 0;
   int max_steps_to_target_ = 0;
   double unseen_distance_m_ = 0.0;  // distance driven since the last snapshot that was reached

@@ -18,22 +18,22 @@ std::string join_numbers(std::span<const int> numbers) {
 
 }  // namespace
 
-HomingStrategy published_strategy(std::vector<int> highest) {
+HomingStrategy make_published_strategy(std::vector<int> highest) {
   std::string label = "K = " + join_numbers(highest);
   return {std::move(label), HomingStrategy::Rule::published, std::move(highest)};
 }
 
-HomingStrategy own_strategy() {
+HomingStrategy make_own_strategy() {
   return {"our rule", HomingStrategy::Rule::own, {}};
 }
 
-HomingStrategy expected_image_strategy() {
+HomingStrategy make_expected_image_strategy() {
   return {"expected images", HomingStrategy::Rule::expected_images, {}};
 }
 
-ArenaSurveys::ArenaSurveys(const Arena& arena, std::size_t goals_every, Executor& executor)
+ArenaSurveys::ArenaSurveys(const Arena& arena, std::size_t goal_stride, Executor& executor)
     : arena_(arena),
-      goal_stride_(goals_every),
+      goal_stride_(goal_stride),
       executor_(executor),
       expected_image_homing_(s06_columns) {}
 
@@ -59,7 +59,8 @@ const HomingSurvey& ArenaSurveys::survey_own_without_search(int highest) {
   const auto rule = [&](std::size_t goal, std::size_t place) {
     const HomingView& home = arena_.homes.views[goal].view;
     const HomingView& current = arena_.currents.views[place].view;
-    const bool is_similar = image_difference(home, current, own_highest) < s06_similar_difference;
+    const bool is_similar =
+        image_difference(home, current, own_highest) < s06_max_similar_difference;
     return home_vector_unchecked(home, current, is_similar ? fine : coarse);
   };
   return survey("own again " + std::to_string(highest), HomingRule(rule));

@@ -22,7 +22,7 @@ inline constexpr std::array<double, 3> s06_accepted_m{0.025, 0.05, 0.1};
 inline constexpr int s06_iterations = 2;
 
 /// Image difference at K = 10 below which a view is similar to home.
-inline constexpr double s06_similar_difference = 0.1;
+inline constexpr double s06_max_similar_difference = 0.1;
 
 /// A homing strategy: a sequence of rules; whenever homing stops, the next rule continues.
 struct HomingStrategy {
@@ -31,22 +31,22 @@ struct HomingStrategy {
   Rule rule = Rule::published;
   std::vector<int> highest;  ///< K of each stage; only for the published rule
 };
-[[nodiscard]] HomingStrategy published_strategy(std::vector<int> highest);
+[[nodiscard]] HomingStrategy make_published_strategy(std::vector<int> highest);
 /// Returns our strategy: home vectors with default options and K = 10; then, where runs stop at a
 /// place that is not similar to home, three rounds of coarse to fine without displacement search;
 /// finally the default options again. A place is similar to home below an image difference of
-/// `s06_similar_difference`. Chosen on arenas of seeds 1 to 4.
-[[nodiscard]] HomingStrategy own_strategy();
-[[nodiscard]] HomingStrategy expected_image_strategy();
+/// `s06_max_similar_difference`. Chosen on arenas of seeds 1 to 4.
+[[nodiscard]] HomingStrategy make_own_strategy();
+[[nodiscard]] HomingStrategy make_expected_image_strategy();
 
 /// The surveys of one arena, computed on first use and cached.
 class ArenaSurveys {
  public:
   /// Refers to the arena and the executor, which must outlive this object.
-  ArenaSurveys(const Arena& arena, std::size_t goals_every, Executor& executor);
+  ArenaSurveys(const Arena& arena, std::size_t goal_stride, Executor& executor);
 
   [[nodiscard]] const Arena& arena() const noexcept { return arena_; }
-  [[nodiscard]] std::size_t goals_every() const noexcept { return goal_stride_; }
+  [[nodiscard]] std::size_t goal_stride() const noexcept { return goal_stride_; }
   [[nodiscard]] const HomingSurvey& survey_published(int highest, int iterations = s06_iterations);
   /// Surveys home vectors with default options and K = `highest`.
   [[nodiscard]] const HomingSurvey& survey_own(int highest);

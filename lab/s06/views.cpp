@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "lab/baselines/turn_products.hpp"
+#include "lab/baselines/rotation_products.hpp"
 #include "lab/rows.hpp"
 #include "lab/s06/support.hpp"
 #include "panonav/core/error.hpp"
@@ -188,7 +188,7 @@ PairSums sum_pairs(const Arena& arena, std::size_t curves, Executor& executor, F
   const auto& currents = arena.currents.views;
   constexpr std::size_t chunk = 64;
   std::vector<PairSums> parts((homes.size() + chunk - 1) / chunk, PairSums(curves));
-  executor.for_chunks(
+  executor.for_each_chunk(
       homes.size(), chunk, [&](std::size_t begin, std::size_t end, std::size_t number) {
         PairSums& part = parts[number];
         CurveValues pair_values(curves);
@@ -213,13 +213,13 @@ PairSums sum_pairs(const Arena& arena, std::size_t curves, Executor& executor, F
 
 // Makes a curve against the distance, from bins with at least 100 pairs.
 template <typename Value>
-viewer::Series make_curve_by_distance(const Arena& arena, const PairSums& sums, double farthest_m,
-                                      const Value& value) {
+viewer::Series make_curve_by_distance(const Arena& arena, const PairSums& sums,
+                                      double max_distance_m, const Value& value) {
   viewer::Series series;
   for (std::size_t i = 0; i < PairSums::bins; ++i) {
     if (sums.pairs[i] < 100.0) continue;
     const double x = static_cast<double>(i) * arena.options.spacing_m;
-    if (x > farthest_m) break;
+    if (x > max_distance_m) break;
     series.add(x, value(i));
   }
   return series;
@@ -296,9 +296,9 @@ std::vector<std::vector<std::uint8_t>> find_best_shifts(const Arena& arena, Exec
     for (const float value : row) row_mean += static_cast<double>(value) / s06_columns;
     for (const float value : row) rows.push_back(value - static_cast<float>(row_mean));
   }
-  const std::size_t stride = turn_products_stride(s06_columns);
+  const std::size_t stride = rotation_products_stride(s06_columns);
   std::vector<std::vector<std::uint8_t>> shifts(arena.homes.rows.size());
-  executor.for_chunks(shifts.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
+  executor.for_each_chunk(shifts.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
     std::vector<float> periodic(s06_columns + stride);
     std::vector<float> products(currents.size() * stride);
     std::vector<float> largest(currents.size());
@@ -306,7 +306,8 @@ std::vector<std::vector<std::uint8_t>> find_best_shifts(const Arena& arena, Exec
       for (std::size_t i = 0; i < periodic.size(); ++i) {
         periodic[i] = arena.homes.rows[g][i % s06_columns];
       }
-      turn_products(rows, s06_columns, periodic, products, largest, kernels::chosen_instructions());
+      compute_rotation_products(rows, s06_columns, periodic, products, largest,
+                                kernels::chosen_instructions());
       for (std::size_t p = 0; p < currents.size(); ++p) {
         const float* const row = products.data() + p * stride;
         shifts[g].push_back(

@@ -158,7 +158,7 @@ class LabResults {
     }
     goal_cm_.push_back(100.0 * variant.goal.error_m);
     arrived_ += variant.goal.arrived ? 1 : 0;
-    changed_percent_.push_back(100.0 * lab.changed_share);
+    changed_percent_.push_back(100.0 * lab.changed_fraction);
     const auto time_ms = [&](const auto& route) {
       return measure_fit_ms(lab.across,
                             [&](const std::vector<float>& line, const Pose2& predicted) {
@@ -183,8 +183,8 @@ class LabResults {
              "%", changed_percent_);
     report_method("changed.fit", moved + ", direct fit with masking", at_most(0.8),
                   published_moved_);
-    report_change_reports("before", "scene as memorised", errors_.at("straight.fit"));
-    report_change_reports("after", "things moved; the first four of a drive cannot be",
+    report_changed_images("before", "scene as memorised", errors_.at("straight.fit"));
+    report_changed_images("after", "things moved; the first four of a drive cannot be",
                           errors_.at("changed.fit"));
     report_method("changed.plain", moved + ", direct fit without masking", std::nullopt,
                   published_moved_);
@@ -211,7 +211,7 @@ class LabResults {
       spacings_m.push_back(lab_spacing_m * static_cast<double>(every));
     }
     draw_sweep("spacing", spacings_m, "Way between the lines, direct fit", "way between lines [cm]",
-               "direct fit", "Error against the way between memorised lines.");
+               "direct fit", "Error against the distance between memorised lines.");
     draw_sweep("offset", lateral_offsets_m, "Distance from the path, direct fit",
                "distance from the path [cm]", "direct fit",
                "Error of drives parallel to the path.");
@@ -247,7 +247,7 @@ class LabResults {
              errors.images());
   }
 
-  void report_change_reports(const std::string& id, const std::string& scene,
+  void report_changed_images(const std::string& id, const std::string& scene,
                              const MethodErrors& errors) const {
     add_rate(result_, "y03.changed.named." + id,
              "images in which something is named as changed, " + scene, errors.changed,
@@ -287,7 +287,7 @@ class LabResults {
 }  // namespace
 
 void RouteExperiments::reproduce_lab_drives() const {
-  LabResults measures(options, result);
+  LabResults results(options, result);
   // Process a few variants at a time: all threads render each variant, then variants are evaluated
   // in parallel.
   constexpr int batch = 4;
@@ -302,7 +302,7 @@ void RouteExperiments::reproduce_lab_drives() const {
       return localise_drives(labs[i], begin + static_cast<int>(i) < options.swept);
     });
     // Add results sequentially, because `add` measures run times.
-    for (std::size_t i = 0; i < labs.size(); ++i) measures.add(labs[i], variants[i]);
+    for (std::size_t i = 0; i < labs.size(); ++i) results.add(labs[i], variants[i]);
     if (begin > 0) continue;
     const auto& drives = variants[0].drives;
     draw_route_panorama(labs[0], result);
@@ -313,8 +313,8 @@ void RouteExperiments::reproduce_lab_drives() const {
                 result);
     draw_goal_run(labs[0], variants[0].goal, result);
   }
-  measures.report();
-  measures.draw_sweeps();
+  results.report();
+  results.draw_sweeps();
 }
 
 }  // namespace panonav::lab

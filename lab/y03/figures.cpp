@@ -62,7 +62,7 @@ viewer::PicturePlot make_panorama_plot(const LabRoute& lab, const std::string& t
   const auto columns = static_cast<std::size_t>(lab.route.columns());
   viewer::PicturePlot plot{.title = title,
                            .x_label = "azimuth from straight ahead [degrees], left positive",
-                           .y_label = "way along the path [m]",
+                           .y_label = "distance along the path [m]",
                            .x_range = {180.0, -180.0},
                            .y_range = {0.0, lab.route.length_m()},
                            .columns = lab.route.columns(),
@@ -90,9 +90,9 @@ void draw_route_panorama(const LabRoute& lab, Reproduction& result) {
            make_panorama_plot(lab, "Route panorama: each row is the horizon at one place"));
 }
 
-void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproduction& result) {
-  const std::size_t middle = beside.truth.size() / 2;
-  const Pose2& pose = beside.truth[middle];
+void draw_virtual_view(const LabRoute& lab, const LineDrive& lateral_drive, Reproduction& result) {
+  const std::size_t middle = lateral_drive.truth.size() / 2;
+  const Pose2& pose = lateral_drive.truth[middle];
   const Pose2 in_path = inverse(lab.world_from_path) * pose;
   const auto columns = static_cast<std::size_t>(lab.route.columns());
   std::vector<RouteCrossing> crossings(columns);
@@ -129,7 +129,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproductio
   for (std::size_t i = 0; i < columns; ++i) {
     const std::size_t c = shown_column(i, columns);
     const double azimuth = 180.0 - 360.0 * static_cast<double>(i) / static_cast<double>(columns);
-    truth.add(azimuth, static_cast<double>(beside.lines[middle][c]));
+    truth.add(azimuth, static_cast<double>(lateral_drive.lines[middle][c]));
     if (!std::isfinite(shown[c])) continue;
     synthesised.add(azimuth, static_cast<double>(shown[c]));
   }

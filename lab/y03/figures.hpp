@@ -13,9 +13,9 @@ namespace panonav::lab {
 /// Draws figure 3: the route panorama of the path.
 void draw_route_panorama(const LabRoute& lab, Reproduction& result);
 /// Draws figure 5: the positions in the route panorama of the lines of sight from a viewpoint next
-/// to the path, and the line synthesised there with the true one. `beside` is the drive that passes
-/// the viewpoint.
-void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproduction& result);
+/// to the path, and the line synthesised there with the true one. `lateral_drive` is the drive that
+/// passes the viewpoint.
+void draw_virtual_view(const LabRoute& lab, const LineDrive& lateral_drive, Reproduction& result);
 
 /// The drives across the path, localised by two methods in two scenes.
 struct LocalisedDrives {

@@ -30,19 +30,20 @@ constexpr double min_changed_fraction = 0.05;
 constexpr double max_changed_fraction = 0.15;
 constexpr double target_changed_fraction = 0.1;
 
-std::vector<std::vector<float>> take_lines(const simulation::Renderer& renderer,
-                                           const std::vector<Pose2>& poses,
-                                           const simulation::LineCamera& camera, std::uint64_t seed,
-                                           Executor& executor) {
+std::vector<std::vector<float>> capture_lines(const simulation::Renderer& renderer,
+                                              const std::vector<Pose2>& poses,
+                                              const simulation::LineCamera& camera,
+                                              std::uint64_t seed, Executor& executor) {
   return simulation::make_each(executor, poses.size(), [&](std::size_t i) {
-    return simulation::take_line(renderer, poses[i], camera, Random(seed, i).next());
+    return simulation::capture_line(renderer, poses[i], camera, Random(seed, i).next());
   });
 }
 
-LineDrive take_drive(const simulation::Renderer& renderer, std::vector<Pose2> poses,
-                     const simulation::LineCamera& camera, std::uint64_t seed, Executor& executor) {
+LineDrive simulate_line_drive(const simulation::Renderer& renderer, std::vector<Pose2> poses,
+                              const simulation::LineCamera& camera, std::uint64_t seed,
+                              Executor& executor) {
   LineDrive drive;
-  drive.lines = take_lines(renderer, poses, camera, seed, executor);
+  drive.lines = capture_lines(renderer, poses, camera, seed, executor);
   const auto odometry = simulation::simulate_odometry(poses, {}, seed);
   drive.steps.emplace_back();
   for (std::size_t i = 1; i < odometry.size(); ++i) {
@@ -102,21 +103,22 @@ DriveErrors track_drive(const LineDrive& drive, const Fit& fit) {
 
 struct ChangedLab {
   std::unique_ptr<simulation::Renderer> renderer;
-  double share = 0.0;
+  double fraction = 0.0;
 };
 
 // Returns the fraction of the directions in which two scenes differ by more than 5 of 255 grey
 // levels without noise, at start, middle and end of a drive.
-double changed_share(const simulation::Renderer& before, const simulation::Renderer& after,
-                     const std::vector<Pose2>& drive, simulation::LineCamera camera) {
+double measure_changed_fraction(const simulation::Renderer& before,
+                                const simulation::Renderer& after, const std::vector<Pose2>& drive,
+                                simulation::LineCamera camera) {
   camera.sensor.read_noise = 0.0;
   camera.sensor.full_well = 1e9;
   constexpr float max_unchanged_difference = 5.0F / 255.0F;
   std::size_t changed = 0;
   std::size_t all = 0;
   for (const std::size_t i : {std::size_t{0}, drive.size() / 2, drive.size() - 1}) {
-    const auto a = simulation::take_line(before, drive[i], camera, 0);
-    const auto b = simulation::take_line(after, drive[i], camera, 0);
+    const auto a = simulation::capture_line(before, drive[i], camera, 0);
+    const auto b = simulation::capture_line(after, drive[i], camera, 0);
     for (std::size_t c = 0; c < a.size(); ++c) {
       changed += std::abs(a[c] - b[c]) > max_unchanged_difference ? 1 : 0;
       ++all;
@@ -139,12 +141,12 @@ ChangedLab change_lab(std::uint64_t seed, const simulation::Renderer& before,
                                        .moved_seed = seed + 1 + 1000 * trial});
     auto after =
         std::make_unique<simulation::Renderer>(scene, simulation::RendererOptions{}, executor);
-    const double share = changed_share(before, *after, drive, camera);
-    if (!best.renderer || std::abs(share - target_changed_fraction) <
-                              std::abs(best.share - target_changed_fraction)) {
-      best = {std::move(after), share};
+    const double fraction = measure_changed_fraction(before, *after, drive, camera);
+    if (!best.renderer || std::abs(fraction - target_changed_fraction) <
+                              std::abs(best.fraction - target_changed_fraction)) {
+      best = {std::move(after), fraction};
     }
-    if (best.share >= min_changed_fraction && best.share <= max_changed_fraction) break;
+    if (best.fraction >= min_changed_fraction && best.fraction <= max_changed_fraction) break;
   }
   return best;
 }
@@ -167,7 +169,7 @@ LabRoute record_lab_route(std::uint64_t seed, const std::vector<double>& lateral
   const double fallback_x_m = 0.5 * (space.low().x_m + space.high().x_m) - 0.5 * lab_path_m;
   lab.world_from_path = find_path_start(space).value_or(Pose2{fallback_x_m, middle_m, 0.0});
   const auto path = make_straight_path(lab.world_from_path, lab_path_m, lab_spacing_m);
-  const auto lines = take_lines(renderer, path, camera, seed * 7 + 1, executor);
+  const auto lines = capture_lines(renderer, path, camera, seed * 7 + 1, executor);
   for (std::size_t i = 0; i < path.size(); ++i) lab.route.append(path[i], lines[i]);
 
   // The drive is 2 m long and crosses the path in its middle.
@@ -175,14 +177,15 @@ LabRoute record_lab_route(std::uint64_t seed, const std::vector<double>& lateral
   const Pose2 start =
       lab.world_from_path * Pose2{0.5 * lab_path_m, 0.0, turn} * Pose2{-1.0, 0.0, 0.0};
   const auto across = make_straight_path(start, 2.0, drive_step_m);
-  lab.across = take_drive(renderer, across, camera, seed * 7 + 2, executor);
+  lab.across = simulate_line_drive(renderer, across, camera, seed * 7 + 2, executor);
   const ChangedLab changed = change_lab(seed, renderer, across, camera, executor);
-  lab.across_changed = take_drive(*changed.renderer, across, camera, seed * 7 + 3, executor);
-  lab.changed_share = changed.share;
+  lab.across_changed =
+      simulate_line_drive(*changed.renderer, across, camera, seed * 7 + 3, executor);
+  lab.changed_fraction = changed.fraction;
   for (std::size_t i = 0; i < lateral_m.size(); ++i) {
     const Pose2 begin = lab.world_from_path * Pose2{0.3 * lab_path_m, lateral_m[i], 0.0};
-    lab.lateral_drives.push_back(take_drive(renderer, make_straight_path(begin, 1.8, 0.2), camera,
-                                            seed * 7 + 4 + i, executor));
+    lab.lateral_drives.push_back(simulate_line_drive(renderer, make_straight_path(begin, 1.8, 0.2),
+                                                     camera, seed * 7 + 4 + i, executor));
   }
   return lab;
 }
@@ -249,7 +252,7 @@ GoalRun run_to_goals(const LabRoute& lab, const RouteLines& lines, std::uint64_t
   Pose2 step;
   for (int i = 0; i < max_steps; ++i) {
     estimate = estimate * step;
-    const auto line = simulation::take_line(*lab.renderer, robot, camera, random.next());
+    const auto line = simulation::capture_line(*lab.renderer, robot, camera, random.next());
     if (const auto fix = lines.fit(line, estimate)) estimate = fix->pose;
     run.truth.push_back(robot);
     run.estimate.push_back(estimate);

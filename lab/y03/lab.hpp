@@ -33,7 +33,7 @@ struct LabRoute {
   RoutePanorama route;    ///< in the world's frame
   LineDrive across;
   LineDrive across_changed;
-  double changed_share = 0.0;             ///< share of the directions in which objects changed
+  double changed_fraction = 0.0;          ///< share of the directions in which objects changed
   std::vector<LineDrive> lateral_drives;  ///< parallel to the path, one per lateral offset
 };
 

@@ -40,7 +40,7 @@ constexpr int runs_per_route = 10;  // per route, every second one backwards
 
 // A route, its panorama and the runs that repeated it.
 struct RepeatedRoute {
-  std::vector<Pose2> way;
+  std::vector<Pose2> poses;
   RoutePanorama panorama;
   std::vector<RouteRun> runs;
 };
@@ -48,8 +48,8 @@ struct RepeatedRoute {
 RepeatedRoute record_and_repeat_route(const RouteScene& place, int runs, std::uint64_t seed,
                                       Executor& executor) {
   RepeatedRoute repeated;
-  repeated.way = plan_curved_route(place, long_route_m, spacing_m, seed);
-  repeated.panorama = record_route(place, repeated.way, Random(seed, 7).next(), executor);
+  repeated.poses = plan_curved_route(place, long_route_m, spacing_m, seed);
+  repeated.panorama = record_route(place, repeated.poses, Random(seed, 7).next(), executor);
   const RouteTracker tracker(repeated.panorama);
   repeated.runs =
       simulation::make_each(executor, static_cast<std::size_t>(runs), [&](std::size_t i) {
@@ -112,11 +112,11 @@ void report_routes(const ReproductionOptions& options, const std::string& name,
   add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
            results.obstacle_steps, results.lines);
   viewer::MapPlot map{.title = first_place.name, .layers = viewer::scene_layers(first_place.scene)};
-  std::ranges::move(make_route_layers(routes.front().way, routes.front().runs),
+  std::ranges::move(make_route_layers(routes.front().poses, routes.front().runs),
                     std::back_inserter(map.layers));
   add_plot(result, "route_" + name + ".svg",
            "A route of 60 m through " + name +
-               ", recorded once and repeated forward and back; the driven ways lie on it.",
+               ", recorded once and repeated forward and back; the driven paths lie on it.",
            map);
 }
 
@@ -133,7 +133,7 @@ void measure_file(const std::vector<RepeatedRoute>& routes, Reproduction& result
   std::filesystem::remove(path);
   MemoryHeader header;
   header.shape = {1, 1};
-  std::uint64_t empty = 0;
+  std::uint64_t empty_bytes = 0;
   double length_m = 0.0;
   std::uint64_t packed_bytes = 0;
   {
@@ -143,7 +143,7 @@ void measure_file(const std::vector<RepeatedRoute>& routes, Reproduction& result
     unmeasured_route.append({0.0, 0.0, 0.0}, routes.front().panorama.line(0));
     static_cast<void>(file.append_route("none", unmeasured_route));
   }
-  empty = file_bytes(path);
+  empty_bytes = file_bytes(path);
   {
     MemoryFile file = MemoryFile::open(path, Access::read_write);
     for (std::size_t i = 0; i < routes.size(); ++i) {
@@ -159,7 +159,7 @@ void measure_file(const std::vector<RepeatedRoute>& routes, Reproduction& result
   const double megabytes_per_km = 1e-3 / length_m;
   const std::string what = "memory of routes through loop, a line every 10 cm, ";
   add_row(result, "y03.memory.file", what + "by what a memory file grows, a kilometre",
-          megabytes_per_km * static_cast<double>(full_bytes - empty), "MB", at_most(3.6),
+          megabytes_per_km * static_cast<double>(full_bytes - empty_bytes), "MB", at_most(3.6),
           std::pair(3.6, 3.6));
   add_row(result, "y03.memory.packed", what + "packed lines and poses alone, a kilometre",
           megabytes_per_km * static_cast<double>(packed_bytes), "MB");
@@ -209,14 +209,14 @@ void RouteExperiments::reproduce_real_route() const {
     if (!entry.pose) throw FileError((options.data / "sussex_route").string(), "has no positions");
     places.push_back({entry.pose->x_m, entry.pose->y_m});
   }
-  const std::vector<Pose2> way = estimate_headings(places);
+  const std::vector<Pose2> poses = estimate_headings(places);
   constexpr std::size_t every = 10;
   RoutePanorama route;
-  for (std::size_t i = 0; i < way.size(); i += every) {
-    static_cast<void>(route.append(way[i], std::span<const float>(lines[i])));
+  for (std::size_t i = 0; i < poses.size(); i += every) {
+    static_cast<void>(route.append(poses[i], std::span<const float>(lines[i])));
   }
   const RouteTracker tracker(route);
-  const auto found = simulation::make_each(executor, way.size(), [&](std::size_t i) {
+  const auto found = simulation::make_each(executor, poses.size(), [&](std::size_t i) {
     return i % every != 0 ? tracker.search(lines[i]) : std::nullopt;
   });
   std::vector<double> along_error_cm;
@@ -224,7 +224,7 @@ void RouteExperiments::reproduce_real_route() const {
   std::size_t queries = 0;
   viewer::MapLayer right{.label = "fixes", .colour = viewer::PlotColour::blue};
   viewer::MapLayer remembered{.label = "remembered lines", .colour = viewer::PlotColour::black};
-  for (std::size_t i = 0; i < way.size(); ++i) {
+  for (std::size_t i = 0; i < poses.size(); ++i) {
     if (i % every == 0) {
       remembered.circles.push_back(places[i]);
       continue;
@@ -245,7 +245,7 @@ void RouteExperiments::reproduce_real_route() const {
   add_rate(result, "y03.sussex.found", what + ": found on the route", along_error_cm.size(),
            queries);
   viewer::MapLayer driven{
-      .label = "driven way", .colour = viewer::PlotColour::grey, .lines = {places}};
+      .label = "driven path", .colour = viewer::PlotColour::grey, .lines = {places}};
   add_plot(
       result, "sussex_route.svg",
       "A real route outdoors: where each picture between the remembered lines was found, without "

@@ -308,7 +308,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
   }
   const auto edges = compute_slopes(smooth_line(line, smoothing_deg * columns_ / 360.0));
   std::vector<bool> joined;
-  RouteContourFix fix = place_contours(edges, predicted, joined);
+  RouteContourFix fix = initialise_contours(edges, predicted, joined);
   if (fix.columns.size() < min_points) return std::nullopt;
   converge(fix, edges, joined);
   std::size_t met = 0;
@@ -323,8 +323,9 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
 // Places the control points of both contours, `margin_m` ahead of and behind the predicted curve.
 // `joined` states for each control point whether it is on the same side of the path as the previous
 // one.
-RouteContourFix RouteContours::place_contours(std::span<const float> edges, const Pose2& predicted,
-                                              std::vector<bool>& joined) const {
+RouteContourFix RouteContours::initialise_contours(std::span<const float> edges,
+                                                   const Pose2& predicted,
+                                                   std::vector<bool>& joined) const {
   const auto crossings = predict_curve(predicted.position());
   const double turn = predicted.heading_rad * columns_ / (2.0 * std::numbers::pi);
   const auto size = static_cast<long long>(columns_);

@@ -58,8 +58,9 @@ class RouteContours {
   [[nodiscard]] std::vector<RouteCrossing> predict_curve(Point2 viewpoint) const;
   [[nodiscard]] double pair_energy(const ContourPoint& before, const ContourPoint& at,
                                    double interval, bool joined, double next_slope) const;
-  [[nodiscard]] RouteContourFix place_contours(std::span<const float> edges, const Pose2& predicted,
-                                               std::vector<bool>& joined) const;
+  [[nodiscard]] RouteContourFix initialise_contours(std::span<const float> edges,
+                                                    const Pose2& predicted,
+                                                    std::vector<bool>& joined) const;
   void converge(RouteContourFix& fix, std::span<const float> edges,
                 const std::vector<bool>& joined) const;
   [[nodiscard]] std::vector<Term> make_path_terms(const RouteContourFix& fix) const;

@@ -37,15 +37,15 @@ simulation::FreeSpace make_wide_free_space(const RouteScene& place) {
 }
 
 // Returns the path with each position replaced by the mean of up to `reach` positions on each side.
-std::vector<Pose2> smooth_path(const std::vector<Pose2>& way, std::size_t reach) {
-  std::vector<Pose2> result = way;
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    const std::size_t half = std::min({reach, i, way.size() - 1 - i});
+std::vector<Pose2> smooth_path(const std::vector<Pose2>& poses, std::size_t reach) {
+  std::vector<Pose2> result = poses;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::size_t half = std::min({reach, i, poses.size() - 1 - i});
     double x = 0.0;
     double y = 0.0;
     for (std::size_t j = i - half; j <= i + half; ++j) {
-      x += way[j].x_m;
-      y += way[j].y_m;
+      x += poses[j].x_m;
+      y += poses[j].y_m;
     }
     const auto n = static_cast<double>(2 * half + 1);
     result[i] = {x / n, y / n, 0.0};
@@ -62,9 +62,9 @@ bool has_clear_line(const RouteScene& place, Point2 from, Point2 to) {
 }
 
 // Returns the smallest clearance of the poses of a path.
-double min_clearance_m(const RouteScene& place, const std::vector<Pose2>& way) {
+double min_clearance_m(const RouteScene& place, const std::vector<Pose2>& poses) {
   double min_m = std::numeric_limits<double>::infinity();
-  for (const Pose2& pose : way) {
+  for (const Pose2& pose : poses) {
     min_m = std::min(min_m, place.free_space->clearance_m(pose.position()));
   }
   return min_m;
@@ -76,20 +76,20 @@ double direction(Point2 from, Point2 to) {
 
 // Returns the distance from the part of the path within 1.5 m of the path length `along_m`; other
 // parts of the route may pass nearby and must not count.
-double distance_from_expected_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
+double distance_from_expected_part_m(Point2 robot, std::span<const Pose2> poses, double along_m) {
   constexpr double reach_m = 1.5;
   std::size_t begin = 0;
-  std::size_t end = way.size();
+  std::size_t end = poses.size();
   double path_m = 0.0;
-  for (std::size_t i = 1; i < way.size(); ++i) {
-    path_m += distance(way[i - 1].position(), way[i].position());
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    path_m += distance(poses[i - 1].position(), poses[i].position());
     if (path_m < along_m - reach_m) begin = i;
     if (path_m > along_m + reach_m) {
       end = i + 1;
       break;
     }
   }
-  return simulation::distance_from_route_m(robot, way.subspan(begin, end - begin));
+  return simulation::distance_from_route_m(robot, poses.subspan(begin, end - begin));
 }
 
 // Samples a start at a lateral offset from the route's start, with a clear straight line to the
@@ -181,28 +181,29 @@ std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m, d
   const double min_kept_clearance_m =
       std::min(min_clearance_m(place, sharp) - cell_m,
                place.scene.robot_radius_m + side_clearance_m - cell_m);
-  std::vector<Pose2> way = sharp;
+  std::vector<Pose2> poses = sharp;
   for (const std::size_t reach : {10U, 7U, 5U, 3U, 2U}) {
     std::vector<Pose2> round = smooth_path(smooth_path(sharp, reach), reach);
     if (min_clearance_m(place, round) < min_kept_clearance_m) continue;
-    way = std::move(round);
+    poses = std::move(round);
     break;
   }
-  way = simulation::resample(way, spacing_m);
+  poses = simulation::resample(poses, spacing_m);
   const auto max_poses = static_cast<std::size_t>(std::floor(length_m / spacing_m)) + 1;
-  if (way.size() > max_poses) way.resize(max_poses);
-  simulation::face_path(way);
-  return way;
+  if (poses.size() > max_poses) poses.resize(max_poses);
+  simulation::face_path(poses);
+  return poses;
 }
 
-RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& way,
+RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& poses,
                            std::uint64_t seed, Executor& executor) {
-  auto lines = simulation::make_each(executor, way.size(), [&](std::size_t i) {
-    return simulation::take_line(*place.renderer, way[i], place.camera, Random(seed, i).next());
+  auto lines = simulation::make_each(executor, poses.size(), [&](std::size_t i) {
+    return simulation::capture_line(*place.renderer, poses[i], place.camera,
+                                    Random(seed, i).next());
   });
   RoutePanorama route(place.camera.line.columns);
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    static_cast<void>(route.append(way[i], std::span<const float>(lines[i])));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    static_cast<void>(route.append(poses[i], std::span<const float>(lines[i])));
   }
   return route;
 }
@@ -216,16 +217,18 @@ Pose2 ScaleErrorWheels::execute(const Pose2& commanded, Random& random) const {
 
 RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const RouteRunOptions& options,
                       std::uint64_t seed) {
-  std::vector<Pose2> way(tracker.lines().poses().begin(), tracker.lines().poses().end());
+  std::vector<Pose2> poses(tracker.lines().poses().begin(), tracker.lines().poses().end());
   if (options.back) {
-    std::ranges::reverse(way);
-    for (Pose2& pose : way) pose.heading_rad = wrap_angle(pose.heading_rad + std::numbers::pi);
+    std::ranges::reverse(poses);
+    for (Pose2& pose : poses) pose.heading_rad = wrap_angle(pose.heading_rad + std::numbers::pi);
   }
-  const std::vector<Point2> path = positions_of(way);
-  const Pose2 start = way.front();
+  const std::vector<Point2> path = positions_of(poses);
+  const Pose2 start = poses.front();
   Random random(seed, 1);
   Random noise_of_lines(seed, 2);
-  const auto scale = [&] { return 1.0 + (random.uniform() < 0.5 ? -1.0 : 1.0) * options.drift; };
+  const auto scale = [&] {
+    return 1.0 + (random.uniform() < 0.5 ? -1.0 : 1.0) * options.wheel_scale_error;
+  };
   ScaleErrorWheels wheels;
   wheels.travel = scale();
   wheels.turn = scale();
@@ -240,11 +243,11 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   int lines_without_fix = 0;
   for (int step = 0; step < max_steps; ++step) {
     const auto line =
-        simulation::take_line(*place.renderer, robot, place.camera, noise_of_lines.next());
+        simulation::capture_line(*place.renderer, robot, place.camera, noise_of_lines.next());
     const auto found = tracker.track(line, commanded);
     run.truth.push_back(robot);
     run.lateral_m.push_back(
-        distance_from_expected_part_m(robot.position(), way, follower.along_m()));
+        distance_from_expected_part_m(robot.position(), poses, follower.along_m()));
     lines_without_fix = found ? 0 : lines_without_fix + 1;
     run.line_fixes.emplace_back();
     if (found) {
@@ -282,14 +285,14 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   return run;
 }
 
-std::vector<viewer::MapLayer> make_route_layers(std::span<const Pose2> way,
+std::vector<viewer::MapLayer> make_route_layers(std::span<const Pose2> poses,
                                                 std::span<const RouteRun> runs) {
-  viewer::MapLayer route{.label = "remembered route",
-                         .colour = viewer::PlotColour::black,
-                         .lines = {positions_of(way)}};
+  viewer::MapLayer route{
+      .label = "stored route", .colour = viewer::PlotColour::black, .lines = {positions_of(poses)}};
   viewer::MapLayer forward{.label = "driven forward", .colour = viewer::PlotColour::blue};
   viewer::MapLayer back{.label = "driven back", .colour = viewer::PlotColour::green};
-  viewer::MapLayer starts{.label = "starts, 0.3 m off", .colour = viewer::PlotColour::orange};
+  viewer::MapLayer starts{.label = "starts, 0.3 m beside the route",
+                          .colour = viewer::PlotColour::orange};
   viewer::MapLayer lost{.label = "lost", .colour = viewer::PlotColour::vermilion};
   for (std::size_t i = 0; i < runs.size(); ++i) {
     (i % 2 == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));

@@ -33,7 +33,7 @@ struct RouteScene : simulation::SimulatedPlace {
                                                    double spacing_m, std::uint64_t seed);
 
 /// Records the route panorama of the lines that a robot sees along a path.
-[[nodiscard]] RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& way,
+[[nodiscard]] RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& poses,
                                          std::uint64_t seed, Executor& executor);
 
 /// Wheels with a scale error: they move more or less than commanded, but report the command.
@@ -46,9 +46,9 @@ struct ScaleErrorWheels {
 
 struct RouteRunOptions {
   bool back = false;
-  double drift = 0.05;          ///< scale error of travel and turn, random sign per run
-  double start_offset_m = 0.3;  ///< lateral; the robot assumes the start of the route
-  double step_m = 0.15;         ///< driven between two lines
+  double wheel_scale_error = 0.05;  ///< scale error of travel and turn, random sign per run
+  double start_offset_m = 0.3;      ///< lateral; the robot assumes the start of the route
+  double step_m = 0.15;             ///< driven between two lines
 };
 
 /// A pose estimated from one line.
@@ -84,7 +84,7 @@ struct RouteRun {
                                     const RouteRunOptions& options, std::uint64_t seed);
 
 /// Returns map layers of the route and of the runs, of which every second one is backwards.
-[[nodiscard]] std::vector<viewer::MapLayer> make_route_layers(std::span<const Pose2> way,
+[[nodiscard]] std::vector<viewer::MapLayer> make_route_layers(std::span<const Pose2> poses,
                                                               std::span<const RouteRun> runs);
 
 }  // namespace panonav::lab

@@ -245,10 +245,10 @@ void bind_tracker(py::module_& m) {
   Record<NamedEstimate>(m, "MonteCarloEstimate", "Estimated pose of a tracked robot.")
       .field("name", &NamedEstimate::name, "Name of the image, if it has one.")
       .field(
-          "state", [](const NamedEstimate& e) { return name_of(e.state); },
+          "state", [](const NamedEstimate& e) { return to_string(e.state); },
           "'localised', 'ambiguous' or 'lost'.")
       .field("pose", &NamedEstimate::pose, "Mean of the largest mode; None if lost.")
-      .field("inside", &NamedEstimate::inside, "Probability that it is in the memory's area.")
+      .field("inside", &NamedEstimate::p_inside, "Probability that it is in the memory's area.")
       .field("probability", &NamedEstimate::probability, "That it is at the largest mode.")
       .field("modes", &NamedEstimate::modes, "Largest weight first.")
       .field("spread_m", &NamedEstimate::spread_m,

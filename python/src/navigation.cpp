@@ -32,7 +32,7 @@ void bind_navigation(py::module_& m) {
   Record<NavigationDecision>(m, "NavigationDecision", "One decision with its reasons.")
       .field("step", &NavigationDecision::step, "Number of the decision, from 1.")
       .field(
-          "state", [](const NavigationDecision& d) { return name_of(d.state); },
+          "state", [](const NavigationDecision& d) { return to_string(d.state); },
           "'moving', 'arrived', 'blocked', 'lost' or 'unreachable'.")
       .field("direction_rad", &NavigationDecision::direction_rad, "In the current robot frame.")
       .field("advance_m", &NavigationDecision::advance_m, "Distance to drive; 0 unless moving.")
@@ -54,7 +54,8 @@ void bind_navigation(py::module_& m) {
           "events",
           [](const NavigationDecision& d) {
             std::vector<std::string_view> names;
-            for (const NavigationDecision::Event event : d.events) names.push_back(name_of(event));
+            for (const NavigationDecision::Event event : d.events)
+              names.push_back(to_string(event));
             return names;
           },
           "Reasons for a decision other than to continue, such as 'kidnapped' or 'closed'.");
@@ -125,7 +126,7 @@ void bind_navigation(py::module_& m) {
       .def_property_readonly(
           "edges_from",
           [](const SharedNavigator& navigator) {
-            return navigator.read([](const RobotNavigator& n) { return name_of(n.origin()); });
+            return navigator.read([](const RobotNavigator& n) { return to_string(n.origin()); });
           },
           "'map', 'lattice', 'links' or 'arrangement'.")
       .def_property_readonly(

@@ -33,7 +33,7 @@ CameraModel make_camera_model(const std::string& name, const py::dict& parameter
 
 namespace {
 
-std::string name_of(ColumnDirection direction) {
+std::string to_string(ColumnDirection direction) {
   return direction == ColumnDirection::clockwise ? "clockwise" : "counter-clockwise";
 }
 
@@ -95,7 +95,7 @@ void bind_cameras(py::module_& m) {
       .def_readonly("inner_radius_px", &Camera::inner_radius_px,
                     "Radius of the camera's reflection in the mirror.")
       .def_property_readonly(
-          "direction", [](const Camera& c) { return name_of(c.direction); },
+          "direction", [](const Camera& c) { return to_string(c.direction); },
           "Direction of increasing azimuth in the image: 'clockwise' or 'counter-clockwise'.")
       .def_readonly("forward_angle_rad", &Camera::forward_angle_rad,
                     "Mirror: image angle of forward, counter-clockwise from the right.")
@@ -275,7 +275,7 @@ void bind_panoramas(py::module_& m) {
           "kept_elevations", [](const PictureSource& s) { return s.layout.kept_elevations; },
           "(bottom, top) of the part to keep in radians; None: all.")
       .def_property_readonly(
-          "direction", [](const PictureSource& s) { return name_of(s.layout.direction); },
+          "direction", [](const PictureSource& s) { return to_string(s.layout.direction); },
           "How columns run from left to right, seen from above: 'clockwise' or "
           "'counter-clockwise'.")
       .def_property_readonly(

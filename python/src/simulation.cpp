@@ -79,7 +79,7 @@ py::array_t<double> to_point_rows(std::span<const Point2> points) {
 Image take_picture_at(const simulation::SimulatedWorld& world, const Pose2& pose,
                       std::uint64_t seed) {
   Executor executor(1);
-  return world.take_picture(pose, seed, executor);
+  return world.capture_image(pose, seed, executor);
 }
 
 void bind_worlds(py::module_& m) {
@@ -321,7 +321,7 @@ void bind_robots(py::module_& m) {
           "carry_to",
           [](SharedRobot& robot, const Pose2& pose) {
             robot.change([&](Robot& r) {
-              r.base.carry_to(choose_free_start(*r.world, pose, 0));
+              r.base.teleport_to(choose_free_start(*r.world, pose, 0));
               return 0;
             });
           },

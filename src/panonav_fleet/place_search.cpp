@@ -113,9 +113,9 @@ struct PlaceSearch::Implementation {
       };
       // Reads a limited number of ids at a time, so that a server uses its index instead of sorting
       // all of them.
-      constexpr std::uint32_t at_a_time = 20000;
+      constexpr std::uint32_t ids_per_query = 20000;
       for (std::uint32_t before = border(part); before < border(part + 1);) {
-        const std::uint32_t end = before + std::min(at_a_time, border(part + 1) - before);
+        const std::uint32_t end = before + std::min(ids_per_query, border(part + 1) - before);
         tables.read_magnitudes({before + 1}, {end}, header.shape.size(),
                                [&](const MagnitudesRow& row) {
                                  if (sketchers[part].add(tables, row)) store_areas();
@@ -180,9 +180,9 @@ struct PlaceSearch::Implementation {
 
   void count_search(const SearchResult& found, std::chrono::steady_clock::duration duration) const {
     const std::lock_guard lock(mutex);
-    ++counted.searches;
-    counted.views_read += found.views_in_full;
-    counted.seconds += std::chrono::duration<double>(duration).count();
+    ++counters.searches;
+    counters.views_read += found.views_in_full;
+    counters.seconds += std::chrono::duration<double>(duration).count();
   }
 
   // ---- refreshing
@@ -239,7 +239,7 @@ struct PlaceSearch::Implementation {
         }
       }
       std::ranges::sort(there);
-      before = areas.within(changed_areas);
+      before = areas.find_views_in(changed_areas);
     }
     std::vector<ViewId> added;
     for (const ViewId view : there) {
@@ -283,10 +283,10 @@ struct PlaceSearch::Implementation {
 
   std::filesystem::path path;
   MemoryHeader header;
-  mutable std::mutex mutex;  // guards `current`, `idle`, `counted`
+  mutable std::mutex mutex;  // guards `current`, `idle`, `counters`
   std::shared_ptr<const Sketched> current;
   mutable std::vector<std::unique_ptr<MemoryTables>> idle;
-  mutable SearchCounters counted;
+  mutable SearchCounters counters;
   mutable std::atomic<int> running = 0;  // number of running searches
 
   std::mutex refreshing;  // guards all members below
@@ -474,7 +474,7 @@ std::uint64_t PlaceSearch::bytes() const {
 
 SearchCounters PlaceSearch::counters() const {
   const std::lock_guard lock(implementation_->mutex);
-  return implementation_->counted;
+  return implementation_->counters;
 }
 
 std::unique_ptr<ViewIndex> PlaceSearch::index() const {

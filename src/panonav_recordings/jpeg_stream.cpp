@@ -100,39 +100,40 @@ void JpegStream::add(std::span<const std::uint8_t> bytes, const std::string& nam
 std::optional<std::vector<std::uint8_t>> JpegStream::next() {
   constexpr std::array<std::uint8_t, 3> beginning{marker, start_of_image, marker};
   while (true) {
-    if (walked_ == 0) {
+    if (parsed_bytes_ == 0) {
       auto found = std::search(buffer_.begin(), buffer_.end(), beginning.begin(), beginning.end());
       // The last two bytes are kept, as they may begin the next picture.
       if (found == buffer_.end()) found -= std::min<std::ptrdiff_t>(2, found - buffer_.begin());
       buffer_.erase(buffer_.begin(), found);
       if (buffer_.size() < beginning.size()) return std::nullopt;
-      walked_ = 2;
+      parsed_bytes_ = 2;
     }
     // Entropy-coded data follows a segment: skip it to the next marker.
-    const auto at =
-        std::find(buffer_.begin() + static_cast<std::ptrdiff_t>(walked_), buffer_.end(), marker) -
-        buffer_.begin();
-    walked_ = static_cast<std::size_t>(at);
-    if (walked_ + 2 > buffer_.size()) return std::nullopt;
-    const std::uint8_t kind = buffer_[walked_ + 1];
+    const auto at = std::find(buffer_.begin() + static_cast<std::ptrdiff_t>(parsed_bytes_),
+                              buffer_.end(), marker) -
+                    buffer_.begin();
+    parsed_bytes_ = static_cast<std::size_t>(at);
+    if (parsed_bytes_ + 2 > buffer_.size()) return std::nullopt;
+    const std::uint8_t kind = buffer_[parsed_bytes_ + 1];
     if (kind == marker) {
-      ++walked_;
+      ++parsed_bytes_;
     } else if (is_marker_without_length(kind)) {
-      walked_ += 2;
+      parsed_bytes_ += 2;
     } else if (kind == end_of_image) {
-      const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(walked_ + 2);
+      const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(parsed_bytes_ + 2);
       std::vector<std::uint8_t> picture(buffer_.begin(), end);
       buffer_.erase(buffer_.begin(), end);
-      walked_ = 0;
+      parsed_bytes_ = 0;
       return picture;
     } else if (kind == start_of_image) {  // the previous picture was cut off
       buffer_.erase(buffer_.begin(), buffer_.begin() + at);
-      walked_ = 2;
+      parsed_bytes_ = 2;
     } else {
-      if (walked_ + 4 > buffer_.size()) return std::nullopt;
-      const std::size_t length = buffer_[walked_ + 2] * std::size_t{256} + buffer_[walked_ + 3];
-      if (walked_ + 2 + length > buffer_.size()) return std::nullopt;
-      walked_ += 2 + std::max<std::size_t>(length, 2);
+      if (parsed_bytes_ + 4 > buffer_.size()) return std::nullopt;
+      const std::size_t length =
+          buffer_[parsed_bytes_ + 2] * std::size_t{256} + buffer_[parsed_bytes_ + 3];
+      if (parsed_bytes_ + 2 + length > buffer_.size()) return std::nullopt;
+      parsed_bytes_ += 2 + std::max<std::size_t>(length, 2);
     }
   }
 }

@@ -25,11 +25,11 @@ class JpegStream {
   /// Returns the next complete picture; empty until more bytes come.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> next();
   /// Returns the number of bytes of an incomplete picture.
-  [[nodiscard]] std::size_t unfinished() const noexcept { return buffer_.size(); }
+  [[nodiscard]] std::size_t unfinished_bytes() const noexcept { return buffer_.size(); }
 
  private:
   std::vector<std::uint8_t> buffer_;  // from the beginning of the current picture
-  std::size_t walked_ = 0;            // bytes of `buffer_` parsed so far; 0: no beginning found yet
+  std::size_t parsed_bytes_ = 0;      // bytes of `buffer_` parsed so far; 0: no beginning found yet
 };
 
 /// Reads a stream of JPEG pictures to its end into a temporary file, which is removed with the

@@ -35,7 +35,7 @@ bool is_camera(const std::string& address) {
 
 using Steady = std::chrono::steady_clock;
 
-double now_s() {
+double unix_time_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
@@ -68,7 +68,7 @@ class StandardInput final : public Input {
   std::optional<RawPicture> take() override {
     while (true) {
       if (auto picture = stream_.next())
-        return RawPicture{std::move(*picture), now_s(), Steady::now(), 0};
+        return RawPicture{std::move(*picture), unix_time_s(), Steady::now(), 0};
       std::array<pollfd, 2> waits{pollfd{STDIN_FILENO, POLLIN, 0}, pollfd{stop_, POLLIN, 0}};
       if (poll(waits.data(), waits.size(), -1) < 0) continue;
       if (waits[1].revents != 0) return std::nullopt;
@@ -114,7 +114,7 @@ class AddressInput final : public Input {
     const double max_wait_s =
         std::exchange(is_first_, false) ? 3.0 * max_silence_s_ : max_silence_s_;
     auto frame = video_.next(std::chrono::milliseconds(static_cast<int>(1000.0 * max_wait_s)));
-    if (frame) return RawPicture{std::move(frame->picture), now_s(), Steady::now(), 0};
+    if (frame) return RawPicture{std::move(frame->picture), unix_time_s(), Steady::now(), 0};
     throw FileError(
         address_,
         "was interrupted" +
@@ -130,7 +130,7 @@ class AddressInput final : public Input {
 };
 
 /// True if a JPEG file has Huffman tables. Some cameras leave them out, but viewers need them.
-bool is_whole_jpeg(std::span<const std::uint8_t> bytes) {
+bool has_huffman_tables(std::span<const std::uint8_t> bytes) {
   constexpr std::array<std::uint8_t, 2> begin{0xff, 0xd8};
   constexpr std::array<std::uint8_t, 2> tables{0xff, 0xc4};
   const auto is_at = [&](std::size_t at, const auto& marker) {
@@ -304,7 +304,7 @@ std::optional<LivePicture> LivePictures::next() {
                           received.stamp_s,
                           received.arrived,
                           Steady::now() - before};
-      if (is_whole_jpeg(bytes)) decoded.encoded = std::move(bytes);
+      if (has_huffman_tables(bytes)) decoded.encoded = std::move(bytes);
       return decoded;
     } catch (const Error&) {
       const std::lock_guard lock(self.mutex);

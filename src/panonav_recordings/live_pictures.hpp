@@ -83,7 +83,7 @@ class LivePictures {
 /// A pixel format of a camera, with its sizes.
 struct CameraFormat {
   std::string pixels;            ///< "MJPG", "YUYV", "GREY", ...: the driver's name
-  bool usable = false;           ///< true if we can decode it
+  bool is_supported = false;     ///< true if we can decode it
   std::vector<ImageSize> sizes;  ///< empty: the driver does not list them
 };
 

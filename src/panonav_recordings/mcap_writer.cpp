@@ -95,7 +95,7 @@ struct McapWriter::State {
   }
 
   // Writes bytes; `known` is their checksum if it was computed before.
-  void put(std::span<const std::uint8_t> bytes, std::optional<std::uint32_t> known = {}) {
+  void write_bytes(std::span<const std::uint8_t> bytes, std::optional<std::uint32_t> known = {}) {
     const std::uint32_t own = known ? *known : compute_crc(bytes);
     sum = static_cast<std::uint32_t>(::crc32_combine(sum, own, static_cast<z_off_t>(bytes.size())));
     written += bytes.size();
@@ -110,11 +110,11 @@ struct McapWriter::State {
   [[noreturn]] void fail() {
     const std::string cause = std::generic_category().message(errno);
     has_failed = true;
-    release();
+    close_descriptor();
     throw FileError(path.string(), "cannot be written: " + cause);
   }
 
-  void release() noexcept {
+  void close_descriptor() noexcept {
     if (descriptor >= 0) ::close(std::exchange(descriptor, -1));
   }
 
@@ -139,8 +139,8 @@ struct McapWriter::State {
         .number(chunk_sum)
         .text(name)
         .number(std::uint64_t{stored.size()});
-    put(head);
-    put(stored, name.empty() ? std::optional(chunk_sum) : std::nullopt);
+    write_bytes(head);
+    write_bytes(stored, name.empty() ? std::optional(chunk_sum) : std::nullopt);
 
     const std::uint64_t index_at = written;
     Bytes lists, offsets;
@@ -154,7 +154,7 @@ struct McapWriter::State {
       lists.record(McapRecord::message_index, Bytes().number(number).prefixed(pairs));
       channel.in_chunk.clear();
     }
-    put(lists);
+    write_bytes(lists);
     chunk_indexes.record(McapRecord::chunk_index, Bytes()
                                                       .number(chunk_time.begin)
                                                       .number(chunk_time.end)
@@ -172,7 +172,7 @@ struct McapWriter::State {
   }
 
   void write_summary() {
-    put(Bytes().record(McapRecord::data_end, Bytes().number(sum)));
+    write_bytes(Bytes().record(McapRecord::data_end, Bytes().number(sum)));
     Bytes counts;
     for (std::size_t i = 0; i < channels.size(); ++i) {
       counts.number(static_cast<std::uint16_t>(i)).number(channels[i].messages);
@@ -204,7 +204,7 @@ struct McapWriter::State {
     end.number(start).number(offsets_at);
     end.number(compute_crc(end));
     for (const char c : mcap_magic) end.push_back(static_cast<std::uint8_t>(c));
-    put(end);
+    write_bytes(end);
   }
 };
 
@@ -220,7 +220,7 @@ McapWriter::McapWriter(const std::filesystem::path& path, const McapWriterOption
   Bytes begin;
   for (const char c : mcap_magic) begin.push_back(static_cast<std::uint8_t>(c));
   begin.record(McapRecord::header, Bytes().text(options.profile).text("panonav"));
-  state_->put(begin);
+  state_->write_bytes(begin);
 }
 
 McapWriter::~McapWriter() {
@@ -228,7 +228,7 @@ McapWriter::~McapWriter() {
   try {
     close();
   } catch (...) {
-    state_->release();
+    state_->close_descriptor();
   }
 }
 

@@ -38,28 +38,28 @@ double to_seconds(std::int64_t ns) {
 /// The pictures of one topic, read and decoded on demand.
 class RecordedPictures : public PictureStore {
  public:
-  /// `places` are the locations of messages of the types sensor_msgs/Image and CompressedImage.
+  /// `locations` are the locations of messages of the types sensor_msgs/Image and CompressedImage.
   RecordedPictures(fs::path path, std::shared_ptr<const Recording> recording,
-                   std::vector<MessageLocation> places);
+                   std::vector<MessageLocation> locations);
   [[nodiscard]] Image read(std::size_t index) const override;
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> encoded(std::size_t index) const override;
 
  private:
   fs::path path_;
   std::shared_ptr<const Recording> recording_;
-  std::vector<MessageLocation> places_;
+  std::vector<MessageLocation> locations_;
 };
 
 RecordedPictures::RecordedPictures(fs::path path, std::shared_ptr<const Recording> recording,
-                                   std::vector<MessageLocation> places)
-    : path_(std::move(path)), recording_(std::move(recording)), places_(std::move(places)) {}
+                                   std::vector<MessageLocation> locations)
+    : path_(std::move(path)), recording_(std::move(recording)), locations_(std::move(locations)) {}
 
 Image RecordedPictures::read(std::size_t index) const {
-  const MessageLocation& place = places_.at(index);
-  const RecordedTopic& topic = recording_->topics()[place.topic];
-  const auto bytes = recording_->read(place);
+  const MessageLocation& location = locations_.at(index);
+  const RecordedTopic& topic = recording_->topics()[location.topic];
+  const auto bytes = recording_->read(location);
   const std::string name =
-      path_.string() + ": image at " + to_text(to_seconds(place.time_ns)) + " s";
+      path_.string() + ": image at " + to_text(to_seconds(location.time_ns)) + " s";
   try {
     if (topic.type == ros::Image::type) {
       return ros::to_image(ros::read_message<ros::Image>(bytes, topic.encoding));
@@ -71,10 +71,10 @@ Image RecordedPictures::read(std::size_t index) const {
 }
 
 std::optional<std::vector<std::uint8_t>> RecordedPictures::encoded(std::size_t index) const {
-  const MessageLocation& place = places_.at(index);
-  const RecordedTopic& topic = recording_->topics()[place.topic];
+  const MessageLocation& location = locations_.at(index);
+  const RecordedTopic& topic = recording_->topics()[location.topic];
   if (topic.type == ros::Image::type) return std::nullopt;
-  const auto bytes = recording_->read(place);
+  const auto bytes = recording_->read(location);
   try {
     const auto message = ros::read_message<ros::CompressedImage>(bytes, topic.encoding);
     return std::vector<std::uint8_t>(message.data.begin(), message.data.end());
@@ -86,11 +86,11 @@ std::optional<std::vector<std::uint8_t>> RecordedPictures::encoded(std::size_t i
 /// Makes the entry of each image, in order, and counts missing fields.
 class EntryMaker {
  public:
-  EntryMaker(const RecordedMessages& messages, bool by_log)
-      : messages_(messages), by_log_(by_log) {}
+  EntryMaker(const RecordedMessages& messages, bool use_log_times)
+      : messages_(messages), use_log_times_(use_log_times) {}
 
   [[nodiscard]] DatasetEntry make(const RecordedPicture& picture) {
-    const std::int64_t ns = by_log_ ? picture.place.time_ns : picture.stamp_ns;
+    const std::int64_t ns = use_log_times_ ? picture.location.time_ns : picture.stamp_ns;
     if (ns < previous_ns_) ++backward_;
     previous_ns_ = ns;
     DatasetEntry entry;
@@ -110,9 +110,9 @@ class EntryMaker {
     const auto& [width, height] = messages_.first_size;
     if (backward_ > 0)
       warnings.push_back("stamps run back at " + std::to_string(backward_) + of_all);
-    warn_if_any(messages_.other_sizes, of_all + " are not of the size of the first, " +
-                                           std::to_string(width) + " x " + std::to_string(height) +
-                                           " px");
+    warn_if_any(messages_.differing_size_count, of_all + " are not of the size of the first, " +
+                                                    std::to_string(width) + " x " +
+                                                    std::to_string(height) + " px");
     if (messages_.chain || messages_.odometry.size() > 0) {
       warn_if_any(without_odometry_,
                   of_all +
@@ -126,7 +126,7 @@ class EntryMaker {
                 of_all +
                     " would be tilted by more than 30 degrees and are treated as level; the axes "
                     "of the inertial sensor must be x forward and z up");
-    warn_if_any(messages_.without_orientation,
+    warn_if_any(messages_.imu_without_orientation_count,
                 " messages of the inertial sensor state no orientation; roll and pitch are not "
                 "guessed from accelerations");
   }
@@ -172,7 +172,7 @@ class EntryMaker {
   }
 
   const RecordedMessages& messages_;
-  bool by_log_;
+  bool use_log_times_;
   std::unordered_set<std::string> names_;
   std::int64_t previous_ns_ = std::numeric_limits<std::int64_t>::min();
   std::size_t backward_ = 0;  ///< pictures with a stamp before the previous one's
@@ -202,15 +202,16 @@ Dataset read_recording(std::shared_ptr<const Recording> recording, const fs::pat
                        PictureSource source, const InputOptions::Topics& topics) {
   RecordedMessages messages =
       collect_messages(path, *recording, choose_topics(*recording, path, topics, source));
-  const bool by_log = messages.sort();
-  std::vector<MessageLocation> places;
-  for (const RecordedPicture& picture : messages.pictures) places.push_back(picture.place);
-  const auto store = std::make_shared<const RecordedPictures>(path, recording, std::move(places));
+  const bool use_log_times = messages.sort();
+  std::vector<MessageLocation> locations;
+  for (const RecordedPicture& picture : messages.pictures) locations.push_back(picture.location);
+  const auto store =
+      std::make_shared<const RecordedPictures>(path, recording, std::move(locations));
 
   Dataset opened;
   opened.folder = path;
   opened.source = std::move(source);
-  EntryMaker maker(messages, by_log);
+  EntryMaker maker(messages, use_log_times);
   for (const RecordedPicture& picture : messages.pictures) {
     DatasetEntry& entry = opened.entries.emplace_back(maker.make(picture));
     entry.path = path;
@@ -230,14 +231,15 @@ RecordingSummary describe_recording(const fs::path& path) {
   for (std::uint32_t i = 0; i < topics.size(); ++i) {
     TopicSummary& each = summary.topics.emplace_back();
     each.topic = topics[i];
-    const auto places = recording->places(std::span(&i, 1));
-    if (places.empty()) continue;
-    each.time = TimeSpan{places.front().time_ns, places.back().time_ns};
+    const auto locations = recording->locations(std::span(&i, 1));
+    if (locations.empty()) continue;
+    each.time = TimeSpan{locations.front().time_ns, locations.back().time_ns};
     const double span_s = to_seconds(each.time->end_ns - each.time->begin_ns);
-    if (span_s > 0.0) each.rate_hz = static_cast<double>(places.size() - 1) / span_s;
-    if (!has_pictures(topics[i])) continue;
+    if (span_s > 0.0) each.rate_hz = static_cast<double>(locations.size() - 1) / span_s;
+    if (!is_readable_picture_topic(topics[i])) continue;
     try {
-      each.shows = to_readable_line(describe_picture(recording->read(places.front()), topics[i]));
+      each.shows =
+          to_readable_line(describe_picture(recording->read(locations.front()), topics[i]));
     } catch (const Error& error) {
       each.shows = to_readable_line(error.what());
     }

@@ -70,17 +70,17 @@ class FilesRecording : public Recording {
     return lines;
   }
 
-  [[nodiscard]] std::vector<MessageLocation> places(std::span<const std::uint32_t> topics,
-                                                    std::optional<TimeSpan> within) const override {
+  [[nodiscard]] std::vector<MessageLocation> locations(
+      std::span<const std::uint32_t> topics, std::optional<TimeSpan> within) const override {
     const Filter filter = make_filter(topics, within);
-    std::vector<MessageLocation> places;
-    for (const Block& block : blocks_) list(block, filter, places);
-    std::ranges::sort(places, is_earlier);
-    return places;
+    std::vector<MessageLocation> locations;
+    for (const Block& block : blocks_) list(block, filter, locations);
+    std::ranges::sort(locations, is_earlier);
+    return locations;
   }
 
-  [[nodiscard]] std::vector<std::uint8_t> read(const MessageLocation& place) const override {
-    const RecordedMessage message = message_at(place);
+  [[nodiscard]] std::vector<std::uint8_t> read(const MessageLocation& location) const override {
+    const RecordedMessage message = read_message_at(location);
     return {message.bytes.begin(), message.bytes.end()};
   }
 
@@ -90,49 +90,49 @@ class FilesRecording : public Recording {
     const Filter filter = make_filter(topics, within);
     // Messages of a block that are still to be passed on. A block is opened when the time reaches
     // its first message.
-    struct Open {
-      std::vector<MessageLocation> places;
+    struct OpenBlock {
+      std::vector<MessageLocation> locations;
       std::size_t next = 0;
     };
-    const auto is_later = [](const Open& a, const Open& b) {
-      return is_earlier(b.places[b.next], a.places[a.next]);
+    const auto is_later = [](const OpenBlock& a, const OpenBlock& b) {
+      return is_earlier(b.locations[b.next], a.locations[a.next]);
     };
-    std::vector<Open> open;
+    std::vector<OpenBlock> open;
     std::size_t listed = 0;
     std::size_t next = 0;
     std::set<std::pair<std::uint32_t, std::uint64_t>> damaged;
     while (true) {
       while (next < blocks_.size() &&
              (open.empty() ||
-              blocks_[next].time.begin_ns <= open.front().places[open.front().next].time_ns)) {
-        Open block;
-        list(blocks_[next++], filter, block.places, listed);
-        if (block.places.empty()) continue;
-        listed += block.places.size();
-        std::ranges::sort(block.places, is_earlier);
+              blocks_[next].time.begin_ns <= open.front().locations[open.front().next].time_ns)) {
+        OpenBlock block;
+        list(blocks_[next++], filter, block.locations, listed);
+        if (block.locations.empty()) continue;
+        listed += block.locations.size();
+        std::ranges::sort(block.locations, is_earlier);
         open.push_back(std::move(block));
         std::ranges::push_heap(open, is_later);
       }
       if (open.empty()) return;
       std::ranges::pop_heap(open, is_later);
-      Open& first = open.back();
-      const MessageLocation place = first.places[first.next++];
-      if (first.next == first.places.size()) {
-        listed -= first.places.size();
+      OpenBlock& first = open.back();
+      const MessageLocation location = first.locations[first.next++];
+      if (first.next == first.locations.size()) {
+        listed -= first.locations.size();
         open.pop_back();
       } else {
         std::ranges::push_heap(open, is_later);
       }
-      if (damaged.contains({place.file, place.block})) continue;
+      if (damaged.contains({location.file, location.block})) continue;
       std::optional<RecordedMessage> message;
       try {
-        message = message_at(place);
+        message = read_message_at(location);
       } catch (const FileError& error) {
-        files_[place.file]->warn(error);
-        damaged.emplace(place.file, place.block);
+        files_[location.file]->warn(error);
+        damaged.emplace(location.file, location.block);
         continue;
       }
-      use(place, message->bytes);
+      use(location, message->bytes);
     }
   }
 
@@ -149,15 +149,15 @@ class FilesRecording : public Recording {
 
   [[nodiscard]] Filter make_filter(std::span<const std::uint32_t> topics,
                                    std::optional<TimeSpan> within) const {
-    constexpr TimeSpan always{std::numeric_limits<std::int64_t>::min(),
-                              std::numeric_limits<std::int64_t>::max()};
+    constexpr TimeSpan all_times{std::numeric_limits<std::int64_t>::min(),
+                                 std::numeric_limits<std::int64_t>::max()};
     std::vector<bool> chosen(topics_.size());
     for (const std::uint32_t topic : topics) {
       require(topic < topics_.size(), "topic", topic,
               "less than " + std::to_string(topics_.size()));
       chosen[topic] = true;
     }
-    Filter filter{{}, within.value_or(always)};
+    Filter filter{{}, within.value_or(all_times)};
     for (const auto& of_file : topics_of_files_) {
       auto& flags = filter.topics.emplace_back();
       for (const std::uint32_t topic : of_file) flags.push_back(chosen[topic]);
@@ -167,32 +167,32 @@ class FilesRecording : public Recording {
 
   // Appends the locations in a block that pass the filter. `listed` is the number of locations held
   // elsewhere, for the limit.
-  void list(const Block& block, const Filter& filter, std::vector<MessageLocation>& places,
+  void list(const Block& block, const Filter& filter, std::vector<MessageLocation>& locations,
             std::size_t listed = 0) const {
     if (block.time.begin_ns > filter.within.end_ns || block.time.end_ns < filter.within.begin_ns) {
       return;
     }
-    const std::size_t before = places.size();
+    const std::size_t before = locations.size();
     try {
       files_[block.file]->list(block.block, filter.topics[block.file], filter.within,
-                               limits_.messages - std::min(listed, limits_.messages), places);
+                               limits_.messages - std::min(listed, limits_.messages), locations);
     } catch (const FileError& error) {
-      if (places.size() + listed > limits_.messages) throw;
+      if (locations.size() + listed > limits_.messages) throw;
       files_[block.file]->warn(error);
     }
-    for (std::size_t i = before; i < places.size(); ++i) {
-      places[i].topic = topics_of_files_[block.file][places[i].topic];
-      places[i].file = block.file;
+    for (std::size_t i = before; i < locations.size(); ++i) {
+      locations[i].topic = topics_of_files_[block.file][locations[i].topic];
+      locations[i].file = block.file;
     }
   }
 
-  [[nodiscard]] RecordedMessage message_at(const MessageLocation& place) const {
-    require(place.file < files_.size(), "file of a message", place.file,
+  [[nodiscard]] RecordedMessage read_message_at(const MessageLocation& location) const {
+    require(location.file < files_.size(), "file of a message", location.file,
             "less than " + std::to_string(files_.size()));
-    const RecordingFile& file = *files_[place.file];
-    RecordedMessage message = file.read(place);
-    if (message.time_ns != place.time_ns ||
-        topics_of_files_[place.file][message.topic] != place.topic) {
+    const RecordingFile& file = *files_[location.file];
+    RecordedMessage message = file.read(location);
+    if (message.time_ns != location.time_ns ||
+        topics_of_files_[location.file][message.topic] != location.topic) {
       throw FileError(file.path().string(),
                       "is damaged: an index names another message than the "
                       "one that is there");
@@ -200,10 +200,10 @@ class FilesRecording : public Recording {
     // rosbag2 can pack each message with Zstandard, whose magic number differs from CDR in the
     // first byte, which is 0 there.
     constexpr std::array<std::uint8_t, 4> zstd_magic{0x28, 0xB5, 0x2F, 0xFD};
-    if (topics_[place.topic].encoding == MessageEncoding::cdr && message.bytes.size() >= 4 &&
+    if (topics_[location.topic].encoding == MessageEncoding::cdr && message.bytes.size() >= 4 &&
         std::ranges::equal(message.bytes.first(4), zstd_magic)) {
-      auto unpacked = unpack_frame(message.bytes, limits_.chunk_bytes);
-      if (!unpacked.whole) {
+      auto unpacked = unpack_zstd_frame(message.bytes, limits_.chunk_bytes);
+      if (!unpacked.is_whole) {
         throw FileError(file.path().string(), "a packed message cannot be unpacked, or not to " +
                                                   std::to_string(limits_.chunk_bytes) + " bytes");
       }
@@ -277,8 +277,8 @@ std::unique_ptr<RecordingFile> open_packed(const fs::path& path, const Recording
   const auto space = fs::space(copy.path().parent_path(), unknown);
   const std::uint64_t max_bytes =
       unknown ? limits.file_bytes : std::min<std::uint64_t>(limits.file_bytes, space.available / 2);
-  const UnpackedFile unpacked = unpack_file(path, copy.path(), max_bytes);
-  if (unpacked.too_long) {
+  const UnpackedFile unpacked = unpack_zstd_file(path, copy.path(), max_bytes);
+  if (unpacked.exceeds_limit) {
     throw FileError(path.string(), "unpacks to more than " + std::to_string(max_bytes) +
                                        " bytes, as many as are allowed and half of what is free "
                                        "in the folder for temporary files (TMPDIR)");
@@ -291,8 +291,8 @@ std::unique_ptr<RecordingFile> open_packed(const fs::path& path, const Recording
     const std::string of_copy = copy.path().string() + ": ";
     throw FileError(path.string(), what.starts_with(of_copy) ? what.substr(of_copy.size()) : what);
   }
-  file->call(path);
-  if (!unpacked.whole) {
+  file->set_reported_path(path);
+  if (!unpacked.is_whole) {
     file->warn("is damaged or cut off: " + std::to_string(unpacked.bytes) + " bytes are unpacked");
   }
   return file;

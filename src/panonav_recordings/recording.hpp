@@ -83,20 +83,20 @@ class Recording {
   /// Returns the locations of the messages of these topics within the time span, sorted by time,
   /// and at equal times by file. Throws FileError if there are more than the limit, ContractError
   /// on an unknown topic. Chunks outside of the span are not read.
-  [[nodiscard]] virtual std::vector<MessageLocation> places(
+  [[nodiscard]] virtual std::vector<MessageLocation> locations(
       std::span<const std::uint32_t> topics, std::optional<TimeSpan> within = {}) const = 0;
 
   /// Returns the bytes of a message. Several threads may call at a time. Reading in the order of
-  /// `places` is fastest. Throws FileError if the chunk of the message is damaged.
-  [[nodiscard]] virtual std::vector<std::uint8_t> read(const MessageLocation& place) const = 0;
+  /// `locations` is fastest. Throws FileError if the chunk of the message is damaged.
+  [[nodiscard]] virtual std::vector<std::uint8_t> read(const MessageLocation& location) const = 0;
 
-  /// Passes the messages that `places` would list to `use`, in the same order. Bytes are valid
+  /// Passes the messages that `locations` would list to `use`, in the same order. Bytes are valid
   /// until `use` returns. Damaged chunks are skipped with a warning. Memory: it lists only the
   /// messages of chunks that overlap in time, not all.
   virtual void for_each(
       std::span<const std::uint32_t> topics, std::optional<TimeSpan> within,
-      const std::function<void(const MessageLocation& place, std::span<const std::uint8_t> bytes)>&
-          use) const = 0;
+      const std::function<void(const MessageLocation& location,
+                               std::span<const std::uint8_t> bytes)>& use) const = 0;
 };
 
 /// True if `Recording::open` would accept the path, by the first bytes of a file or the

@@ -56,7 +56,7 @@ inline constexpr double quaternion_tolerance = 0.1;
 [[nodiscard]] Pose inverse(const Pose& a_from_b);
 /// Interpolates positions linearly and orientations along the shorter rotation (slerp). `share` 0
 /// returns exactly `a`, 1 exactly `b`; values outside of 0 .. 1 extrapolate.
-[[nodiscard]] Pose between(const Pose& a, const Pose& b, double share);
+[[nodiscard]] Pose interpolate(const Pose& a, const Pose& b, double share);
 /// Returns the pose with this heading, then roll and pitch as in `Tilt`: R_z(heading) R_y(pitch)
 /// R_x(roll).
 [[nodiscard]] Pose to_pose(const Pose2& pose, const Tilt& tilt = {});

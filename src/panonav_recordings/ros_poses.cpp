@@ -42,7 +42,7 @@ Pose inverse(const Pose& a_from_b) {
   return {{-at.x, -at.y, -at.z}, back};
 }
 
-Pose between(const Pose& a, const Pose& b, double share) {
+Pose interpolate(const Pose& a, const Pose& b, double share) {
   if (share == 0.0) return a;
   if (share == 1.0) return b;
   const Quaternion& q = a.orientation;

@@ -29,12 +29,12 @@ namespace {
 std::optional<ros::OccupancyGrid> make_visited_grid(const std::vector<Point2>& positions,
                                                     std::int64_t stamp_ns) {
   constexpr double cell_m = 0.1;
-  constexpr int around = 2;  // cells
+  constexpr int margin_cells = 2;  // cells
   constexpr double max_cells = 4e6;
   const auto [low_x, high_x] = std::ranges::minmax(positions, {}, &Point2::x_m);
   const auto [low_y, high_y] = std::ranges::minmax(positions, {}, &Point2::y_m);
-  const double columns = std::ceil((high_x.x_m - low_x.x_m) / cell_m) + 2 * around + 1;
-  const double rows = std::ceil((high_y.y_m - low_y.y_m) / cell_m) + 2 * around + 1;
+  const double columns = std::ceil((high_x.x_m - low_x.x_m) / cell_m) + 2 * margin_cells + 1;
+  const double rows = std::ceil((high_y.y_m - low_y.y_m) / cell_m) + 2 * margin_cells + 1;
   if (!(columns * rows <= max_cells)) return std::nullopt;
   ros::OccupancyGrid grid;
   grid.header = {stamp_ns, "map"};
@@ -42,15 +42,16 @@ std::optional<ros::OccupancyGrid> make_visited_grid(const std::vector<Point2>& p
   grid.resolution = static_cast<float>(cell_m);
   grid.width = static_cast<std::uint32_t>(columns);
   grid.height = static_cast<std::uint32_t>(rows);
-  const Point2 corner{low_x.x_m - (around + 0.5) * cell_m, low_y.y_m - (around + 0.5) * cell_m};
+  const Point2 corner{low_x.x_m - (margin_cells + 0.5) * cell_m,
+                      low_y.y_m - (margin_cells + 0.5) * cell_m};
   // Slightly below the points; otherwise viewers hide half of each point.
   grid.origin.position = {corner.x_m, corner.y_m, -0.05};
   grid.cells.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), -1);
   for (const Point2& position : positions) {
     const int column = static_cast<int>((position.x_m - corner.x_m) / cell_m);
     const int row = static_cast<int>((position.y_m - corner.y_m) / cell_m);
-    for (int r = row - around; r <= row + around; ++r) {
-      for (int c = column - around; c <= column + around; ++c) {
+    for (int r = row - margin_cells; r <= row + margin_cells; ++r) {
+      for (int c = column - margin_cells; c <= column + margin_cells; ++c) {
         if (r < 0 || c < 0 || r >= static_cast<int>(rows) || c >= static_cast<int>(columns)) {
           continue;
         }
@@ -102,7 +103,7 @@ std::vector<Point2> reference_positions(const VisualMemory& memory) {
   return positions;
 }
 
-void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
+void set_localisation(RunMoment& moment, const MonteCarloEstimate& estimate) {
   moment.pose = estimate.pose;
   moment.modes = estimate.modes;
   if (estimate.pose && !estimate.modes.empty()) {
@@ -114,12 +115,12 @@ void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
                                                                   : "lost";
   moment.probability = estimate.probability;
   moment.values = {{"probability", format_fixed(estimate.probability, 4)},
-                   {"inside", format_fixed(estimate.inside, 4)},
+                   {"inside", format_fixed(estimate.p_inside, 4)},
                    {"modes", std::to_string(estimate.modes.size())},
                    {"particles", std::to_string(estimate.particles)}};
 }
 
-void describe(RunMoment& moment, const Place& place) {
+void set_localisation(RunMoment& moment, const Place& place) {
   moment.sure = place.known;
   moment.state = place.known ? "known place" : "unknown place";
   moment.probability = place.known_probability;
@@ -135,8 +136,8 @@ void describe(RunMoment& moment, const Place& place) {
     const double deviation_m = *place.position->radius_m / 2.4477;
     const double variance = deviation_m * deviation_m;
     // The accuracy of the heading is unknown: this is the variance of a uniform angle.
-    constexpr double any_turn = std::numbers::pi * std::numbers::pi / 3.0;
-    moment.covariance = {variance, 0, 0, 0, variance, 0, 0, 0, any_turn};
+    constexpr double uniform_heading_variance = std::numbers::pi * std::numbers::pi / 3.0;
+    moment.covariance = {variance, 0, 0, 0, variance, 0, 0, 0, uniform_heading_variance};
   }
 }
 

@@ -97,10 +97,10 @@ struct RunMoment {
 [[nodiscard]] std::vector<Point2> reference_positions(const VisualMemory& memory);
 
 /// Sets pose, covariance, state and diagnostics of a moment from a tracked estimate.
-void describe(RunMoment& moment, const MonteCarloEstimate& estimate);
+void set_localisation(RunMoment& moment, const MonteCarloEstimate& estimate);
 /// Sets state, probability and diagnostics of a moment from a recognised place, and the pose if
 /// place, position and heading are known.
-void describe(RunMoment& moment, const Place& place);
+void set_localisation(RunMoment& moment, const Place& place);
 
 /// Options of `RunRecorder` for a disk that is too slow.
 struct RunRecorderOptions {

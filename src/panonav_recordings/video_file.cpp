@@ -32,7 +32,8 @@ struct VideoIndex {
 };
 
 /// Runs a program to its end and returns its standard output.
-std::string read_output(const std::vector<std::string>& arguments, const std::string& file) {
+std::string run_and_read_output(const std::vector<std::string>& arguments,
+                                const std::string& file) {
   constexpr std::size_t max_bytes = std::size_t{256} << 20;
   const auto child = start_ffmpeg(arguments, file);
   std::string text;
@@ -84,7 +85,7 @@ std::optional<std::int64_t> parse_whole_number(std::string_view text) {
 /// Lists stamps by ffprobe; `entries` selects those of packets or of decoded frames. `nullopt` if
 /// one has no stamp.
 std::optional<VideoIndex> read_index(const std::string& file, const std::string& entries) {
-  const std::string text = read_output(
+  const std::string text = run_and_read_output(
       {"ffprobe", "-v", "error", "-protocol_whitelist", "file,pipe", "-select_streams", "v:0",
        "-show_entries", "stream=time_base:" + entries, "-of", "csv", "file:" + file},
       file);
@@ -97,14 +98,14 @@ std::optional<VideoIndex> read_index(const std::string& file, const std::string&
     if (fields.size() < 2) continue;
     if (fields[0] == "stream") {
       const auto slash = fields[1].find('/');
-      const auto over = parse_whole_number(fields[1].substr(0, slash));
-      const auto under = slash == std::string::npos
-                             ? std::nullopt
-                             : parse_whole_number(fields[1].substr(slash + 1));
-      if (!over || !under || *over <= 0 || *under <= 0) {
+      const auto numerator = parse_whole_number(fields[1].substr(0, slash));
+      const auto denominator = slash == std::string::npos
+                                   ? std::nullopt
+                                   : parse_whole_number(fields[1].substr(slash + 1));
+      if (!numerator || !denominator || *numerator <= 0 || *denominator <= 0) {
         throw FileError(file, "has no unit of time");
       }
-      index.unit_s = static_cast<double>(*over) / static_cast<double>(*under);
+      index.unit_s = static_cast<double>(*numerator) / static_cast<double>(*denominator);
     } else {
       if (fields.size() > 2 && fields[2].find('D') != std::string::npos) continue;  // not shown
       const auto stamp = parse_whole_number(fields[1]);
@@ -129,9 +130,9 @@ class VideoStore final : public PictureStore {
   [[nodiscard]] Image read(std::size_t number) const override {
     const std::lock_guard lock(mutex_);
     const std::int64_t stamp_to_find = chosen_.stamps.at(number);
-    if (const auto held = held_.find(stamp_to_find); held != held_.end()) {
-      Image picture = std::move(held->second);
-      held_.erase(held);
+    if (const auto kept = kept_pictures_.find(stamp_to_find); kept != kept_pictures_.end()) {
+      Image picture = std::move(kept->second);
+      kept_pictures_.erase(kept);
       return picture;
     }
     if (frames_ && stamp_to_find > last_) {
@@ -140,7 +141,7 @@ class VideoStore final : public PictureStore {
     // Seeking can fail in cut files; the second pass decodes from the beginning.
     for (const bool sought : {true, false}) {
       if (!sought && number == 0) continue;
-      start(number, sought);
+      start_decoding(number, sought);
       if (auto picture = decode_up_to(stamp_to_find)) return std::move(*picture);
     }
     const std::string why = frames_->last_error();
@@ -160,19 +161,20 @@ class VideoStore final : public PictureStore {
       last_ = frame->stamp;
       if (frame->stamp == stamp_to_find) return std::move(frame->picture);
       if (frame->stamp > stamp_to_find) break;
-      if (std::ranges::binary_search(chosen_.stamps, frame->stamp)) hold(std::move(*frame));
+      if (std::ranges::binary_search(chosen_.stamps, frame->stamp))
+        keep_for_later(std::move(*frame));
     }
     return std::nullopt;
   }
 
   /// Starts ffmpeg at a picture. It converts and sends only the selected pictures from there on.
-  void start(std::size_t number, bool sought) const {
+  void start_decoding(std::size_t number, bool sought) const {
     const double first_s = seconds(chosen_.stamps[number]);
     constexpr double rounding_s = 1e-4;
-    std::string chosen = "gte(t," + to_text(first_s - rounding_s) + ")";
+    std::string select_expression = "gte(t," + to_text(first_s - rounding_s) + ")";
     if (every_s_) {
-      chosen += "*(isnan(prev_selected_t)+gte(t-prev_selected_t," +
-                to_text(*every_s_ - rounding_s) + "))";
+      select_expression += "*(isnan(prev_selected_t)+gte(t-prev_selected_t," +
+                           to_text(*every_s_ - rounding_s) + "))";
     }
     std::vector<std::string> input{"-copyts"};
     if (sought && number > 0) {
@@ -185,19 +187,19 @@ class VideoStore final : public PictureStore {
                                     std::string("-i"), "file:" + file_}) {
       input.push_back(word);
     }
-    held_.clear();
-    frames_.emplace(input, chosen, file_, limits_);
+    kept_pictures_.clear();
+    frames_.emplace(input, select_expression, file_, limits_);
     last_ = std::numeric_limits<std::int64_t>::min();
   }
 
   /// Keeps a decoded picture, because threads request pictures slightly out of order.
-  void hold(DecodedFrame&& frame) const {
+  void keep_for_later(DecodedFrame&& frame) const {
     constexpr std::size_t max_bytes = std::size_t{256} << 20;
     constexpr std::size_t max_pictures = 32;
-    const std::size_t max_held =
+    const std::size_t max_kept =
         std::clamp<std::size_t>(max_bytes / frame.picture.pixels().size(), 2, max_pictures);
-    held_.emplace(frame.stamp, std::move(frame.picture));
-    while (held_.size() > max_held) held_.erase(held_.begin());
+    kept_pictures_.emplace(frame.stamp, std::move(frame.picture));
+    while (kept_pictures_.size() > max_kept) kept_pictures_.erase(kept_pictures_.begin());
   }
 
   std::string file_;
@@ -207,7 +209,7 @@ class VideoStore final : public PictureStore {
   mutable std::mutex mutex_;
   mutable std::optional<DecodedVideo> frames_;
   mutable std::int64_t last_ = 0;
-  mutable std::map<std::int64_t, Image> held_;
+  mutable std::map<std::int64_t, Image> kept_pictures_;
 };
 
 }  // namespace

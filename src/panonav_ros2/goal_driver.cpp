@@ -1,6 +1,5 @@
 #include "panonav_ros2/goal_driver.hpp"
 
-#include <limits>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -95,7 +94,7 @@ void GoalDriver::drive_to_goal(const Observation& observation, const std::option
   if (pose) report.estimate = memory_->tracker.localiser().find_nearest_view(pose->position());
   const RobotNavigator::Step step = navigator_->step(observation, report);
   const NavigationDecision& decision = step.decision;
-  const std::string state(name_of(decision.state));
+  const std::string state(to_string(decision.state));
   if (decision.state != NavigationDecision::State::moving) {
     end(state, decision.state == NavigationDecision::State::arrived ? fine : error);
     return;
@@ -113,7 +112,7 @@ void GoalDriver::drive_along_route(const Observation& observation,
                                    const std::optional<Pose2>& pose) {
   const RouteDriver::Step step = route_driver_->step(observation, pose);
   mission_.along_m = step.along_m;
-  const std::string state(name_of(step.state));
+  const std::string state(to_string(step.state));
   if (step.state == RouteDriver::State::arrived || step.state == RouteDriver::State::lost) {
     end(state, step.state == RouteDriver::State::arrived ? fine : error);
     return;

@@ -119,7 +119,7 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
   last_pose_ = estimate.pose;
   if (estimate.pose) estimate.pose = *estimate.pose * inverse(base_from_camera_);
   recordings::RunMoment moment;
-  describe(moment, estimate);
+  set_localisation(moment, estimate);
   if (!moment.sure) last_pose_.reset();
   if (last_pose_) correct_motion(*moment.pose, moved.path_from_base, moment);
   driver_.drive(observation, last_pose_);
@@ -171,7 +171,9 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
   }
   if (best_matches_.subscribers() > 0) {
     const auto found = tracker.index()->search(view, {.top = 1}, {});
-    const auto thumbnail = memory_->file.thumbnail(found.matches.front().view);
+    // A view that another robot has just removed from a server is not found any more.
+    const auto thumbnail =
+        found.matches.empty() ? std::nullopt : memory_->file.thumbnail(found.matches.front().view);
     if (thumbnail) best_matches_.publish({{stamp_ns, setup_.frames.base}, "png", *thumbnail});
   }
 }

@@ -54,8 +54,7 @@ BootTime read_boot_time() {
 }
 
 /// Returns why a mission written at that time is not continued; empty if it is continued.
-std::string find_reason_not_to_continue(const BootTime& written, double file_age_s,
-                                        double max_age_s) {
+std::string find_rejection_reason(const BootTime& written, double file_age_s, double max_age_s) {
   const BootTime now = read_boot_time();
   if (now.boot.empty() || written.boot != now.boot) {
     return " was written before the system was started";
@@ -107,7 +106,7 @@ std::optional<Mission> MissionFile::load(WarningLog& log) {
   BootTime at;
   std::string fault = " is damaged";
   if (mission && in >> word >> at.boot >> at.seconds && word == "written") {
-    fault = find_reason_not_to_continue(at, age_s, max_age_s_);
+    fault = find_rejection_reason(at, age_s, max_age_s_);
     if (fault.empty()) return mission;
   }
   log.warn("mission", path_.string() + fault + "; the robot does not continue");

@@ -42,8 +42,8 @@ std::optional<MotionHistory::Motion> MotionHistory::at(std::int64_t stamp_ns) co
   const double share = static_cast<double>(stamp_ns - before.stamp_ns) /
                        static_cast<double>(after->stamp_ns - before.stamp_ns);
   return motion(recordings::ros::to_pose2(
-      recordings::ros::between(recordings::ros::to_pose(before.odom_from_base),
-                               recordings::ros::to_pose(after->odom_from_base), share)));
+      recordings::ros::interpolate(recordings::ros::to_pose(before.odom_from_base),
+                                   recordings::ros::to_pose(after->odom_from_base), share)));
 }
 
 std::optional<MotionHistory::Motion> MotionHistory::newest() const {

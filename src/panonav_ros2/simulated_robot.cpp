@@ -17,11 +17,11 @@ namespace panonav::ros2 {
 void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor) {
   using T = SimulatedRobotOptions;
   constexpr OptionTable table{
-      option<&T::picture_rate_hz>("images per second of the simulation", 0.001, 100),
-      option<&T::odometry_rate_hz>("odometry messages per second of the simulation", 0.001, 1000),
-      option<&T::time_factor>("seconds of the simulation per second", 0.001, 100),
-      option<&T::velocity_timeout_s>("time without a command after which the robot stops", 0.001,
-                                     60),
+      option<&T::picture_rate_hz>("images per second of simulated time", 0.001, 100),
+      option<&T::odometry_rate_hz>("odometry messages per second of simulated time", 0.001, 1000),
+      option<&T::time_factor>("simulated seconds per second of real time", 0.001, 100),
+      option<&T::velocity_timeout_s>("time without a velocity command after which the robot stops",
+                                     0.001, 60),
   };
   table.visit(options, visitor);
 }
@@ -65,7 +65,7 @@ struct SimulatedRobot::Implementation {
         [this](const recordings::ros::Twist& twist) { set_velocity(twist); });
     subscribe<recordings::ros::PoseStamped>(participant, log, "set_pose", {},
                                             [this](const recordings::ros::PoseStamped& message) {
-                                              carry_to(recordings::ros::to_pose2(message.pose));
+                                              teleport_to(recordings::ros::to_pose2(message.pose));
                                             });
   }
 
@@ -77,12 +77,12 @@ struct SimulatedRobot::Implementation {
     velocity_until_s = now_s + options.velocity_timeout_s;
   }
 
-  void carry_to(const Pose2& pose) {
+  void teleport_to(const Pose2& pose) {
     if (!surroundings.is_free(pose.position())) {
       throw ContractError("place", format_fixed(pose.x_m, 2) + ", " + format_fixed(pose.y_m, 2),
                           "a free one");
     }
-    base.carry_to(pose);
+    base.teleport_to(pose);
   }
 
   void run() {
@@ -119,11 +119,11 @@ struct SimulatedRobot::Implementation {
     truths.publish({{stamp_ns, "map"}, recordings::ros::to_pose(base.pose())});
     if (now_s < next_picture_s || is_taking_picture.exchange(true)) return;
     next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
-    camera_work.add([this, stamp_ns, pose = base.pose()] { take_picture(stamp_ns, pose); });
+    camera_work.add([this, stamp_ns, pose = base.pose()] { capture_image(stamp_ns, pose); });
   }
 
   /// Renders an image; runs on a separate thread, so that the simulation does not wait.
-  void take_picture(std::int64_t stamp_ns, const Pose2& pose) {
+  void capture_image(std::int64_t stamp_ns, const Pose2& pose) {
     try {
       const Image picture = surroundings.picture(pose, Random(seed, ++picture_number).next());
       pictures.publish(make_message(picture, stamp_ns));

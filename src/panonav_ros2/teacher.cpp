@@ -68,13 +68,13 @@ void Teacher::store_lines(const TopologicalMap& map) {
     const std::size_t before = line.node;
     const std::size_t after = std::min(before + 1, nodes_.size() - 1);
     Pose2& pose = line.encoded.pose;
-    const auto corrected_by_node = [&](std::size_t node) {
+    const auto correct_by_node = [&](std::size_t node) {
       return map.nodes[node].pose * inverse(nodes_[node]) * pose;
     };
     const double from_m = distance(nodes_[before].position(), pose.position());
     const double to_m = distance(nodes_[after].position(), pose.position());
     const double share = from_m > 0.0 ? from_m / (from_m + to_m) : 0.0;
-    pose = interpolate(corrected_by_node(before), corrected_by_node(after), share);
+    pose = interpolate(correct_by_node(before), correct_by_node(after), share);
     recorder.add(std::move(line.encoded));
   }
   (void)recorder.finish();

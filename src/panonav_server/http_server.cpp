@@ -39,7 +39,7 @@ constexpr int send_buffer_bytes = 256 * 1024;
 constexpr unsigned request_timeout_s = 5;
 constexpr unsigned idle_timeout_s = 30;  ///< between two requests of a trusted client
 constexpr double min_body_bytes_per_s = 100e3;
-constexpr milliseconds tick_interval(400);
+constexpr milliseconds poll_interval(400);
 
 enum class Stage {
   idle,  ///< no byte of the next request yet
@@ -51,8 +51,9 @@ struct Connection {
   MHD_Connection* handle = nullptr;
   int socket = -1;
   Stage stage = Stage::idle;
-  Clock::time_point heard = Clock::now();  ///< of the last received bytes or stage change
-  Clock::time_point due = heard + std::chrono::seconds(request_timeout_s);  ///< late after this
+  Clock::time_point last_activity = Clock::now();  ///< of the last received bytes or stage change
+  Clock::time_point deadline =
+      last_activity + std::chrono::seconds(request_timeout_s);  ///< late after this
   bool trusted = false;  ///< sent a head that `judge_head` trusts
   bool evicted = false;
   bool suspended = false;  ///< waits for `more` or `later`
@@ -65,23 +66,24 @@ struct Connection {
   std::string piece;     ///< of `more`
   std::size_t sent = 0;  ///< of `piece`
 
-  void enter(Stage next) {
+  void enter_stage(Stage next) {
     stage = next;
-    heard = Clock::now();
+    last_activity = Clock::now();
     const bool is_pause = stage == Stage::idle && trusted;
-    due = heard + std::chrono::seconds(is_pause ? idle_timeout_s : request_timeout_s);
+    deadline = last_activity + std::chrono::seconds(is_pause ? idle_timeout_s : request_timeout_s);
   }
   /// Extends the deadline of a body by the time for `bytes` more, but never to more than the
   /// time-out from now.
   void extend_deadline(std::size_t bytes) {
-    heard = Clock::now();
-    due = std::min(due + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
-                             static_cast<double>(bytes) / min_body_bytes_per_s)),
-                   heard + std::chrono::seconds(request_timeout_s));
+    last_activity = Clock::now();
+    deadline = std::min(
+        deadline + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                       static_cast<double>(bytes) / min_body_bytes_per_s)),
+        last_activity + std::chrono::seconds(request_timeout_s));
   }
   [[nodiscard]] bool is_late() const {
     // During answers, libmicrohttpd itself detects clients that accept nothing.
-    return stage != Stage::answering && Clock::now() > due;
+    return stage != Stage::answering && Clock::now() > deadline;
   }
   /// Rank in which connections are evicted to make room, lowest first; nullopt: not evicted.
   [[nodiscard]] std::optional<int> eviction_rank() const {
@@ -110,7 +112,8 @@ Connection& get_connection(MHD_Connection* handle) {
 }
 
 /// Copies the next part of a stream into the buffer of libmicrohttpd.
-ssize_t read_more(void* connection, std::uint64_t /*position*/, char* buffer, std::size_t size) {
+ssize_t copy_next_part(void* connection, std::uint64_t /*position*/, char* buffer,
+                       std::size_t size) {
   Connection& one = *static_cast<Connection*>(connection);
   if (one.evicted) return MHD_CONTENT_READER_END_WITH_ERROR;
   if (one.sent == one.piece.size()) {
@@ -129,8 +132,8 @@ ssize_t read_more(void* connection, std::uint64_t /*position*/, char* buffer, st
 }
 
 /// Queues an answer with `headers` (each ended by "\r\n"), and moves its `more` to the connection.
-MHD_Result put(Connection& one, HttpAnswer answer, std::string_view headers) {
-  one.enter(Stage::answering);
+MHD_Result queue_answer(Connection& one, HttpAnswer answer, std::string_view headers) {
+  one.enter_stage(Stage::answering);
   const auto status = static_cast<unsigned>(answer.status);
   if (answer.content.empty() && status >= 400) {
     answer.content = std::string(MHD_get_reason_phrase_for(status)) + ".\n";
@@ -138,8 +141,8 @@ MHD_Result put(Connection& one, HttpAnswer answer, std::string_view headers) {
   MHD_Response* response = nullptr;
   if (answer.more) {
     one.more = std::move(answer.more);
-    response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, send_buffer_bytes, &read_more,
-                                                 &one, nullptr);
+    response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, send_buffer_bytes,
+                                                 &copy_next_part, &one, nullptr);
     MHD_set_response_options(response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END);
   } else {
     response = MHD_create_response_from_buffer(answer.content.size(), answer.content.data(),
@@ -201,32 +204,33 @@ struct HttpServer::Implementation {
 
   ~Implementation() {
     ended = true;
-    poke();
+    wake_up();
     thread.join();
     MHD_stop_daemon(daemon);
     close(wake);
   }
 
   void start_daemon() {
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_port = htons(static_cast<std::uint16_t>(options.port));
-    if (inet_pton(AF_INET, options.address.c_str(), &place.sin_addr) != 1) return;
+    sockaddr_in socket_address{};
+    socket_address.sin_family = AF_INET;
+    socket_address.sin_port = htons(static_cast<std::uint16_t>(options.port));
+    if (inet_pton(AF_INET, options.address.c_str(), &socket_address.sin_addr) != 1) return;
     const auto keep_escaped = [](void*, MHD_Connection*, char* text) { return std::strlen(text); };
     daemon = MHD_start_daemon(
         MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_SUPPRESS_DATE_NO_CLOCK, 0, nullptr,
-        nullptr, &take, this, MHD_OPTION_SOCK_ADDR, reinterpret_cast<sockaddr*>(&place),
-        MHD_OPTION_STRICT_FOR_CLIENT, is_lenient_version() ? 0 : 1,
+        nullptr, &on_request_data, this, MHD_OPTION_SOCK_ADDR,
+        reinterpret_cast<sockaddr*>(&socket_address), MHD_OPTION_STRICT_FOR_CLIENT,
+        is_lenient_version() ? 0 : 1,
         // Evicted connections still exist for a moment.
         MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(2 * max_connections),
         MHD_OPTION_CONNECTION_TIMEOUT, request_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-        connection_bytes, MHD_OPTION_NOTIFY_CONNECTION, &connect_or_close, this,
-        MHD_OPTION_NOTIFY_COMPLETED, &complete, nullptr, MHD_OPTION_UNESCAPE_CALLBACK,
+        connection_bytes, MHD_OPTION_NOTIFY_CONNECTION, &on_connection_change, this,
+        MHD_OPTION_NOTIFY_COMPLETED, &on_request_completed, nullptr, MHD_OPTION_UNESCAPE_CALLBACK,
         static_cast<std::size_t (*)(void*, MHD_Connection*, char*)>(keep_escaped), nullptr,
         MHD_OPTION_END);
   }
 
-  void poke() const {
+  void wake_up() const {
     const std::uint64_t one = 1;
     [[maybe_unused]] const auto written = write(wake, &one, sizeof(one));
   }
@@ -234,17 +238,17 @@ struct HttpServer::Implementation {
   void serve() {
     const int events = MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
     std::optional<Clock::time_point> last;  // when to stop sending answers
-    Clock::time_point ticked{};
+    Clock::time_point last_poll{};
     while (!last || (Clock::now() < *last && is_sending_answers())) {
       std::array<pollfd, 2> waiting{pollfd{wake, POLLIN, 0}, pollfd{events, POLLIN, 0}};
       MHD_UNSIGNED_LONG_LONG due_ms = 0;
       const bool is_due = MHD_get_timeout(daemon, &due_ms) == MHD_YES && due_ms == 0;
       poll(waiting.data(), waiting.size(), is_due ? 0 : last ? 50 : 500);
-      std::uint64_t pokes = 0;
-      const bool poked = read(wake, &pokes, sizeof(pokes)) > 0;
-      if (poked || Clock::now() - ticked > tick_interval) {
-        std::ranges::for_each(connections, &Implementation::tick);
-        ticked = Clock::now();
+      std::uint64_t wake_ups = 0;
+      const bool was_woken = read(wake, &wake_ups, sizeof(wake_ups)) > 0;
+      if (was_woken || Clock::now() - last_poll > poll_interval) {
+        std::ranges::for_each(connections, &Implementation::poll_connection);
+        last_poll = Clock::now();
       }
       std::ranges::for_each(connections, &Implementation::check_first_byte);
       MHD_run(daemon);
@@ -259,7 +263,7 @@ struct HttpServer::Implementation {
 
   /// Calls `later` of a connection that waits for it; evicts the connection if it is late or its
   /// client has left.
-  static void tick(Connection& one) {
+  static void poll_connection(Connection& one) {
     if (one.evicted) return;
     if (!one.suspended) {
       if (one.is_late()) one.evict();
@@ -279,7 +283,7 @@ struct HttpServer::Implementation {
         recv(one.socket, &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1) {
       return;
     }
-    one.enter(Stage::reading);
+    one.enter_stage(Stage::reading);
     if (std::isalpha(static_cast<unsigned char>(first)) != 0 || first == '*') return;
     constexpr std::string_view refusal = "HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n";
     send(one.socket, refusal.data(), refusal.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -293,8 +297,8 @@ struct HttpServer::Implementation {
     });
   }
 
-  static void connect_or_close(void* self, MHD_Connection* handle, void** context,
-                               MHD_ConnectionNotificationCode code) {
+  static void on_connection_change(void* self, MHD_Connection* handle, void** context,
+                                   MHD_ConnectionNotificationCode code) {
     auto& connections = static_cast<Implementation*>(self)->connections;
     if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
       connections.remove_if([&](const Connection& one) { return &one == *context; });
@@ -304,7 +308,7 @@ struct HttpServer::Implementation {
     Connection* leaving = nullptr;
     for (Connection& other : connections) {
       const auto order = [](const Connection& of) {
-        return std::pair(*of.eviction_rank(), of.heard);
+        return std::pair(*of.eviction_rank(), of.last_activity);
       };
       if (other.eviction_rank() && (leaving == nullptr || order(other) < order(*leaving))) {
         leaving = &other;
@@ -319,8 +323,8 @@ struct HttpServer::Implementation {
     (leaving == nullptr ? &one : leaving)->evict();
   }
 
-  static void complete(void* /*self*/, MHD_Connection* handle, void** /*request*/,
-                       MHD_RequestTerminationCode /*why*/) {
+  static void on_request_completed(void* /*self*/, MHD_Connection* handle, void** /*request*/,
+                                   MHD_RequestTerminationCode /*why*/) {
     Connection& one = get_connection(handle);
     one.more = nullptr;
     one.later = nullptr;
@@ -328,15 +332,15 @@ struct HttpServer::Implementation {
     one.has_head = false;
     one.refused_body = 0;
     one.request = {};
-    one.enter(Stage::idle);
+    one.enter_stage(Stage::idle);
     MHD_set_connection_option(handle, MHD_CONNECTION_OPTION_TIMEOUT, idle_timeout_s);
   }
 
   /// Called by libmicrohttpd with the head, with each piece of the body, at its end, and again when
   /// a suspended connection is resumed.
-  static MHD_Result take(void* self, MHD_Connection* handle, const char* path, const char* method,
-                         const char* version, const char* data, std::size_t* size,
-                         void** /*request*/) {
+  static MHD_Result on_request_data(void* self, MHD_Connection* handle, const char* path,
+                                    const char* method, const char* version, const char* data,
+                                    std::size_t* size, void** /*request*/) {
     auto& server = *static_cast<Implementation*>(self);
     Connection& one = get_connection(handle);
     if (one.evicted) return MHD_NO;
@@ -346,12 +350,12 @@ struct HttpServer::Implementation {
       return MHD_YES;
     }
     if (one.refused_body != 0) {
-      return put(one, {.status = one.refused_body}, server.options.headers);
+      return queue_answer(one, {.status = one.refused_body}, server.options.headers);
     }
     if (!one.answer) server.answer_request(one);
     if (one.later && !one.answer) one.answer = one.later();
     if (one.answer)
-      return put(one, *std::exchange(one.answer, std::nullopt), server.options.headers);
+      return queue_answer(one, *std::exchange(one.answer, std::nullopt), server.options.headers);
     one.suspend();
     return MHD_YES;
   }
@@ -360,15 +364,15 @@ struct HttpServer::Implementation {
                          const char* version) {
     one.has_head = true;
     one.request = {.method = method, .path = path};
-    if (one.stage == Stage::idle) one.enter(Stage::reading);
+    if (one.stage == Stage::idle) one.enter_stage(Stage::reading);
     MHD_set_connection_option(one.handle, MHD_CONNECTION_OPTION_TIMEOUT, request_timeout_s);
     HttpHead head = read_http_head(one.handle, method, version, options.max_body, one.request);
     if (head.status == 0 && head.body_bytes > 0 && exceeds_body_limit(0)) head.status = 503;
-    if (head.status != 0) return put(one, {.status = head.status}, options.headers);
+    if (head.status != 0) return queue_answer(one, {.status = head.status}, options.headers);
     HeadVerdict verdict = judge(one.request);
     one.trusted = one.trusted || verdict.is_trusted;
-    if (verdict.refusal) return put(one, std::move(*verdict.refusal), options.headers);
-    one.enter(Stage::reading);  // the body has its own time-out
+    if (verdict.refusal) return queue_answer(one, std::move(*verdict.refusal), options.headers);
+    one.enter_stage(Stage::reading);  // the body has its own time-out
     return MHD_YES;
   }
 
@@ -402,7 +406,7 @@ struct HttpServer::Implementation {
   /// Calls the handler and sets `answer` or `later`.
   void answer_request(Connection& one) {
     if (one.later) return;
-    one.enter(Stage::answering);
+    one.enter_stage(Stage::answering);
     try {
       one.answer = handler(std::move(one.request));
     } catch (const std::exception&) {
@@ -430,8 +434,8 @@ int HttpServer::port() const {
   return MHD_get_daemon_info(implementation_->daemon, MHD_DAEMON_INFO_BIND_PORT)->port;
 }
 
-void HttpServer::poke() {
-  implementation_->poke();
+void HttpServer::wake_up() {
+  implementation_->wake_up();
 }
 
 }  // namespace panonav::server

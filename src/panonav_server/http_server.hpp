@@ -28,7 +28,7 @@ struct HttpAnswer {
   /// calls this for the next part (may be empty), until it returns nullopt. The function is
   /// destroyed with the connection.
   std::function<std::optional<std::string>()> more;
-  /// If set, the answer is not ready yet: after each `poke`, and at least twice a second, the
+  /// If set, the answer is not ready yet: after each `wake_up`, and at least twice a second, the
   /// server calls this until it returns the answer, which must have no `later`. The function is
   /// destroyed with the connection.
   std::function<std::optional<HttpAnswer>()> later;
@@ -85,7 +85,7 @@ class HttpServer {
   [[nodiscard]] int port() const;
   /// Makes the server call the functions `more` and `later` soon. Any thread may call; it never
   /// waits.
-  void poke();
+  void wake_up();
 
  private:
   struct Implementation;

@@ -72,8 +72,8 @@ std::string describe_memories(const std::map<std::string, Served>& served) {
     text += "panonav_memory_views{memory=\"" + name + "\"} " +
             std::to_string(one.loaded->recogniser.size()) + "\n";
   }
-  const auto of_searched = [&](const std::string& name, const std::string& type,
-                               const std::string& help, const auto& value) {
+  const auto add_search_metric = [&](const std::string& name, const std::string& type,
+                                     const std::string& help, const auto& value) {
     std::string lines;
     for (const auto& [memory, one] : served) {
       if (one.loaded->recogniser.is_held()) continue;
@@ -81,16 +81,17 @@ std::string describe_memories(const std::map<std::string, Served>& served) {
     }
     if (!lines.empty()) text += describe_metric(name, type, help) + lines;
   };
-  of_searched("panonav_sketch_bytes", "gauge", "Bytes of sketches of a memory.",
-              [](const PlaceRecogniser& of) { return std::to_string(of.index_bytes()); });
-  of_searched(
+  add_search_metric("panonav_sketch_bytes", "gauge", "Bytes of sketches of a memory.",
+                    [](const PlaceRecogniser& of) { return std::to_string(of.index_bytes()); });
+  add_search_metric(
       "panonav_searches_total", "counter", "Exact searches in a memory on its server.",
       [](const PlaceRecogniser& of) { return std::to_string(of.search_counters().searches); });
-  of_searched(
+  add_search_metric(
       "panonav_search_views_read_total", "counter", "Views that searches read in full.",
       [](const PlaceRecogniser& of) { return std::to_string(of.search_counters().views_read); });
-  of_searched("panonav_search_seconds_total", "counter", "Time that searches took.",
-              [](const PlaceRecogniser& of) { return to_text(of.search_counters().seconds); });
+  add_search_metric(
+      "panonav_search_seconds_total", "counter", "Time that searches took.",
+      [](const PlaceRecogniser& of) { return to_text(of.search_counters().seconds); });
   text += describe_metric("panonav_memory_reloads_total", "counter",
                           "Times that a changed memory file was read again, by result.");
   for (const auto& [name, one] : served) {

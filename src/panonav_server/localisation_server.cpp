@@ -106,23 +106,24 @@ struct LocalisationServer::Implementation {
       lane_by_memory[memory.name] = &lane;
     }
     const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    server.emplace(HttpServerOptions{.address = options.address,
-                                     .port = options.port,
-                                     .headers = "X-Content-Type-Options: nosniff\r\n"
-                                                "Referrer-Policy: no-referrer\r\n"
-                                                "Cross-Origin-Resource-Policy: same-origin\r\n"
-                                                "Content-Security-Policy: default-src 'none'; "
-                                                "frame-ancestors 'none'\r\n"
-                                                "Cache-Control: no-store\r\n",
-                                     .max_body = max_picture_bytes,
-                                     .max_bodies = max_in_flight_bytes,
-                                     .judge_head = [this](const auto& head) { return judge(head); },
-                                     .last_answers = time_for_last_answers},
-                   [this](HttpRequest request) { return answer(std::move(request)); });
+    server.emplace(
+        HttpServerOptions{.address = options.address,
+                          .port = options.port,
+                          .headers = "X-Content-Type-Options: nosniff\r\n"
+                                     "Referrer-Policy: no-referrer\r\n"
+                                     "Cross-Origin-Resource-Policy: same-origin\r\n"
+                                     "Content-Security-Policy: default-src 'none'; "
+                                     "frame-ancestors 'none'\r\n"
+                                     "Cache-Control: no-store\r\n",
+                          .max_body = max_picture_bytes,
+                          .max_bodies = max_in_flight_bytes,
+                          .judge_head = [this](const auto& head) { return check_access(head); },
+                          .last_answers = time_for_last_answers},
+        [this](HttpRequest request) { return answer(std::move(request)); });
     for (Lane& lane : lanes) {
       if (lane.memories.empty()) continue;
       for (int i = 0; i < (options.threads == 0 ? cores : options.threads); ++i) {
-        lane.workers.emplace_back([this, &lane] { work(lane); });
+        lane.workers.emplace_back([this, &lane] { answer_jobs(lane); });
       }
       lane.watcher = std::thread([this, &lane] { watch(lane); });
     }
@@ -156,7 +157,7 @@ struct LocalisationServer::Implementation {
 
   /// Refuses requests without a valid token or origin before their bodies are read. Everybody may
   /// read `/health`, but is not trusted for it.
-  HeadVerdict judge(const HttpRequest& head) {
+  HeadVerdict check_access(const HttpRequest& head) {
     if (head.path == "/health") return {};
     std::optional<HttpAnswer> refusal;
     if (options.token.empty()) {
@@ -287,10 +288,10 @@ struct LocalisationServer::Implementation {
     }
     text += describe_metric("panonav_localisation_seconds", "histogram",
                             "Time in which an image was decoded and answered.") +
-            answering.text("panonav_localisation_seconds");
+            answer_times.text("panonav_localisation_seconds");
     text += describe_metric("panonav_waiting_seconds", "histogram",
                             "Time for which an image waited for a thread.") +
-            queueing.text("panonav_waiting_seconds");
+            queue_times.text("panonav_waiting_seconds");
     std::size_t waiting = 0;
     for (const Lane& lane : lanes) waiting += lane.waiting.size();
     text += describe_metric("panonav_waiting", "gauge", "Images that wait for a thread.") +
@@ -304,7 +305,7 @@ struct LocalisationServer::Implementation {
 
   // ---- on the worker threads
 
-  void work(Lane& lane) {
+  void answer_jobs(Lane& lane) {
     std::unique_lock lock(mutex);
     while (true) {
       lane.came.wait(lock, [&] { return ending || !lane.waiting.empty(); });
@@ -324,7 +325,7 @@ struct LocalisationServer::Implementation {
         // Otherwise each job would wait for the silent server in turn.
         answer = make_error(503, describe_unreadable(job->memory));
       } else {
-        if (is_picture) queueing.add(from - job->came);
+        if (is_picture) queue_times.add(from - job->came);
         const std::shared_ptr<LoadedMemory> memory = one.loaded;
         lock.unlock();
         answer = is_picture ? localise(*job, *memory, known) : thumbnail(*job, *memory);
@@ -333,12 +334,12 @@ struct LocalisationServer::Implementation {
       if (answer.status >= 400) {
         ++refused[answer.status];
       } else if (is_picture) {
-        answering.add(Clock::now() - from);
+        answer_times.add(Clock::now() - from);
         ++(known ? one.known : one.unknown);
       }
       job->answer = std::move(answer);
       job->answered = true;
-      server->poke();
+      server->wake_up();
     }
   }
 
@@ -410,10 +411,10 @@ struct LocalisationServer::Implementation {
   // ---- on the watcher thread of a lane, which reloads changed memories
 
   void watch(Lane& lane) {
-    std::chrono::milliseconds pause = options.look_every;
+    std::chrono::milliseconds pause = options.poll_interval;
     std::unique_lock lock(mutex);
     while (!ended.wait_for(lock, pause, [this] { return ending; })) {
-      pause = options.look_every;
+      pause = options.poll_interval;
       for (const std::string& name : lane.memories) {
         if (ending) return;
         lock.unlock();
@@ -463,8 +464,8 @@ struct LocalisationServer::Implementation {
   std::list<Lane> lanes{1};              // the first has all memory files
   std::map<std::string, Lane*> lane_by_memory;
   std::map<int, std::uint64_t> refused;
-  Histogram answering;
-  Histogram queueing;
+  Histogram answer_times;
+  Histogram queue_times;
   bool ending = false;
   Clock::time_point last_answer;  // deadline once it is ending
   std::optional<HttpServer> server;

@@ -30,7 +30,7 @@ struct LocalisationServerOptions {
   /// (`PlaceRecogniserOptions::max_held_views`), and else searched on its server.
   std::size_t max_held_views = 200'000;
   /// Interval at which memory files are checked for changes.
-  std::chrono::milliseconds look_every{1000};
+  std::chrono::milliseconds poll_interval{1000};
   /// Called on another thread with one line for each event of a memory, such as a reload.
   std::function<void(const std::string& line)> note;
 };

@@ -62,8 +62,8 @@ LineCamera make_line_camera(double height_m, int columns) {
   return result;
 }
 
-std::vector<float> take_line(const Renderer& renderer, const Pose2& pose, const LineCamera& camera,
-                             std::uint64_t seed) {
+std::vector<float> capture_line(const Renderer& renderer, const Pose2& pose,
+                                const LineCamera& camera, std::uint64_t seed) {
   const double c = std::cos(pose.heading_rad);
   const double s = std::sin(pose.heading_rad);
   constexpr std::size_t rays_each = rays_per_axis * rays_per_axis;

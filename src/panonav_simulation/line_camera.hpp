@@ -32,7 +32,7 @@ struct LineCamera {
 
 /// Renders the horizon scanline of the image that the robot would take at `pose`. The same pose and
 /// seed give the same bits. May be called from several threads. Cost: some milliseconds.
-[[nodiscard]] std::vector<float> take_line(const Renderer& renderer, const Pose2& pose,
-                                           const LineCamera& camera, std::uint64_t seed);
+[[nodiscard]] std::vector<float> capture_line(const Renderer& renderer, const Pose2& pose,
+                                              const LineCamera& camera, std::uint64_t seed);
 
 }  // namespace panonav::simulation

@@ -140,14 +140,14 @@ struct ElementContext {
 class WorldReader {
  public:
   WorldReader(const fs::path& world, const GazeboOptions& options)
-      : world_(world), context_(world, options) {
+      : world_(world), sdf_context_(world, options) {
     scene_.camera_height_m = options.camera_height_m;
     scene_.ambient = 0.4F;  // defaults of SDF
     scene_.background = {0.7F, 0.7F, 0.7F};
   }
 
   Scene read() {
-    const pugi::xml_node root = context_.files.read_sdf_root(world_);
+    const pugi::xml_node root = sdf_context_.files.read_sdf_root(world_);
     opened_.push_back(world_.lexically_normal());
     const pugi::xml_node world = root.child("world");
     const pugi::xml_node top = world ? world : root;
@@ -159,7 +159,7 @@ class WorldReader {
     if (const auto background = read_colour(scene_element, "background"))
       scene_.background = *background;
     add_parts(top, {top, {}, {world_.parent_path(), {}}});
-    const std::vector<std::string> warnings = context_.warning_lines();
+    const std::vector<std::string> warnings = sdf_context_.warning_lines();
     if (scene_.meshes.empty()) {
       throw FileError(world_.string(),
                       "shows nothing: no visual with a shape" +
@@ -176,55 +176,55 @@ class WorldReader {
   // Returns the pose of a part; relative to `world_from_parent` if the part names no frame, or an
   // unknown one.
   Affine3 world_from(pugi::xml_node part, const Affine3& world_from_parent,
-                     const ElementContext& place) {
+                     const ElementContext& context) {
     const std::string_view frame = find_pose_frame(part);
     const Affine3 written = read_pose(find_pose_element(part));
     if (frame.empty()) return world_from_parent * written;
-    if (const auto scope_from_base = scope_from_frame(place.scope, frame))
-      return place.world_from_scope * *scope_from_base * written;
-    context_.warn(place.origin.object, "the pose of " + quote(part.attribute("name").value()) +
-                                           " is relative to " + quote(frame) +
-                                           ", which does not exist; taken relative to its parent");
+    if (const auto scope_from_base = scope_from_frame(context.scope, frame))
+      return context.world_from_scope * *scope_from_base * written;
+    sdf_context_.warn(context.origin.object,
+                      "the pose of " + quote(part.attribute("name").value()) + " is relative to " +
+                          quote(frame) + ", which does not exist; taken relative to its parent");
     return world_from_parent * written;
   }
 
   // Adds all models, lights and includes of `parent`, in the order of the file.
-  void add_parts(pugi::xml_node parent, const ElementContext& place) {
-    for (const pugi::xml_node& part : parent) add_part(part, part, place);
+  void add_parts(pugi::xml_node parent, const ElementContext& context) {
+    for (const pugi::xml_node& part : parent) add_part(part, part, context);
   }
 
   // Adds one part. `placed_by` is the part itself, or the <include> whose name and pose
   // replace those of the part.
-  void add_part(pugi::xml_node part, pugi::xml_node placed_by, const ElementContext& place) {
+  void add_part(pugi::xml_node part, pugi::xml_node placed_by, const ElementContext& context) {
     const std::string kind = part.name();
-    const std::string& object = place.origin.object;
+    const std::string& object = context.origin.object;
     std::string name = child_text(placed_by, "name");
     if (name.empty()) name = part.attribute("name").value();
     const std::string thing = kind + " " + quote(name);
     if (kind == "include") {
-      context_.try_to_add(kind + " " + quote(child_text(part, "uri")), object,
-                          [&] { add_include(part, place); });
+      sdf_context_.try_to_add(kind + " " + quote(child_text(part, "uri")), object,
+                              [&] { add_include(part, context); });
     } else if (kind == "model") {
-      context_.try_to_add(thing, object, [&] { add_model(part, placed_by, name, place); });
+      sdf_context_.try_to_add(thing, object, [&] { add_model(part, placed_by, name, context); });
     } else if (kind == "light") {
-      context_.try_to_add(thing, object, [&] {
+      sdf_context_.try_to_add(thing, object, [&] {
         const pugi::xml_node posed = find_pose_element(placed_by) ? placed_by : part;
-        add_light(part, world_from(posed, place.world_from_scope, place));
+        add_light(part, world_from(posed, context.world_from_scope, context));
       });
     } else if (is_element_named(part, {"actor", "population", "road"})) {
-      context_.warn(object, thing + " is left out: panonav shows nothing of this kind");
+      sdf_context_.warn(object, thing + " is left out: panonav shows nothing of this kind");
     }
   }
 
   // Returns the root of the file that an <include> names, and its path; an empty path for
   // well-known models.
   std::pair<pugi::xml_node, fs::path> open_include(const std::string& uri,
-                                                   const ElementContext& place) {
+                                                   const ElementContext& context) {
     constexpr int max_includes = 100000;
-    const auto found = context_.find(uri, place.origin);
+    const auto found = sdf_context_.find(uri, context.origin);
     if (!found) {
       const pugi::xml_node known = find_well_known_model(uri);
-      if (!known) throw UnusablePart{"it was not found in " + context_.files.places()};
+      if (!known) throw UnusablePart{"it was not found in " + sdf_context_.files.list_folders()};
       return {known, {}};
     }
     std::error_code code;
@@ -236,12 +236,12 @@ class WorldReader {
       throw UnusablePart{"it is included more than 32 models deep"};
     if (++includes_ > max_includes)
       throw UnusablePart{"the world includes more than 100000 models in all"};
-    return {context_.files.read_sdf_root(file), file};
+    return {sdf_context_.files.read_sdf_root(file), file};
   }
 
-  void add_include(pugi::xml_node include, const ElementContext& place) {
-    const auto [root, file] = open_include(child_text(include, "uri"), place);
-    ElementContext inner_context = place;
+  void add_include(pugi::xml_node include, const ElementContext& context) {
+    const auto [root, file] = open_include(child_text(include, "uri"), context);
+    ElementContext inner_context = context;
     if (!file.empty()) inner_context.origin.directory = file.parent_path();
     // Take the first model, light or actor, as Gazebo does.
     const pugi::xml_node part = root.find_child([](pugi::xml_node child) {
@@ -254,41 +254,41 @@ class WorldReader {
   }
 
   void add_model(pugi::xml_node model, pugi::xml_node placed_by, const std::string& name,
-                 const ElementContext& place) {
-    ElementContext inner_context = place;
+                 const ElementContext& context) {
+    ElementContext inner_context = context;
     inner_context.scope = model;
     if (inner_context.origin.object.empty()) inner_context.origin.object = name;
-    inner_context.world_from_scope =
-        world_from(find_pose_element(placed_by) ? placed_by : model, place.world_from_scope, place);
+    inner_context.world_from_scope = world_from(find_pose_element(placed_by) ? placed_by : model,
+                                                context.world_from_scope, context);
     std::string anchor = child_text(placed_by, "placement_frame");
     if (anchor.empty()) anchor = model.attribute("placement_frame").value();
     if (const auto model_from_anchor = scope_from_frame(model, anchor))
       inner_context.world_from_scope = inner_context.world_from_scope * inverse(*model_from_anchor);
     for (const pugi::xml_node& link : model.children("link")) {
-      context_.try_to_add("link " + quote(link.attribute("name").value()),
-                          inner_context.origin.object, [&] { add_link(link, inner_context); });
+      sdf_context_.try_to_add("link " + quote(link.attribute("name").value()),
+                              inner_context.origin.object, [&] { add_link(link, inner_context); });
     }
     add_parts(model, inner_context);
   }
 
-  void add_link(pugi::xml_node link, const ElementContext& place) {
-    const Affine3 world_from_link = world_from(link, place.world_from_scope, place);
+  void add_link(pugi::xml_node link, const ElementContext& context) {
+    const Affine3 world_from_link = world_from(link, context.world_from_scope, context);
     for (const pugi::xml_node& part : link) {
       if (!is_element_named(part, {"visual", "light"})) continue;
       const std::string kind = part.name();
-      context_.try_to_add(
-          kind + " " + quote(part.attribute("name").value()), place.origin.object, [&] {
-            const Affine3 world_from_part = world_from(part, world_from_link, place);
+      sdf_context_.try_to_add(
+          kind + " " + quote(part.attribute("name").value()), context.origin.object, [&] {
+            const Affine3 world_from_part = world_from(part, world_from_link, context);
             if (kind == "light") return add_light(part, world_from_part);
-            add_visual(part, world_from_part, place);
+            add_visual(part, world_from_part, context);
           });
     }
   }
 
   void add_visual(pugi::xml_node visual, const Affine3& world_from_visual,
-                  const ElementContext& place) {
+                  const ElementContext& context) {
     const std::size_t meshes_before = scene_.meshes.size();
-    visuals_.add(visual, world_from_visual, place.origin);
+    visuals_.add(visual, world_from_visual, context.origin);
     for (std::size_t i = meshes_before; i < scene_.meshes.size(); ++i) {
       if (std::ranges::all_of(scene_.meshes[i].vertices, is_renderable)) continue;
       scene_.meshes.resize(meshes_before);
@@ -325,9 +325,9 @@ class WorldReader {
   }
 
   fs::path world_;
-  SdfContext context_;
-  Scene& scene_ = context_.scene;
-  SdfVisuals visuals_{context_};
+  SdfContext sdf_context_;
+  Scene& scene_ = sdf_context_.scene;
+  SdfVisuals visuals_{sdf_context_};
   std::vector<fs::path> opened_;  // the file being read and those that include it
   int includes_ = 0;
 };

@@ -213,7 +213,8 @@ class ColladaRepair {
   void merge_holes_of_polygon(pugi::xml_node polygon) const {
     Outline outline;
     for (const pugi::xml_node& ring : polygon.children("p")) outline = parse_outline(ring);
-    for (const pugi::xml_node& ring : polygon.children("h")) join(outline, parse_outline(ring));
+    for (const pugi::xml_node& ring : polygon.children("h"))
+      merge_hole(outline, parse_outline(ring));
     std::string text;
     for (const Corner& corner : outline) {
       for (const double index : corner) text += std::to_string(std::lround(index)) + " ";
@@ -252,7 +253,7 @@ class ColladaRepair {
     return sum;
   }
 
-  void join(Outline& outline, Outline hole) const {
+  void merge_hole(Outline& outline, Outline hole) const {
     if (outline.empty() || hole.empty()) return;
     const Vector3 a = area_normal(outline);
     const Vector3 b = area_normal(hole);
@@ -290,7 +291,7 @@ class ColladaRepair {
 std::optional<std::string> repair_collada(const fs::path& path) {
   try {
     const pugi::xml_document document = parse_xml(read_scene_file(path));
-    const ColladaRepair joined(document.document_element());
+    const ColladaRepair repair(document.document_element());
     std::ostringstream text;
     text.imbue(std::locale::classic());
     document.save(text, "", pugi::format_raw | pugi::format_no_declaration);

@@ -17,7 +17,7 @@ template <typename Make>
 auto make_each(Executor& executor, std::size_t count, Make make) {
   using Made = std::invoke_result_t<Make, std::size_t>;
   std::vector<std::optional<Made>> slots(count);
-  executor.for_chunks(count, 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+  executor.for_each_chunk(count, 1, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) slots[i].emplace(make(i));
   });
   std::vector<Made> made;

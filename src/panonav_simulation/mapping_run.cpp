@@ -72,7 +72,7 @@ MappingRecording record_for_mapping(const PlaceRecording& place, std::vector<Pos
   MappingRecording recording;
   recording.wheels = simulate_odometry(poses, wheels, seed);
   recording.views = make_each(executor, poses.size(), [&](std::size_t i) {
-    return compute_signature(preprocess(take_view(place, poses[i], seed + i), {}), components);
+    return compute_signature(preprocess(capture_view(place, poses[i], seed + i), {}), components);
   });
   recording.truth = std::move(poses);
   return recording;

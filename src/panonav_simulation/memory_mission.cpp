@@ -71,8 +71,8 @@ std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> make_view
   return [=, renderer = std::move(renderer), encoder = std::move(encoder),
           report = std::move(report)](const Pose2& pose, std::uint64_t seed) {
     Executor one_thread(1);
-    const Image image = take_picture(*renderer, pose, camera, frame, sensor, seed,
-                                     executor == nullptr ? one_thread : *executor);
+    const Image image = capture_image(*renderer, pose, camera, frame, sensor, seed,
+                                      executor == nullptr ? one_thread : *executor);
     const Panorama panorama = encoder->panorama(image.view());
     if (report) report(image, panorama);
     return encoder->signature(panorama);
@@ -111,7 +111,7 @@ MissionPlace make_mission_place(const std::string& scene, SimulatedWorldOptions 
                   sensor = final_options.sensor,
                   encoder = std::make_shared<LineEncoder>(source, *route),
                   &executor](const Pose2& pose, std::uint64_t seed) {
-      return encoder->line(take_picture(*renderer, pose, camera, frame, sensor, seed, executor));
+      return encoder->line(capture_image(*renderer, pose, camera, frame, sensor, seed, executor));
     };
   }
   return place;

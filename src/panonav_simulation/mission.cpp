@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -89,8 +88,8 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
 // Returns the length of the shortest path; the straight distance if there is no path.
 double shortest_path_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
-  const auto way = space.shortest_path(from, to);
-  return way ? path_length_m(*way) : distance(from, to);
+  const auto path = space.shortest_path(from, to);
+  return path ? path_length_m(*path) : distance(from, to);
 }
 
 }  // namespace
@@ -104,7 +103,7 @@ std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> make_li
   const auto camera =
       std::make_shared<const LineCamera>(make_line_camera(place.scene.camera_height_m));
   return [camera, renderer = place.renderer](const Pose2& pose, std::uint64_t seed) {
-    return take_line(*renderer, pose, *camera, seed);
+    return capture_line(*renderer, pose, *camera, seed);
   };
 }
 
@@ -166,7 +165,7 @@ RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose
     memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
   }
   const double path_m = path_length_m(poses);
-  NavigationGraph graph = graph_from_map_and_neighbours(map, memory, executor);
+  NavigationGraph graph = make_graph_from_map_and_neighbours(map, memory, executor);
   std::vector<KnownRoute> routes;
   if (place.line) {
     std::vector<KnownRoute::View> placed;
@@ -199,10 +198,10 @@ MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
 
 bool MissionRobot::has_clear_path(Point2 from, Point2 to) const {
   // A person who already touches the robot must not prevent it from moving away.
-  const bool person_in_path = people_.has_person_within(to, robot_radius_m_) &&
-                              !people_.has_person_within(from, robot_radius_m_);
+  const bool is_person_in_path = people_.has_person_within(to, robot_radius_m_) &&
+                                 !people_.has_person_within(from, robot_radius_m_);
   constexpr double fine_m = 0.01;
-  return !person_in_path && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
+  return !is_person_in_path && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
 }
 
 void MissionRobot::wait(double seconds) {
@@ -231,9 +230,9 @@ void MissionRobot::command(const Velocity& velocity) {
 }
 
 std::optional<double> MissionRobot::find_free_direction(double direct_rad, double distance_m) {
-  const auto is_open = [&](double direction_rad, double path_m) {
+  const auto is_open = [&](double direction_rad, double length_m) {
     const Point2 there =
-        pose_ * Point2{path_m * std::cos(direction_rad), path_m * std::sin(direction_rad)};
+        pose_ * Point2{length_m * std::cos(direction_rad), length_m * std::sin(direction_rad)};
     return has_clear_path(pose_.position(), there);
   };
   if (is_open(direct_rad, distance_m)) {
@@ -284,18 +283,7 @@ class NearestReferenceEstimator {
     filter_.move(moved);
     const auto estimate = filter_.observe(pack(view, memory_->full_scale()));
     if (estimate.state != LocalisationState::localised || !estimate.pose) return std::nullopt;
-    std::optional<ViewId> nearest;
-    double min_m = std::numeric_limits<double>::infinity();
-    for (const ViewId id : memory_->views()) {
-      const auto& pose = memory_->info(id).pose;
-      if (!pose) continue;
-      const double far_m = distance(pose->position(), estimate.pose->position());
-      if (far_m < min_m) {
-        min_m = far_m;
-        nearest = id;
-      }
-    }
-    return nearest;
+    return filter_.find_nearest_view(estimate.pose->position());
   }
 
  private:
@@ -347,7 +335,7 @@ class MissionRunner {
         run.kidnapped_at = run.path.size() - 1;
         run.shortest_m += shortest_path_m(space, kidnapped_to->position(), goal) -
                           shortest_path_m(space, robot_.pose().position(), goal);
-        robot_.carry_to(*kidnapped_to);
+        robot_.teleport_to(*kidnapped_to);
         obstacle_ = false;
       }
     }
@@ -414,16 +402,16 @@ void require_goal(const RememberedPlace& remembered, ViewId goal) {
 }  // namespace
 
 std::string explain_other_ends(const std::map<NavigationDecision::State, std::size_t>& ends,
-                               std::size_t falsely_arrived, NavigationDecision::State expected) {
+                               std::size_t false_arrivals, NavigationDecision::State expected) {
   std::string text;
   const auto add = [&](std::size_t count, const std::string& end) {
     if (count == 0) return;
     text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
   };
   if (expected == NavigationDecision::State::arrived)
-    add(falsely_arrived, "report an arrival but are farther off");
+    add(false_arrivals, "report an arrival but are farther off");
   for (const auto& [end, count] : ends) {
-    if (end != expected) add(count, "end as " + std::string(name_of(end)));
+    if (end != expected) add(count, "end as " + std::string(to_string(end)));
   }
   return text;
 }
@@ -444,10 +432,10 @@ std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlac
                                  std::uint64_t seed) {
   for (const ViewId goal : goals) require_goal(remembered, goal);
   navigator.forget_place();
-  MissionRunner voyage(place, remembered, start, options, seed);
+  MissionRunner runner(place, remembered, start, options, seed);
   std::vector<MissionRun> runs;
   for (const ViewId goal : goals) {
-    runs.push_back(voyage.run(navigator, goal, std::nullopt, {}, {}));
+    runs.push_back(runner.run(navigator, goal, std::nullopt, {}, {}));
     // A robot that ended lost must relocalise, and not start from its last, doubtful estimate.
     if (runs.back().end == NavigationDecision::State::lost) navigator.forget_place();
   }

@@ -100,7 +100,7 @@ class MissionRobot final : public RobotBase {
   /// Lets people walk for some seconds while the robot stands.
   void wait(double seconds);
   /// Moves the robot to a pose without its odometry noticing (kidnapping).
-  void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
+  void teleport_to(const Pose2& pose) noexcept { pose_ = pose; }
   /// Returns the motion by odometry since the last call, robot_old_from_robot_new, and resets it.
   [[nodiscard]] Pose2 take_odometry() noexcept;
   [[nodiscard]] const People& people() const noexcept { return people_; }
@@ -172,9 +172,9 @@ struct MissionRun {
 };
 
 /// Describes in words the missions that did not end as `expected`. `ends` counts all missions,
-/// `falsely_arrived` those that reported an arrival farther off.
+/// `false_arrivals` those that reported an arrival farther off.
 [[nodiscard]] std::string explain_other_ends(
-    const std::map<NavigationDecision::State, std::size_t>& ends, std::size_t falsely_arrived,
+    const std::map<NavigationDecision::State, std::size_t>& ends, std::size_t false_arrivals,
     NavigationDecision::State expected = NavigationDecision::State::arrived);
 
 /// Called after each step, with the decision and the true pose.

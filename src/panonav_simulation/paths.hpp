@@ -27,17 +27,16 @@ inline constexpr double rounding_slack = 1e-9;
   std::vector<Pose2> poses;
   if (path.empty()) return poses;
   poses.push_back(path.front());
-  double path_length_m = 0.0;
+  double travelled_m = 0.0;
   for (std::size_t i = 1; i < path.size(); ++i) {
     const double segment = distance(path[i - 1].position(), path[i].position());
     for (;;) {
       const double next = spacing_m * static_cast<double>(poses.size());
-      if (!(next <= path_length_m + segment + rounding_slack * spacing_m) || !(segment > 0.0))
-        break;
-      poses.push_back(interpolate(path[i - 1], path[i],
-                                  std::clamp((next - path_length_m) / segment, 0.0, 1.0)));
+      if (!(next <= travelled_m + segment + rounding_slack * spacing_m) || !(segment > 0.0)) break;
+      poses.push_back(
+          interpolate(path[i - 1], path[i], std::clamp((next - travelled_m) / segment, 0.0, 1.0)));
     }
-    path_length_m += segment;
+    travelled_m += segment;
   }
   return poses;
 }

@@ -42,25 +42,25 @@ People::People(std::shared_ptr<const FreeSpace> space, int count, std::uint64_t 
   }
 }
 
-bool People::has_person_within(Point2 position, double at_most_m) const {
+bool People::has_person_within(Point2 position, double radius_m) const {
   return std::ranges::any_of(people_, [&](const Person& person) {
-    return distance(person.position, position) < at_most_m + person_radius_m;
+    return distance(person.position, position) < radius_m + person_radius_m;
   });
 }
 
 void People::choose_path(Person& person) {
   person.waited_s = 0.0;
-  const auto way = space_->shortest_path(person.position, space_->random_pose(random_).position());
-  person.way = way.value_or(std::vector<Point2>{});
-  std::ranges::reverse(person.way);
+  const auto path = space_->shortest_path(person.position, space_->random_pose(random_).position());
+  person.path = path.value_or(std::vector<Point2>{});
+  std::ranges::reverse(person.path);
 }
 
 void People::advance(double seconds, Point2 robot, double robot_radius_m) {
   for (Person& person : people_) {
-    if (person.way.empty()) choose_path(person);
+    if (person.path.empty()) choose_path(person);
     double left_m = walking_speed_m_s * seconds;
-    while (left_m > 0.0 && !person.way.empty()) {
-      const Point2 to = person.way.back();
+    while (left_m > 0.0 && !person.path.empty()) {
+      const Point2 to = person.path.back();
       const double far_m = distance(person.position, to);
       const double share = far_m > left_m ? left_m / far_m : 1.0;
       const Point2 there{person.position.x_m + share * (to.x_m - person.position.x_m),
@@ -75,7 +75,7 @@ void People::advance(double seconds, Point2 robot, double robot_radius_m) {
       }
       person.position = there;
       left_m -= far_m;
-      if (share == 1.0) person.way.pop_back();
+      if (share == 1.0) person.path.pop_back();
     }
   }
 }

@@ -33,8 +33,8 @@ class People {
  private:
   struct Person {
     Point2 position;
-    std::vector<Point2> way;  // remaining way points, the next one last
-    float brightness = 0.0F;  // of the clothes
+    std::vector<Point2> path;  // remaining way points, the next one last
+    float brightness = 0.0F;   // of the clothes
     double waited_s = 0.0;
   };
   void choose_path(Person& person);

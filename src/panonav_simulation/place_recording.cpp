@@ -26,32 +26,33 @@ std::size_t PlaceRecording::nearest_reference(Point2 position) const {
   return nearest;
 }
 
-Panorama take_view(const PlaceRecording& place, const PanoramaRendering& rendering,
-                   const Pose2& pose, std::uint64_t seed, const SensorOptions& sensor) {
+Panorama capture_view(const PlaceRecording& place, const PanoramaRendering& rendering,
+                      const Pose2& pose, std::uint64_t seed, const SensorOptions& sensor) {
   Executor here(1);
   Panorama view = place.renderer->render_panorama(
       {.pose = pose, .height_m = place.scene.camera_height_m}, rendering, here);
   return apply_sensor(std::move(view), sensor, seed);
 }
 
-Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
-                   const SensorOptions& sensor) {
-  return take_view(place, place.rendering, pose, seed, sensor);
+Panorama capture_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
+                      const SensorOptions& sensor) {
+  return capture_view(place, place.rendering, pose, seed, sensor);
 }
 
-std::vector<PlacedView> take_views(const PlaceRecording& place, const PanoramaRendering& rendering,
-                                   const std::vector<Pose2>& poses, std::uint64_t first_seed,
-                                   const SensorOptions& sensor, Executor& executor) {
+std::vector<PlacedView> capture_views(const PlaceRecording& place,
+                                      const PanoramaRendering& rendering,
+                                      const std::vector<Pose2>& poses, std::uint64_t first_seed,
+                                      const SensorOptions& sensor, Executor& executor) {
   return make_each(executor, poses.size(), [&](std::size_t i) {
-    return PlacedView{poses[i], take_view(place, rendering, poses[i], first_seed + i, sensor)};
+    return PlacedView{poses[i], capture_view(place, rendering, poses[i], first_seed + i, sensor)};
   });
 }
 
-std::vector<PlacedView> retake_queries(const PlaceRecording& place, const SensorOptions& sensor,
-                                       std::uint64_t first_seed, Executor& executor) {
+std::vector<PlacedView> recapture_queries(const PlaceRecording& place, const SensorOptions& sensor,
+                                          std::uint64_t first_seed, Executor& executor) {
   std::vector<Pose2> poses;
   for (const PlacedView& query : place.queries) poses.push_back(query.pose);
-  return take_views(place, place.rendering, poses, first_seed, sensor, executor);
+  return capture_views(place, place.rendering, poses, first_seed, sensor, executor);
 }
 
 PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor) {
@@ -75,9 +76,9 @@ PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options, E
   for (int q = 0; q < options.queries; ++q)
     query_poses.push_back(place.free_space->random_pose(random));
   const std::uint64_t noise = options.seed * 100003U;
-  place.references = take_views(place, place.rendering, grid, noise, {}, executor);
+  place.references = capture_views(place, place.rendering, grid, noise, {}, executor);
   place.queries =
-      take_views(place, place.rendering, query_poses, noise + grid.size(), {}, executor);
+      capture_views(place, place.rendering, query_poses, noise + grid.size(), {}, executor);
   return place;
 }
 

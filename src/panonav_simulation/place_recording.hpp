@@ -36,7 +36,7 @@ struct PlacedView {
 };
 
 /// A simulated place with reference views on a grid, queries at random poses, and the camera
-/// settings for further views (`take_view`).
+/// settings for further views (`capture_view`).
 struct PlaceRecording : SimulatedPlace {
   std::uint64_t seed = 1;
   PanoramaRendering rendering;
@@ -66,23 +66,25 @@ struct PlaceRecordingOptions {
 
 /// Takes one more view in the place, at its camera height. The same pose, seed and sensor give the
 /// same bits; may be called from several threads.
-[[nodiscard]] Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
-                                 const SensorOptions& sensor = {});
+[[nodiscard]] Panorama capture_view(const PlaceRecording& place, const Pose2& pose,
+                                    std::uint64_t seed, const SensorOptions& sensor = {});
 /// Takes a view with the rows, columns and elevations of `rendering`.
-[[nodiscard]] Panorama take_view(const PlaceRecording& place, const PanoramaRendering& rendering,
-                                 const Pose2& pose, std::uint64_t seed,
-                                 const SensorOptions& sensor = {});
+[[nodiscard]] Panorama capture_view(const PlaceRecording& place, const PanoramaRendering& rendering,
+                                    const Pose2& pose, std::uint64_t seed,
+                                    const SensorOptions& sensor = {});
 
 /// Takes a view at each pose; view i uses the seed `first_seed` + i.
-[[nodiscard]] std::vector<PlacedView> take_views(const PlaceRecording& place,
-                                                 const PanoramaRendering& rendering,
-                                                 const std::vector<Pose2>& poses,
-                                                 std::uint64_t first_seed,
-                                                 const SensorOptions& sensor, Executor& executor);
+[[nodiscard]] std::vector<PlacedView> capture_views(const PlaceRecording& place,
+                                                    const PanoramaRendering& rendering,
+                                                    const std::vector<Pose2>& poses,
+                                                    std::uint64_t first_seed,
+                                                    const SensorOptions& sensor,
+                                                    Executor& executor);
 
 /// Takes all queries again with other sensor options.
-[[nodiscard]] std::vector<PlacedView> retake_queries(const PlaceRecording& place,
-                                                     const SensorOptions& sensor,
-                                                     std::uint64_t first_seed, Executor& executor);
+[[nodiscard]] std::vector<PlacedView> recapture_queries(const PlaceRecording& place,
+                                                        const SensorOptions& sensor,
+                                                        std::uint64_t first_seed,
+                                                        Executor& executor);
 
 }  // namespace panonav::simulation

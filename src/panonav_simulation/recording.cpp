@@ -38,16 +38,16 @@ std::vector<Pose2> plan_tour(const Scene& scene, const FreeSpace& space,
           static_cast<double>(way_points_of_tour.size()), ">= 2, or a scene that has a tour");
   std::vector<Pose2> line;
   for (std::size_t i = 1; i < way_points_of_tour.size(); ++i) {
-    const auto way =
+    const auto path =
         space.is_free_between(way_points_of_tour[i - 1], way_points_of_tour[i])
             ? std::optional(std::vector<Point2>{way_points_of_tour[i - 1], way_points_of_tour[i]})
             : space.shortest_path(way_points_of_tour[i - 1], way_points_of_tour[i]);
-    if (!way) {
+    if (!path) {
       const Point2 blocked =
           space.is_free(way_points_of_tour[i]) ? way_points_of_tour[i - 1] : way_points_of_tour[i];
       throw ContractError("waypoint", format_point(blocked), "a free place of the scene");
     }
-    for (const Point2 point : *way) line.push_back({point.x_m, point.y_m, 0.0});
+    for (const Point2 point : *path) line.push_back({point.x_m, point.y_m, 0.0});
   }
   return resample(line, spacing_m);
 }
@@ -122,11 +122,12 @@ void visit_options(RecordingOptions& options, OptionVisitor& visitor) {
       choice<&T::path>("positions at which the robot takes images", "grid", "zigzag", "tour",
                        "walk", "random"),
       choice<&T::heading>("heading of the robot at each position", "fixed", "path", "random"),
-      option<&T::heading_rad>("heading for --heading fixed"),
-      option<&T::spacing_m>("spacing of the grid, or distance of images along the path", 0.001,
+      option<&T::heading_rad>("heading of the robot if --heading is fixed"),
+      option<&T::spacing_m>("spacing of the grid, or distance between images along the path", 0.001,
                             1000),
       option<&T::poses>("number of poses of a walk, or number of random poses", 1, 1e7),
-      option<&T::speed_m_s>("speed of the robot; the stamps are computed from it", 0.001, 100),
+      option<&T::speed_m_s>(
+          "speed of the robot, from which the time stamps of the images are computed", 0.001, 100),
   };
   table.visit(options, visitor);
 }
@@ -135,8 +136,9 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor) {
   using T = FrameOptions;
   constexpr OptionTable table{
       option<&T::camera_height_m>("height of the camera above the floor", above(0), 100),
-      option<&T::tilt_rad>("tilt of the robot; its direction is random at each place", 0, 0.5),
-      option<&T::rays_per_axis>("rays per pixel and axis", 1, 8),
+      option<&T::tilt_rad>(
+          "tilt angle of the robot; the direction of the tilt is random at each place", 0, 0.5),
+      option<&T::rays_per_axis>("number of rays per pixel along each image axis", 1, 8),
   };
   table.visit(options, visitor);
 }
@@ -178,20 +180,21 @@ void face_path(std::vector<Pose2>& poses) {
   if (poses.size() > 1) poses.back().heading_rad = poses[poses.size() - 2].heading_rad;
 }
 
-Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
-                       const PanoramaRendering& rendering, const FrameOptions& options,
-                       const SensorOptions& sensor, std::uint64_t seed, Executor& executor) {
+Panorama capture_panorama(const Renderer& renderer, const Pose2& pose,
+                          const PanoramaRendering& rendering, const FrameOptions& options,
+                          const SensorOptions& sensor, std::uint64_t seed, Executor& executor) {
   validate(options);
   return apply_sensor(
       renderer.render_panorama(make_viewpoint(pose, options, seed), rendering, executor), sensor,
       seed);
 }
 
-Image take_picture(const Renderer& renderer, const Pose2& pose, const RecordingCamera& camera,
-                   const FrameOptions& options, const SensorOptions& sensor, std::uint64_t seed,
-                   Executor& executor) {
+Image capture_image(const Renderer& renderer, const Pose2& pose, const RecordingCamera& camera,
+                    const FrameOptions& options, const SensorOptions& sensor, std::uint64_t seed,
+                    Executor& executor) {
   if (const auto* rendering = std::get_if<PanoramaRendering>(&camera)) {
-    return to_picture(take_panorama(renderer, pose, *rendering, options, sensor, seed, executor));
+    return to_picture(
+        capture_panorama(renderer, pose, *rendering, options, sensor, seed, executor));
   }
   validate(options);
   const auto& camera_model = std::get<Camera>(camera);
@@ -207,7 +210,7 @@ void record(const Renderer& renderer, std::span<const RecordedPose> poses,
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::uint64_t seed_of_frame = frame_seed(seed, i);
     const Image picture =
-        take_picture(renderer, poses[i].pose, camera, options, sensor, seed_of_frame, executor);
+        capture_image(renderer, poses[i].pose, camera, options, sensor, seed_of_frame, executor);
     frame({i, poses[i], sample_tilt(options, seed_of_frame), picture});
   }
 }

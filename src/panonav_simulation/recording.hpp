@@ -85,23 +85,23 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor);
 /// Takes the robot's image: by a camera model, or a panorama as an image (see `to_picture`). The
 /// same options and seed give the same image; use a different seed for each image. Throws
 /// OptionError, and ContractError as the renderer does.
-[[nodiscard]] Image take_picture(const Renderer& renderer, const Pose2& pose,
-                                 const RecordingCamera& camera, const FrameOptions& options,
-                                 const SensorOptions& sensor, std::uint64_t seed,
-                                 Executor& executor);
+[[nodiscard]] Image capture_image(const Renderer& renderer, const Pose2& pose,
+                                  const RecordingCamera& camera, const FrameOptions& options,
+                                  const SensorOptions& sensor, std::uint64_t seed,
+                                  Executor& executor);
 
-/// Takes the robot's view as a panorama. Otherwise as `take_picture`.
-[[nodiscard]] Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
-                                     const PanoramaRendering& rendering,
-                                     const FrameOptions& options, const SensorOptions& sensor,
-                                     std::uint64_t seed, Executor& executor);
+/// Takes the robot's view as a panorama. Otherwise as `capture_image`.
+[[nodiscard]] Panorama capture_panorama(const Renderer& renderer, const Pose2& pose,
+                                        const PanoramaRendering& rendering,
+                                        const FrameOptions& options, const SensorOptions& sensor,
+                                        std::uint64_t seed, Executor& executor);
 
 /// One image of a recording, valid during the callback.
 struct RecordedFrame {
   std::size_t number = 0;    ///< index from 0
   const RecordedPose& pose;  ///< element of the poses passed to `record`
   Tilt tilt;                 ///< true tilt of the robot
-  const Image& picture;      ///< as returned by `take_picture`
+  const Image& picture;      ///< as returned by `capture_image`
 };
 
 /// Takes all images in order and passes each to `frame`, so that only one is in memory. Frame i

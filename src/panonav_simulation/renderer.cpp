@@ -273,7 +273,7 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
       }
     }
   };
-  executor.for_chunks(static_cast<std::size_t>(rendering.rows), 4, draw_rows);
+  executor.for_each_chunk(static_cast<std::size_t>(rendering.rows), 4, draw_rows);
   return panorama;
 }
 
@@ -392,7 +392,7 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
       }
     }
   };
-  executor.for_chunks(static_cast<std::size_t>(image.height), 8, draw_rows);
+  executor.for_each_chunk(static_cast<std::size_t>(image.height), 8, draw_rows);
   return image;
 }
 

@@ -94,18 +94,21 @@ void visit_options(SensorOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::exposure>("exposure as a factor; 1 is full exposure", above(0), 1000),
       option<&T::gain>("electronic amplification of signal and noise", above(0), 1000),
-      option<&T::read_noise>("standard deviation of a dark pixel, as a share of full scale", 0, 1),
+      option<&T::read_noise>(
+          "standard deviation of the noise of a dark pixel, as a share of full scale", 0, 1),
       option<&T::full_well>(
           "electrons in a fully exposed pixel; fewer electrons mean more shot noise", 1, 1e12),
       option<&T::vignetting>("share of light lost at the mirror's rim", 0, 1),
-      option<&T::directional_light>("share by which objects on the side of the light are brighter",
-                                    0, 1),
+      option<&T::directional_light>(
+          "share by which objects are brighter in the direction of the light", 0, 1),
       option<&T::light_azimuth_rad>(
           "direction of the light relative to the heading, counter-clockwise positive",
           -full_turn_rad, full_turn_rad),
-      option<&T::occluded_fraction>("share of all azimuths that people or objects hide", 0, 1),
-      option<&T::occluders>("number of these people or objects; all have the same width", 1, 1000),
-      option<&T::eight_bit>("round values to multiples of 1/255"),
+      option<&T::occluded_fraction>(
+          "share of all azimuths in which people or objects hide the scene", 0, 1),
+      option<&T::occluders>(
+          "number of people or objects that hide the scene; all have the same width", 1, 1000),
+      option<&T::eight_bit>("round pixel values to multiples of 1/255"),
   };
   table.visit(options, visitor);
 }

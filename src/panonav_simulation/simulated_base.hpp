@@ -44,7 +44,7 @@ class SimulatedBase {
     return step;
   }
   /// Moves the robot to `pose` without its odometry noticing, as if a person carried it.
-  void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
+  void teleport_to(const Pose2& pose) noexcept { pose_ = pose; }
   /// Returns the true pose, in the frame of the start pose.
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
   /// Returns odometry_from_robot as measured by the wheels, identity at the start.

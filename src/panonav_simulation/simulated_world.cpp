@@ -40,7 +40,7 @@ void reject_variations_of_file(const std::string& file, const FindSetOption& fin
 
 /// Limits of the process that reads a world or a mesh: seconds of processor time, bytes of memory.
 constexpr unsigned max_read_seconds = 60;
-constexpr rlim_t max_read_bytes = rlim_t{4} << 30U;
+constexpr rlim_t max_read_memory_bytes = rlim_t{4} << 30U;
 
 void limit_process_resources() {
   const rlimit no_core{0, 0};
@@ -50,7 +50,8 @@ void limit_process_resources() {
   alarm(2 * max_read_seconds);  // also ends a process that only waits
   rlim_t pages_now = 0;
   std::ifstream("/proc/self/statm") >> pages_now;
-  const rlim_t bytes = pages_now * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + max_read_bytes;
+  const rlim_t bytes =
+      pages_now * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + max_read_memory_bytes;
   const rlimit memory{bytes, bytes};
   setrlimit(RLIMIT_AS, &memory);
 }
@@ -155,7 +156,7 @@ std::string image_file_name(std::size_t index) {
 void visit_options(SceneOptions& options, OptionVisitor& visitor) {
   using T = SceneOptions;
   constexpr OptionTable table{
-      option<&T::seed>("seed of poses, noise, tilt and odometry", 0),
+      option<&T::seed>("seed of the random poses, image noise, camera tilt and odometry errors", 0),
       option<&T::scene_seed>("seed of the textures and furniture of built-in scenes", 0),
       option<&T::moved_objects>("share of the movable objects that are moved to another position",
                                 0, 1),
@@ -175,10 +176,11 @@ void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
       option<&T::columns>("columns of panoramas", 4, 16384),
       option<&T::elevation_low_deg>("lower edge of panoramas", -90, 90),
       option<&T::elevation_high_deg>("upper edge of panoramas", -90, 90),
-      option<&T::lens_seed>("seed of the misalignment and differences of the two lenses; 0: none",
+      option<&T::lens_seed>("seed of the random misalignment and differences of the two lenses; 0: "
+                            "aligned and equal lenses",
                             0),
-      option<&T::lens_distance_m>("distance of the two lenses; it causes parallax of near objects",
-                                  0, 1),
+      option<&T::lens_distance_m>(
+          "distance between the two lenses; a distance causes parallax of near objects", 0, 1),
       options_of<&T::scene>(),
   };
   table.visit(options, visitor);
@@ -275,10 +277,10 @@ std::vector<RecordedPose> SimulatedWorld::plan_along(
   return recorded;
 }
 
-Image SimulatedWorld::take_picture(const Pose2& pose, std::uint64_t seed,
-                                   Executor& executor) const {
-  return simulation::take_picture(*renderer_, pose, camera(), options_.frame, options_.sensor, seed,
-                                  executor);
+Image SimulatedWorld::capture_image(const Pose2& pose, std::uint64_t seed,
+                                    Executor& executor) const {
+  return simulation::capture_image(*renderer_, pose, camera(), options_.frame, options_.sensor,
+                                   seed, executor);
 }
 
 Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,

@@ -98,7 +98,8 @@ class SimulatedWorld {
   /// OptionError.
   [[nodiscard]] std::vector<RecordedPose> plan_along(std::span<const StampedPose> trajectory) const;
   /// Takes the image at a pose; use a different seed for each image. Throws as the renderer.
-  [[nodiscard]] Image take_picture(const Pose2& pose, std::uint64_t seed, Executor& executor) const;
+  [[nodiscard]] Image capture_image(const Pose2& pose, std::uint64_t seed,
+                                    Executor& executor) const;
 
  private:
   SimulatedWorldOptions options_;

@@ -28,7 +28,7 @@ std::vector<std::string> find_worlds(const std::filesystem::path& data) {
   return filter_available_worlds(data, {"small_warehouse", "small_house"});
 }
 
-std::vector<std::string> find_all_worlds(const std::filesystem::path& data) {
+std::vector<std::string> list_available_worlds(const std::filesystem::path& data) {
   return filter_available_worlds(data, {"small_warehouse", "small_house", "industrial_warehouse"});
 }
 

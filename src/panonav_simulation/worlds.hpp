@@ -15,7 +15,7 @@ namespace panonav::simulation {
 /// Returns the names of the available Gazebo worlds used for development.
 [[nodiscard]] std::vector<std::string> find_worlds(const std::filesystem::path& data);
 /// Returns the names of all available Gazebo worlds, including those never used for development.
-[[nodiscard]] std::vector<std::string> find_all_worlds(const std::filesystem::path& data);
+[[nodiscard]] std::vector<std::string> list_available_worlds(const std::filesystem::path& data);
 /// Reads the Gazebo world `name`. Throws FileError.
 [[nodiscard]] Scene read_gazebo_world(const std::filesystem::path& data, const std::string& name);
 

@@ -35,7 +35,7 @@ std::vector<Point2> make_arrow(Point2 from, double direction_rad, double length_
 std::vector<MapLayer> make_field_layers(const simulation::RememberedPlace& remembered,
                                         const FieldOptions& options, ViewId goal) {
   constexpr double share_of_spacing = 0.55;
-  MapLayer references{.label = "references", .colour = PlotColour::blue};
+  MapLayer references{.label = "stored views", .colour = PlotColour::blue};
   MapLayer arrows{.label = "directions to the goal", .colour = PlotColour::sky};
   const auto field = direction_field(remembered.graph, goal, options);
   for (std::size_t i = 0; i < field.size(); ++i) {

@@ -53,8 +53,8 @@ std::string to_text_with_valid_utf8(const Json& json) {
 
 }  // namespace
 
-std::string moment_to_json(const recordings::RunMoment& moment, std::size_t count) {
-  Json json{{"n", count}, {"t", moment.stamp_s}};
+std::string moment_to_json(const recordings::RunMoment& moment, std::size_t number) {
+  Json json{{"n", number}, {"t", moment.stamp_s}};
   Json pictures = Json::array();
   if (moment.picture || !moment.encoded_picture.empty()) pictures.push_back("camera");
   if (moment.panorama) pictures.push_back("panorama");
@@ -153,7 +153,7 @@ void RetainedParts::take(const recordings::RunMoment& from) {
   }
 }
 
-std::string past_to_json(const std::vector<PastMoment>& past) {
+std::string moments_to_json(const std::vector<PastMoment>& past) {
   Json all = Json::array();
   for (const PastMoment& moment : past) {
     Json entry{moment.stamp_s};

@@ -41,6 +41,6 @@ struct PastMoment {
 };
 /// Returns [[stamp, x, y, heading, probability, sure, state, true x, true y], ...]; unknown values
 /// are null.
-[[nodiscard]] std::string past_to_json(const std::vector<PastMoment>& past);
+[[nodiscard]] std::string moments_to_json(const std::vector<PastMoment>& past);
 
 }  // namespace panonav::viewer

@@ -173,7 +173,7 @@ void RunPage::add(const recordings::RunMoment& moment) {
   pictures_.back() = pictures.dump();
 }
 
-void RunPage::route(const PicturePlot& panorama, const std::vector<RouteMark>& marks) {
+void RunPage::set_route(const PicturePlot& panorama, const std::vector<RouteMark>& marks) {
   Json all = Json::array();
   for (const RouteMark& mark : marks) {
     Json changed = Json::array();

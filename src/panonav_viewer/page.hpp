@@ -43,7 +43,7 @@ class RunPage {
   /// Shows no path, because the images are not in the order of a path.
   void set_unordered() noexcept { unordered_ = true; }
   /// Adds an image of the remembered route over azimuth and path length, with a mark per moment.
-  void route(const PicturePlot& panorama, const std::vector<RouteMark>& marks);
+  void set_route(const PicturePlot& panorama, const std::vector<RouteMark>& marks);
 
   /// Returns the number of moments.
   [[nodiscard]] std::size_t size() const noexcept { return moments_.size(); }

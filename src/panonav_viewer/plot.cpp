@@ -125,9 +125,9 @@ PlotAxis make_x_axis(const LinePlot& plot) {
     }
   }
   if (plot.series.empty()) return axis;
-  const auto& places = plot.series.front().x;
-  for (std::size_t i = 0; i < std::min(plot.x_tick_labels.size(), places.size()); ++i) {
-    axis.tick_texts.emplace_back(places[i], plot.x_tick_labels[i]);
+  const auto& positions = plot.series.front().x;
+  for (std::size_t i = 0; i < std::min(plot.x_tick_labels.size(), positions.size()); ++i) {
+    axis.tick_labels.emplace_back(positions[i], plot.x_tick_labels[i]);
   }
   return axis;
 }

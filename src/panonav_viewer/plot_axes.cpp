@@ -12,8 +12,8 @@ namespace {
 
 constexpr double x_tick_px = 60.0;  ///< smallest distance between tick marks
 constexpr double y_tick_px = 34.0;
-constexpr double rotated_name_deg = -40.0;  ///< rotation of names that would overlap
-constexpr double min_rotated_name_distance_px = 16.0;
+constexpr double tick_label_rotation_deg = -40.0;  ///< rotation of names that would overlap
+constexpr double min_rotated_tick_label_distance_px = 16.0;
 constexpr double legend_row_px = 18.0;
 constexpr double symbol_px = 24.0;
 
@@ -107,24 +107,24 @@ std::vector<Point2> PlotArea::to_px(std::span<const Point2> points) const {
   return all;
 }
 
-bool PlotArea::has_rotated_names() const {
-  const double room = box.width / static_cast<double>(x.tick_texts.size());
-  return std::ranges::any_of(x.tick_texts, [room](const auto& name) {
+bool PlotArea::has_rotated_tick_labels() const {
+  const double room = box.width / static_cast<double>(x.tick_labels.size());
+  return std::ranges::any_of(x.tick_labels, [room](const auto& name) {
     return estimate_text_width(name.second) + 6.0 > room;
   });
 }
 
 double PlotArea::extra_margin_px() const {
-  if (!has_rotated_names()) return 0.0;
+  if (!has_rotated_tick_labels()) return 0.0;
   double longest = 0.0;
-  for (const auto& [at, name] : x.tick_texts)
+  for (const auto& [at, name] : x.tick_labels)
     longest = std::max(longest, estimate_text_width(name));
   return 0.65 * longest;  // sin(40 deg)
 }
 
 void PlotArea::draw_grid(SvgDrawing& drawing) const {
   const LineStyle thin{.width = 1.0};
-  if (x.tick_texts.empty()) {
+  if (x.tick_labels.empty()) {
     for (const double tick : x.ticks(box.width / x_tick_px)) {
       const double at = box.left + x.fraction_of(tick) * box.width;
       drawing.add_path(std::vector<Point2>{{at, box.top}, {at, box.bottom()}},
@@ -140,13 +140,13 @@ void PlotArea::draw_grid(SvgDrawing& drawing) const {
 
 void PlotArea::draw_axes(SvgDrawing& drawing, const std::string& title) const {
   drawing.add_frame(box, PlotColour::dark_grey);
-  if (x.tick_texts.empty()) {
+  if (x.tick_labels.empty()) {
     for (const double tick : x.ticks(box.width / x_tick_px)) {
       drawing.add_text({box.left + x.fraction_of(tick) * box.width, box.bottom() + 16.0},
                        format_number(tick), {.anchor = "middle"});
     }
   } else {
-    draw_names(drawing);
+    draw_tick_labels(drawing);
   }
   for (const double tick : y.ticks(box.height / y_tick_px)) {
     drawing.add_text({box.left - 6.0, box.bottom() - y.fraction_of(tick) * box.height + 4.0},
@@ -162,18 +162,20 @@ void PlotArea::draw_axes(SvgDrawing& drawing, const std::string& title) const {
   drawing.add_text({middle, box.top - 10.0}, title, {.anchor = "middle", .size = size});
 }
 
-void PlotArea::draw_names(SvgDrawing& drawing) const {
+void PlotArea::draw_tick_labels(SvgDrawing& drawing) const {
   constexpr std::size_t max_characters = 47;
-  const bool is_turned = has_rotated_names();
+  const bool is_rotated = has_rotated_tick_labels();
   // Draw only every n-th name if even rotated names would overlap.
-  const auto every = static_cast<std::size_t>(1.0 + static_cast<double>(x.tick_texts.size()) *
-                                                        min_rotated_name_distance_px / box.width);
-  for (std::size_t i = 0; i < x.tick_texts.size(); i += every) {
-    const auto& [value, name] = x.tick_texts[i];
+  const auto every =
+      static_cast<std::size_t>(1.0 + static_cast<double>(x.tick_labels.size()) *
+                                         min_rotated_tick_label_distance_px / box.width);
+  for (std::size_t i = 0; i < x.tick_labels.size(); i += every) {
+    const auto& [value, name] = x.tick_labels[i];
     const double at = box.left + x.fraction_of(value) * box.width;
-    const TextStyle style = is_turned ? TextStyle{.anchor = "end", .rotation_deg = rotated_name_deg}
-                                      : TextStyle{.anchor = "middle"};
-    drawing.add_text({is_turned ? at + 4.0 : at, box.bottom() + 16.0},
+    const TextStyle style =
+        is_rotated ? TextStyle{.anchor = "end", .rotation_deg = tick_label_rotation_deg}
+                   : TextStyle{.anchor = "middle"};
+    drawing.add_text({is_rotated ? at + 4.0 : at, box.bottom() + 16.0},
                      shorten_middle(to_readable_line(name), max_characters), style);
   }
 }

@@ -17,8 +17,8 @@ struct PlotAxis {
   double to = 1.0;
   bool is_log = false;
   double tick = 0.0;  ///< distance of tick marks; 0: chosen from the range
-  /// Positions with texts that replace the numbers, if any.
-  std::vector<std::pair<double, std::string>> tick_texts = {};
+  /// Positions with labels that replace the numbers, if any.
+  std::vector<std::pair<double, std::string>> tick_labels = {};
 
   /// Returns the position of a value on the axis, 0 at `from` and 1 at `to`; NaN if the axis cannot
   /// show it.
@@ -45,7 +45,7 @@ struct PlotArea {
 
   [[nodiscard]] Point2 to_px(double x_value, double y_value) const;
   [[nodiscard]] std::vector<Point2> to_px(std::span<const Point2> points) const;
-  /// Returns the additional height, in pixels, that rotated names below the x axis need.
+  /// Returns the additional height, in pixels, that rotated tick labels below the x axis need.
   [[nodiscard]] double extra_margin_px() const;
   /// Draws the grid behind the values.
   void draw_grid(SvgDrawing& drawing) const;
@@ -53,8 +53,8 @@ struct PlotArea {
   void draw_axes(SvgDrawing& drawing, const std::string& title) const;
 
  private:
-  [[nodiscard]] bool has_rotated_names() const;
-  void draw_names(SvgDrawing& drawing) const;
+  [[nodiscard]] bool has_rotated_tick_labels() const;
+  void draw_tick_labels(SvgDrawing& drawing) const;
 };
 
 /// Symbol of a legend entry: line, mark or area.

@@ -56,7 +56,7 @@ Json lines_to_json(const std::vector<std::vector<Point2>>& source) {
 }
 
 Json make_layer_json(const MapLayer& layer) {
-  Json json{{"label", layer.label}, {"colour", name_of(layer.colour)}};
+  Json json{{"label", layer.label}, {"colour", to_string(layer.colour)}};
   if (!layer.circles.empty()) json["circles"] = points_to_json(layer.circles);
   if (!layer.crosses.empty()) json["crosses"] = points_to_json(layer.crosses);
   if (!layer.lines.empty()) json["lines"] = lines_to_json(layer.lines);
@@ -74,7 +74,7 @@ std::string dump_json(const Json& json) {
 
 }  // namespace
 
-std::string_view name_of(PlotColour colour) {
+std::string_view to_string(PlotColour colour) {
   constexpr std::array<std::string_view, 12> names{
       "blue",  "vermilion", "green",     "purple", "orange",     "sky",
       "black", "yellow",    "dark_grey", "grey",   "light_grey", "pale_grey"};

@@ -12,7 +12,7 @@
 namespace panonav::viewer {
 
 /// Returns the name of the CSS variable of a colour: "vermilion" for --vermilion.
-[[nodiscard]] std::string_view name_of(PlotColour colour);
+[[nodiscard]] std::string_view to_string(PlotColour colour);
 
 /// Returns a plot as JSON. Throws ContractError if a series has different numbers of x and y.
 [[nodiscard]] std::string plot_to_json(const LinePlot& plot);

@@ -80,9 +80,9 @@ std::string make_view_element(const ReportView& view) {
       make_data_url("image/jpeg", encode_jpeg(picture.view())) + "\">";
   for (const ViewMark& mark : view.marks) {
     const double percent = 50.0 - mark.azimuth_rad * 50.0 / std::numbers::pi;
-    html += "<i" + std::string(mark.dashed_through_view ? "" : " class=\"arrow\"") +
+    html += "<i" + std::string(mark.is_dashed_line ? "" : " class=\"arrow\"") +
             " style=\"left:" + format_fixed(percent, 2) + "%;--key:var(--" +
-            std::string(name_of(mark.colour)) + ")\"></i>";
+            std::string(to_string(mark.colour)) + ")\"></i>";
   }
   return html + "</div>" + element("figcaption", view.caption) + "</figure>\n";
 }

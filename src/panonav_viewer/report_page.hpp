@@ -47,7 +47,7 @@ struct StoryCard {
 struct ViewMark {
   double azimuth_rad = 0.0;
   PlotColour colour = PlotColour::grey;
-  bool dashed_through_view = false;  ///< a dashed line through the view, not only an arrow
+  bool is_dashed_line = false;  ///< a dashed line through the view, not only an arrow
 };
 /// A panoramic view; azimuth decreases to the right, forward is in the middle.
 struct ReportView {

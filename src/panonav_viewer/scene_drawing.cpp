@@ -91,7 +91,7 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
   constexpr double shown_margin_m = 3.0;    // distant trees would make the floor tiny
   constexpr std::size_t max_bodies = 30;
   MapLayer walls{.label = "walls", .colour = PlotColour::dark_grey};
-  MapLayer furniture{.label = "furniture and other things", .colour = PlotColour::grey};
+  MapLayer furniture{.label = "furniture and other objects", .colour = PlotColour::grey};
   const auto is_near = [&](const std::vector<Point2>& points) {
     return std::ranges::any_of(points, [&](const Point2& p) {
       return p.x_m > scene.floor_low.x_m - shown_margin_m &&

@@ -53,7 +53,7 @@ std::optional<std::size_t> parse_index(std::string_view text) {
   return read_number(text, number) ? std::optional(number) : std::nullopt;
 }
 
-std::string_view name_of(ViewerInput wish) {
+std::string_view to_string(ViewerInput wish) {
   switch (wish) {
     case ViewerInput::goal:
       return "goal";
@@ -120,7 +120,7 @@ struct ViewServer::Implementation {
   explicit Implementation(const ViewServerOptions& server_options)
       : options(server_options),
         token(make_random_token()),
-        page(live_page(options.title, options.replay, name_of(options.takes))),
+        page(live_page(options.title, options.replay, to_string(options.takes))),
         server({.address = options.address,
                 .port = options.port,
                 .headers = answer_headers,
@@ -132,7 +132,7 @@ struct ViewServer::Implementation {
     std::unique_lock lock(mutex);
     ended = true;
     if (viewer_count == 0) return;
-    server.poke();
+    server.wake_up();
     changed.wait_for(lock, std::chrono::seconds(1), [this] { return viewer_count == 0; });
     lock.unlock();
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -148,26 +148,26 @@ struct ViewServer::Implementation {
   }
 
   [[nodiscard]] server::HttpAnswer answer(const server::HttpRequest& request) {
-    const auto status_only = [](int status) { return server::HttpAnswer{.status = status}; };
+    const auto make_status_answer = [](int status) { return server::HttpAnswer{.status = status}; };
     const std::string_view resource = std::string_view(request.path).substr(1 + token.size());
     if ((options.replay || options.takes != ViewerInput::none) && resource == "/control") {
-      if (request.method != "POST") return status_only(405);
-      return status_only(handle_control(request.body) ? 204 : 400);
+      if (request.method != "POST") return make_status_answer(405);
+      return make_status_answer(handle_control(request.body) ? 204 : 400);
     }
-    if (request.method != "GET") return status_only(405);
+    if (request.method != "GET") return make_status_answer(405);
     if (resource == "/") return {.type = "text/html; charset=utf-8", .content = page};
     if (resource == "/events") return events();
     constexpr std::string_view views = "/view/";
     if (resource.starts_with(views)) {
       const auto number = parse_index(resource.substr(views.size()));
-      return number ? reference(*number) : status_only(404);
+      return number ? reference(*number) : make_status_answer(404);
     }
     constexpr std::string_view pictures = "/picture/";
-    if (!resource.starts_with(pictures)) return status_only(404);
+    if (!resource.starts_with(pictures)) return make_status_answer(404);
     const std::string_view rest = resource.substr(pictures.size());
     const std::size_t slash = rest.find('/');
     const auto number = parse_index(rest.substr(0, slash));
-    if (slash == std::string_view::npos || !number) return status_only(404);
+    if (slash == std::string_view::npos || !number) return make_status_answer(404);
     return picture(*number, std::string(rest.substr(slash + 1)));
   }
 
@@ -180,7 +180,7 @@ struct ViewServer::Implementation {
       if (!options.thumbnail || number >= known.size()) return {.status = 404};
       name = known[number].name;
     }
-    auto started = reference_pictures.read(std::move(name), [this] { server.poke(); });
+    auto started = reference_pictures.read(std::move(name), [this] { server.wake_up(); });
     if (!started) return {.status = 503};
     const auto picture = std::make_shared<std::future<std::string>>(std::move(*started));
     return {.later = [picture]() -> std::optional<server::HttpAnswer> {
@@ -239,7 +239,7 @@ struct ViewServer::Implementation {
       {
         const std::lock_guard lock(all_.mutex);
         if (!greeted_) {
-          text = "retry: 500\n" + format_event("past", past_to_json(all_.past));
+          text = "retry: 500\n" + format_event("past", moments_to_json(all_.past));
           if (!all_.frames.empty()) next_ = all_.frames.back()->number();
           greeted_ = true;
         }
@@ -307,7 +307,7 @@ struct ViewServer::Implementation {
   /// Stores a goal or pose that a viewer sent as the only member of its message; returns false if
   /// it is invalid or not accepted.
   bool take(const nlohmann::json& json) {
-    const std::string key(name_of(options.takes));
+    const std::string key(to_string(options.takes));
     if (key.empty() || json.size() != 1 || !json.contains(key)) return false;
     const auto& values = json[key];
     const std::size_t size = options.takes == ViewerInput::pose ? 3 : 2;
@@ -390,7 +390,7 @@ struct ViewServer::Implementation {
       }
       if (viewer_count == 0) return;
     }
-    server.poke();
+    server.wake_up();
   }
 
   const ViewServerOptions options;

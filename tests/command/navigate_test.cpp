@@ -313,7 +313,7 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
     seen.odometry = robot;
     step = navigator.step(seen);
     decisions += step.decided ? 1 : 0;
-    max_loaded = std::max(max_loaded, navigator.navigator().loaded_views());
+    max_loaded = std::max(max_loaded, navigator.navigator().loaded_view_count());
     robot = robot * integrate_velocity(step.velocity, BaseOptions{}.period_s);
   } while (step.decision.state == NavigationDecision::State::moving && ++periods < 5000);
   EXPECT_EQ(step.decision.state, NavigationDecision::State::arrived);

@@ -29,12 +29,12 @@ TEST(Executor, CallsEveryIndexOnceOnAnyNumberOfThreads) {
       for (const std::size_t chunk :
            {std::size_t{1}, std::size_t{3}, std::size_t{64}, std::size_t{5000}}) {
         std::vector<std::atomic<int>> calls(count);
-        executor.for_chunks(count, chunk,
-                            [&](std::size_t begin, std::size_t end, std::size_t number) {
-                              EXPECT_EQ(begin, number * chunk);
-                              EXPECT_EQ(end, std::min(count, begin + chunk));
-                              for (std::size_t i = begin; i < end; ++i) ++calls[i];
-                            });
+        executor.for_each_chunk(count, chunk,
+                                [&](std::size_t begin, std::size_t end, std::size_t number) {
+                                  EXPECT_EQ(begin, number * chunk);
+                                  EXPECT_EQ(end, std::min(count, begin + chunk));
+                                  for (std::size_t i = begin; i < end; ++i) ++calls[i];
+                                });
         for (const auto& c : calls) ASSERT_EQ(c.load(), 1);
       }
     }
@@ -51,7 +51,7 @@ int sum_with_few_threads(rlim_t processes, std::size_t expected) {
   Executor executor(64);
   if (executor.threads() >= 64) return 3;
   std::vector<std::size_t> sums(100);
-  executor.for_chunks(1000, 10, [&](std::size_t begin, std::size_t end, std::size_t number) {
+  executor.for_each_chunk(1000, 10, [&](std::size_t begin, std::size_t end, std::size_t number) {
     for (std::size_t i = begin; i < end; ++i) sums[number] += i * i;
   });
   std::size_t sum = 0;
@@ -76,7 +76,7 @@ TEST(Executor, GoesOnWithTheThreadsThatCouldBeStarted) {
 
 TEST(Executor, AnEmptyLoopCallsNothing) {
   Executor executor(2);
-  executor.for_chunks(0, 4, [](std::size_t, std::size_t, std::size_t) { FAIL(); });
+  executor.for_each_chunk(0, 4, [](std::size_t, std::size_t, std::size_t) { FAIL(); });
 }
 
 // A floating-point reduction is the test of determinism: its bits depend on the order of adding.
@@ -85,10 +85,12 @@ double chunked_sum(int threads) {
   constexpr std::size_t chunk = 37;
   Executor executor(threads);
   std::vector<double> partial((count + chunk - 1) / chunk, 0.0);
-  executor.for_chunks(count, chunk, [&](std::size_t begin, std::size_t end, std::size_t number) {
-    Random random(9, number);
-    for (std::size_t i = begin; i < end; ++i) partial[number] += random.normal() * 1e3;
-  });
+  executor.for_each_chunk(count, chunk,
+                          [&](std::size_t begin, std::size_t end, std::size_t number) {
+                            Random random(9, number);
+                            for (std::size_t i = begin; i < end; ++i)
+                              partial[number] += random.normal() * 1e3;
+                          });
   double sum = 0.0;
   for (const double p : partial) sum += p;
   return sum;
@@ -105,7 +107,7 @@ TEST(Executor, ThrowsTheFirstExceptionByChunkNumberAndRunsTheRest) {
     Executor executor(threads);
     std::atomic<int> finished = 0;
     try {
-      executor.for_chunks(100, 1, [&](std::size_t begin, std::size_t, std::size_t) {
+      executor.for_each_chunk(100, 1, [&](std::size_t begin, std::size_t, std::size_t) {
         if (begin % 10 == 3) throw std::runtime_error("chunk " + std::to_string(begin));
         ++finished;
       });
@@ -119,10 +121,10 @@ TEST(Executor, ThrowsTheFirstExceptionByChunkNumberAndRunsTheRest) {
 
 TEST(Executor, WorksAgainAfterAnException) {
   Executor executor(2);
-  EXPECT_THROW(executor.for_chunks(4, 1, [](std::size_t, std::size_t, std::size_t) { throw 1; }),
-               int);
+  EXPECT_THROW(
+      executor.for_each_chunk(4, 1, [](std::size_t, std::size_t, std::size_t) { throw 1; }), int);
   std::atomic<int> calls = 0;
-  executor.for_chunks(10, 3, [&](std::size_t, std::size_t, std::size_t) { ++calls; });
+  executor.for_each_chunk(10, 3, [&](std::size_t, std::size_t, std::size_t) { ++calls; });
   EXPECT_EQ(calls.load(), 4);
 }
 
@@ -130,7 +132,7 @@ TEST(Executor, ManyShortLoopsDoNotHangOrLoseWork) {
   Executor executor(4);
   std::atomic<std::size_t> sum = 0;
   for (int loop = 0; loop < 2000; ++loop) {
-    executor.for_chunks(
+    executor.for_each_chunk(
         5, 2, [&](std::size_t begin, std::size_t end, std::size_t) { sum += end - begin; });
   }
   EXPECT_EQ(sum.load(), 10'000U);
@@ -148,11 +150,11 @@ TEST(Executor, WhatBetweenThrowsEndsALoopAndTheNextOneRuns) {
       ++calls;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     };
-    EXPECT_THROW(executor.for_chunks(1000, 1, work), std::runtime_error);
+    EXPECT_THROW(executor.for_each_chunk(1000, 1, work), std::runtime_error);
     EXPECT_LT(calls.load(), 500);
     interrupted = false;
     calls = 0;
-    executor.for_chunks(20, 1, work);
+    executor.for_each_chunk(20, 1, work);
     EXPECT_EQ(calls.load(), 20);
   }
 }
@@ -162,7 +164,7 @@ TEST(Executor, RefusesBadNumbers) {
   EXPECT_THROW(Executor(1025), ContractError);
   EXPECT_GE(Executor(0).threads(), 1);
   Executor executor;
-  EXPECT_THROW(executor.for_chunks(1, 0, [](std::size_t, std::size_t, std::size_t) {}),
+  EXPECT_THROW(executor.for_each_chunk(1, 0, [](std::size_t, std::size_t, std::size_t) {}),
                ContractError);
 }
 

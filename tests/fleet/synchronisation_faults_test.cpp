@@ -116,7 +116,8 @@ TEST_F(SynchronisedMemory, BadRowsOfOthersAreLeftOutAndNamed) {
       memory_name(server("x")) + "'");
 
   std::set<std::string> said;
-  set_left_out_handler([&](const auto&, const MemoryFile::Fault& row) { said.insert(row.what); });
+  set_skipped_row_handler(
+      [&](const auto&, const MemoryFile::Fault& row) { said.insert(row.what); });
   open("a").append(numbered(60));
   for (const char* robot : {"a", "b"}) {
     said.clear();
@@ -135,7 +136,7 @@ TEST_F(SynchronisedMemory, BadRowsOfOthersAreLeftOutAndNamed) {
     EXPECT_FALSE(file.find("nowhere"));
     EXPECT_FALSE(file.find("beyond"));
   }
-  set_left_out_handler({});
+  set_skipped_row_handler({});
   // The memory on the server is used without them, and copied; verify names them.
   const MemoryFile there = on_server();
   EXPECT_EQ(there.load().size(), 8U);
@@ -335,7 +336,7 @@ TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
     ((std::cout << words << ' '), ...);
     std::cout << std::endl;
   };
-  const auto name_of = [](const PackedSignature& signature) {
+  const auto to_string = [](const PackedSignature& signature) {
     return checksum(signature.magnitudes, checksum(signature.phases));
   };
   const auto synchronise = [&] {
@@ -368,14 +369,14 @@ TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
         view.info.stamp_s =
             std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
                 .count();
-        say("adding", name_of(view.signature));
+        say("adding", to_string(view.signature));
         file.append(view);
-        return name_of(view.signature);
+        return to_string(view.signature);
       };
       const std::vector<ViewId> views = file.views();
       const auto any = [&] { return views[random.index(views.size())]; };
       const auto identify = [&](ViewId view) {
-        return name_of(file.load(std::vector{view}).packed(view));
+        return to_string(file.load(std::vector{view}).packed(view));
       };
       const std::uint64_t kind = views.size() < 5 ? 0 : random.index(20);
       if (kind < 12) {

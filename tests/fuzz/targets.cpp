@@ -121,12 +121,12 @@ void read_recording(Bytes bytes) {
     recording->for_each(topics, {}, [&](const recordings::MessageLocation&, Bytes message) {
       read += message.size();
     });
-    const auto places = recording->places(topics);
-    if (!std::ranges::is_sorted(places, {}, &recordings::MessageLocation::time_ns)) {
+    const auto locations = recording->locations(topics);
+    if (!std::ranges::is_sorted(locations, {}, &recordings::MessageLocation::time_ns)) {
       throw std::logic_error("places are not in order of time");
     }
-    for (const recordings::MessageLocation& place : places) {
-      expect_value_or_line([&] { read += recording->read(place).size(); });
+    for (const recordings::MessageLocation& location : locations) {
+      expect_value_or_line([&] { read += recording->read(location).size(); });
     }
     if (read > 0 && topics.empty()) throw std::logic_error("messages without a topic");
     for (const std::string& line : recording->warnings()) {

@@ -103,7 +103,7 @@ TEST(HomingRun, AnObstacleStopsARobotThatMayNotGoPast) {
       const Pose2 goal = start * Pose2{0.0, 0.0, k * 0.4} * Pose2{0.6, 0.0, 0.0};
       if (place.free_space->is_free(goal.position())) continue;
       const HomingRun run =
-          run_home(place, take_homing_view(place, goal, 1), goal, start, options, 3);
+          run_home(place, capture_homing_view(place, goal, 1), goal, start, options, 3);
       if (run.end == HomingRunEnd::blocked) {
         ++blocked;
         EXPECT_TRUE(run.met_obstacle);
@@ -137,7 +137,7 @@ TEST(HomingRun, SaysThatItIsNotHomeWhereHomeWasSeenInAnotherRoom) {
   const HomingPlace& office = place_of("office");
   Random random(13);
   for (int i = 0; i < 8; ++i) {
-    const HomingView home = take_homing_view(office, office.free_space->random_pose(random), 1);
+    const HomingView home = capture_homing_view(office, office.free_space->random_pose(random), 1);
     const Pose2 start = lab.free_space->random_pose(random);
     const HomingRun run = run_home(lab, home, start, start, {}, 3);
     EXPECT_NE(run.end, HomingRunEnd::arrived) << "run " << i << ", " << to_string(run.end);
@@ -166,7 +166,7 @@ TEST(HomingRun, ChecksItsInputs) {
   const HomingPlace& place = place_of("lab");
   EXPECT_THROW((void)sample_homing_tasks(place, 0, 1.0, 1), ContractError);
   EXPECT_THROW((void)sample_homing_tasks(place, 1, 0.0, 1), ContractError);
-  const HomingView home = take_homing_view(place, {}, 1);
+  const HomingView home = capture_homing_view(place, {}, 1);
   EXPECT_THROW((void)run_home(place, home, {}, {1e3, 0.0, 0.0}, {}, 1), ContractError);
   HomingRunOptions broken;
   broken.motion.rotation_from_rotation = -1.0;

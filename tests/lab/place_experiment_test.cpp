@@ -25,9 +25,9 @@ namespace fs = std::filesystem;
 void print(const std::string& place, const std::vector<PlaceResult>& results) {
   for (const PlaceResult& r : results) {
     std::cout << place << ", " << r.condition << ": nearest or next "
-              << 100.0 * r.nearest_or_next.value << " % (" << 100.0 * r.nearest_or_next.low
-              << " .. " << 100.0 * r.nearest_or_next.high << "), nearest "
-              << 100.0 * r.nearest.value << " %, known " << 100.0 * r.known.value
+              << 100.0 * r.nearest_or_neighbour.value << " % ("
+              << 100.0 * r.nearest_or_neighbour.low << " .. " << 100.0 * r.nearest_or_neighbour.high
+              << "), nearest " << 100.0 * r.nearest.value << " %, known " << 100.0 * r.known.value
               << " %, heading median " << degrees(r.heading_median_rad) << ", 95 % "
               << degrees(r.heading_p95_rad) << " degrees, position median " << r.position_median_m
               << " m, inside the radius " << 100.0 * r.inside.value << " %\n";
@@ -52,12 +52,12 @@ TEST_P(GazeboWorld, IsRecognisedAlsoInOtherLightAndWithPeopleInView) {
   const auto results = run_place_experiment(place, place_conditions(), executor);
   print(name, results);
   ASSERT_EQ(results.size(), 4U);
-  EXPECT_GE(results[0].nearest_or_next.value, 0.95);
+  EXPECT_GE(results[0].nearest_or_neighbour.value, 0.95);
   EXPECT_LE(degrees(results[0].heading_median_rad), 2.0);
   EXPECT_GE(results[0].known.value, 0.95);
   EXPECT_GE(results[0].inside.value, 0.93);
-  EXPECT_GE(results[1].nearest_or_next.value, 0.90);
-  EXPECT_GE(results[2].nearest_or_next.value, 0.90);
+  EXPECT_GE(results[1].nearest_or_neighbour.value, 0.90);
+  EXPECT_GE(results[2].nearest_or_neighbour.value, 0.90);
 }
 
 INSTANTIATE_TEST_SUITE_P(Worlds, GazeboWorld, ::testing::Values("small_warehouse", "small_house"),
@@ -97,11 +97,11 @@ TEST(PlaceExperiment, OfOnePlaceTellsItFromOthersAndIsTheSameOnAnyNumberOfThread
   const auto b = run_place_experiment(places[0], place_conditions(), two);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].nearest_or_next.value, b[i].nearest_or_next.value);
+    EXPECT_EQ(a[i].nearest_or_neighbour.value, b[i].nearest_or_neighbour.value);
     EXPECT_EQ(a[i].heading_p95_rad, b[i].heading_p95_rad);
     EXPECT_EQ(a[i].position_median_m, b[i].position_median_m);
   }
-  EXPECT_GE(a[0].nearest_or_next.value, 0.95);
+  EXPECT_GE(a[0].nearest_or_neighbour.value, 0.95);
 }
 
 // A ring of alike walls: columns alone leave doubt about every fifth place of its own.

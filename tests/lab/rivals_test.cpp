@@ -53,13 +53,13 @@ RivalView random_rival_view(std::uint64_t seed) {
 
 std::vector<std::unique_ptr<RivalRecogniser>> all_recognisers() {
   std::vector<std::unique_ptr<RivalRecogniser>> list;
-  list.push_back(fourier_signature_recogniser(15));
-  list.push_back(grey_histogram_recogniser(64));
-  list.push_back(colour_histogram_recogniser(32));
-  list.push_back(eigenimage_recogniser(15));
-  list.push_back(zero_phase_recogniser());
-  list.push_back(pixels_over_all_turns_recogniser());
-  list.push_back(patch_normalised_recogniser());
+  list.push_back(make_fourier_signature_recogniser(15));
+  list.push_back(make_grey_histogram_recogniser(64));
+  list.push_back(make_colour_histogram_recogniser(32));
+  list.push_back(make_eigenimage_recogniser(15));
+  list.push_back(make_zero_phase_recogniser());
+  list.push_back(make_pixels_over_all_rotations_recogniser());
+  list.push_back(make_patch_normalised_recogniser());
   return list;
 }
 
@@ -81,7 +81,7 @@ TEST(RivalRecogniser, EveryRivalFindsAMemorisedViewAfterAnyTurn) {
 TEST(PixelsOverAllTurns, AgreesWithTryingEveryTurn) {
   std::vector<RivalView> references;
   for (std::uint64_t seed = 0; seed < 12; ++seed) references.push_back({random_view(seed)});
-  const auto recogniser = pixels_over_all_turns_recogniser();
+  const auto recogniser = make_pixels_over_all_rotations_recogniser();
   recogniser->memorise(references);
   for (std::uint64_t seed = 100; seed < 110; ++seed) {
     const Panorama query = random_view(seed);
@@ -110,7 +110,7 @@ TEST(ColourHistogram, TellsColoursApartThatAreOneGrey) {
   const Panorama grey = random_view(3);
   std::vector<RivalView> references;
   for (std::uint64_t seed = 0; seed < 5; ++seed) references.push_back(in_colour(grey, seed));
-  const auto recogniser = colour_histogram_recogniser(32);
+  const auto recogniser = make_colour_histogram_recogniser(32);
   recogniser->memorise(references);
   for (std::size_t i = 0; i < references.size(); ++i) {
     EXPECT_EQ(recogniser->nearest(references[i]), i);
@@ -118,7 +118,7 @@ TEST(ColourHistogram, TellsColoursApartThatAreOneGrey) {
 }
 
 TEST(ColourHistogram, RefusesViewsWithoutColour) {
-  const auto recogniser = colour_histogram_recogniser();
+  const auto recogniser = make_colour_histogram_recogniser();
   EXPECT_THROW(recogniser->memorise({{random_view(1)}}), ContractError);
 }
 

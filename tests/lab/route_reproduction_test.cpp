@@ -25,16 +25,16 @@ TEST(LineCamera, SeesTheHorizonOfTheWholePicture) {
   const simulation::Renderer renderer(simulation::make_scene("lab", {.seed = 5}));
   simulation::LineCamera camera = simulation::make_line_camera(0.6);
   const Pose2 pose{3.1, 2.4, 0.7};
-  const auto noisy = simulation::take_line(renderer, pose, camera, 3);
-  EXPECT_EQ(noisy, simulation::take_line(renderer, pose, camera, 3));
-  EXPECT_NE(noisy, simulation::take_line(renderer, pose, camera, 4));
+  const auto noisy = simulation::capture_line(renderer, pose, camera, 3);
+  EXPECT_EQ(noisy, simulation::capture_line(renderer, pose, camera, 3));
+  EXPECT_NE(noisy, simulation::capture_line(renderer, pose, camera, 4));
   camera.sensor.read_noise = 0.0;
   camera.sensor.full_well = 1e12;
   Executor executor(1);
-  const Image picture = simulation::take_picture(
+  const Image picture = simulation::capture_image(
       renderer, pose, camera.camera, {.camera_height_m = 0.6}, camera.sensor, 1, executor);
   const auto whole = horizon_scanline(camera.unwarper.unwrap(picture.view()), camera.line);
-  const auto line = simulation::take_line(renderer, pose, camera, 1);
+  const auto line = simulation::capture_line(renderer, pose, camera, 1);
   ASSERT_EQ(line.size(), 360U);
   double off = 0.0;
   for (std::size_t c = 0; c < line.size(); ++c) {

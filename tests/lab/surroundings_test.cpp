@@ -81,7 +81,7 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
   Random random(9);
   for (int i = 0; i < 10; ++i) {
     const Pose2 pose = place.free_space->random_pose(random);
-    const Panorama view = simulation::take_view(place, rendering, pose, 1, no_noise);
+    const Panorama view = simulation::capture_view(place, rendering, pose, 1, no_noise);
     const Directional extents = predict_extents(place, pose, view, components);
     for (std::size_t d = 0; d < shape_directions / 2; ++d) {
       const double theta = static_cast<double>(d) * std::numbers::pi / 4.0;
@@ -89,7 +89,7 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
       const auto observe_after = [&](double way_m) {
         const Pose2 there{pose.x_m + way_m * std::cos(theta), pose.y_m + way_m * std::sin(theta),
                           pose.heading_rad};
-        return compute_signature(simulation::take_view(place, rendering, there, 1, no_noise),
+        return compute_signature(simulation::capture_view(place, rendering, there, 1, no_noise),
                                  components);
       };
       // From one side to the other, so that what grows with the square of the step falls out.

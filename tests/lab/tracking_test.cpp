@@ -103,8 +103,8 @@ TEST(Tracking, FindsTheRobotInAnOfficeTheSameOnAnyNumberOfThreads) {
   ASSERT_GE(remembered->memory().size(), 30U);
   EXPECT_EQ(remembered->reference_positions().size(), remembered->memory().size());
   const WalkOptions walks{.variants = 1, .runs_each = 6, .images = 12, .seed = 4};
-  const auto clean = record_walks(place, *remembered, clean_condition(), walks, two);
-  const auto again = record_walks(place, *remembered, clean_condition(), walks, one);
+  const auto clean = record_walks(place, *remembered, make_clean_condition(), walks, two);
+  const auto again = record_walks(place, *remembered, make_clean_condition(), walks, one);
   ASSERT_EQ(clean.size(), 6U);
   ASSERT_EQ(again.size(), 6U);
   for (std::size_t r = 0; r < clean.size(); ++r) {
@@ -143,17 +143,18 @@ TEST(Tracking, HardRunsSeeAChangedOfficeThatStaysTheSameForMoreRuns) {
       two);
   const auto remembered = make_tracking_place(place, two);
   WalkOptions walks{.variants = 1, .runs_each = 1, .images = 4, .seed = 4};
-  const auto clean = record_walks(place, *remembered, clean_condition(), walks, two);
-  const auto hard = record_walks(place, *remembered, hard_condition(), walks, two);
+  const auto clean = record_walks(place, *remembered, make_clean_condition(), walks, two);
+  const auto hard = record_walks(place, *remembered, make_hard_condition(), walks, two);
   ASSERT_TRUE(hard[0].steps[0].view && clean[0].steps[0].view);
   EXPECT_FALSE(*hard[0].steps[0].view == *clean[0].steps[0].view);
   walks.runs_each = 2;
-  const auto more = record_walks(place, *remembered, hard_condition(), walks, two);
+  const auto more = record_walks(place, *remembered, make_hard_condition(), walks, two);
   ASSERT_EQ(more.size(), 2U);
   EXPECT_TRUE(*more[0].steps[0].view == *hard[0].steps[0].view);
   EXPECT_FALSE(more[1].steps[0].truth == more[0].steps[0].truth);
   walks.variants = 0;
-  EXPECT_THROW((void)record_walks(place, *remembered, hard_condition(), walks, two), ContractError);
+  EXPECT_THROW((void)record_walks(place, *remembered, make_hard_condition(), walks, two),
+               ContractError);
 }
 
 }  // namespace

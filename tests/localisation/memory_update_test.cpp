@@ -81,16 +81,16 @@ std::vector<Pose2> line() {
 /// A run along the line. In pictures 6 to 9 `changed` is seen, whose places are known from the
 /// second run on.
 MemoryUpdate::Changes run(const Room& room, const Room* changed, const VisualMemory& memory,
-                          const MemoryUpdate::Use& use, const MemoryUpdateOptions& options = {},
-                          double sure = 1.0) {
+                          const MemoryUpdate::UseStatistics& use,
+                          const MemoryUpdateOptions& options = {}, double sure = 1.0) {
   const ColumnRanking ranking(memory);
   MemoryUpdate update(ranking, learn_observation_model(ranking), use, options);
   const std::vector<Pose2> poses = line();
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const bool is_changed = changed != nullptr && i >= 6 && i < 10;
-    MemoryUpdate::AnsweredView view{Pose2{5.0, 5.0, 2.0} * poses[i],
-                                    seen(is_changed ? *changed : room, poses[i], memory), sure,
-                                    std::nullopt, std::nullopt};
+    MemoryUpdate::LocalisedView view{Pose2{5.0, 5.0, 2.0} * poses[i],
+                                     seen(is_changed ? *changed : room, poses[i], memory), sure,
+                                     std::nullopt, std::nullopt};
     if (is_changed && use.runs == 0) {
       view.known_probability = 0.0;
     } else {
@@ -102,9 +102,9 @@ MemoryUpdate::Changes run(const Room& room, const Room* changed, const VisualMem
 }
 
 /// Applies what a run changes, as a memory file would.
-MemoryUpdate::Use apply(const Room& room, const MemoryUpdate::Changes& changes,
-                        VisualMemory& memory) {
-  MemoryUpdate::Use use = changes.use;
+MemoryUpdate::UseStatistics apply(const Room& room, const MemoryUpdate::Changes& changes,
+                                  VisualMemory& memory) {
+  MemoryUpdate::UseStatistics use = changes.use;
   for (const auto* views : {&changes.replaced, &changes.forgotten}) {
     for (const ViewId view : *views) memory.remove(view);
   }
@@ -147,7 +147,7 @@ TEST(MemoryUpdate, AnotherAppearanceStandsBesideTheFormerAndServesTheNextRun) {
               0.5 * spacing_m);
   }
   EXPECT_TRUE(first.replaced.empty());
-  MemoryUpdate::Use use = apply(changed, first, memory);
+  MemoryUpdate::UseStatistics use = apply(changed, first, memory);
   const MemoryUpdate::Changes second = run(place.room, &changed, memory, use);
   EXPECT_LE(second.added.size(), 1U);
   const auto matched_learnt = std::ranges::count_if(
@@ -161,7 +161,7 @@ TEST(MemoryUpdate, AnotherAppearanceStandsBesideTheFormerAndServesTheNextRun) {
 TEST(MemoryUpdate, NothingIsLearntWhereNoPlaceIsKnown) {
   const RememberedRoom place(33, empty_room, spacing_m);
   const Room elsewhere(78, empty_room);
-  MemoryUpdate::Use before;
+  MemoryUpdate::UseStatistics before;
   const MemoryUpdate::Changes changes = run(elsewhere, nullptr, place.memory, before, {}, 0.89);
   EXPECT_EQ(changes.certain, 0U);
   EXPECT_TRUE(changes.added.empty() && changes.matched.empty());
@@ -170,7 +170,7 @@ TEST(MemoryUpdate, NothingIsLearntWhereNoPlaceIsKnown) {
 TEST(MemoryUpdate, SizeIsBoundedAndWhatIsTrueStaysHoweverManyOddRunsCome) {
   const RememberedRoom place(34, empty_room, spacing_m);
   VisualMemory memory = place.memory;
-  MemoryUpdate::Use use;
+  MemoryUpdate::UseStatistics use;
   const MemoryUpdateOptions options{.appearances = 2, .failures = 3};
   std::size_t replaced = 0;
   for (std::uint64_t r = 0; r < 12; ++r) {
@@ -200,7 +200,7 @@ TEST(MemoryUpdate, WhatKeepsFailingIsForgottenOnceAnotherViewOfThePlaceMatches) 
   const RememberedRoom place(35, empty_room, spacing_m);
   const Room changed(79, empty_room);
   VisualMemory memory = place.memory;
-  MemoryUpdate::Use use;
+  MemoryUpdate::UseStatistics use;
   std::size_t forgotten = 0;
   for (int r = 0; r < 6; ++r) {
     const MemoryUpdate::Changes changes = run(place.room, &changed, memory, use, {.failures = 3});

@@ -79,7 +79,7 @@ TEST(PlaceModel, DoesNotNeedPoses) {
   const PlaceModel posed = learn_place_model(ColumnRanking(place.memory));
   EXPECT_TRUE(blind.learnt && posed.learnt && posed.nearest_view_difference);
   EXPECT_FALSE(blind.nearest_view_difference);
-  EXPECT_EQ(blind.mirrored, posed.mirrored);
+  EXPECT_EQ(blind.mirrored_difference, posed.mirrored_difference);
   // Positions can only make it stricter.
   EXPECT_GE(blind.threshold, posed.threshold);
 }
@@ -195,23 +195,23 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
   double last = 1.0;
   for (const double difference : {0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6}) {
     evidence.difference = difference;
-    evidence.of_all_columns = difference;
-    evidence.tenth = difference + 0.1;
+    evidence.difference_of_all_columns = difference;
+    evidence.tenth_difference = difference + 0.1;
     const double probability = place_probability(evidence);
     EXPECT_GE(probability, 0.0);
     EXPECT_LE(probability, last);
     last = probability;
   }
   EXPECT_LT(last, 0.05);
-  evidence.difference = evidence.of_all_columns = 0.05;
+  evidence.difference = evidence.difference_of_all_columns = 0.05;
   EXPECT_GT(place_probability(evidence), 0.99);
   evidence.chance = 0.0;
   EXPECT_EQ(place_probability(evidence), 0.0);
   EXPECT_EQ(place_probability({}), 0.0);
   // Fewer components resolve fewer columns, which agree more often by chance.
   evidence = {.difference = 0.3,
-              .of_all_columns = 0.4,
-              .tenth = 0.35,
+              .difference_of_all_columns = 0.4,
+              .tenth_difference = 0.35,
               .chance = 0.5,
               .views = 200,
               .components = 15};
@@ -229,8 +229,8 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
 
 TEST(PlaceModel, VerifiedFeaturesCountWhereColumnsLeaveDoubtAlone) {
   PlaceEvidence doubtful{.difference = 0.42,
-                         .of_all_columns = 0.5,
-                         .tenth = 0.48,
+                         .difference_of_all_columns = 0.5,
+                         .tenth_difference = 0.48,
                          .chance = 0.62,
                          .views = 200,
                          .components = 15};
@@ -253,7 +253,7 @@ TEST(PlaceModel, VerifiedFeaturesCountWhereColumnsLeaveDoubtAlone) {
   EXPECT_EQ(place_probability(doubtful), by_columns);
   for (const double difference : {0.1, 0.7}) {
     PlaceEvidence certain = doubtful;
-    certain.difference = certain.of_all_columns = difference;
+    certain.difference = certain.difference_of_all_columns = difference;
     certain.features.reset();
     EXPECT_FALSE(is_inconclusive(certain));
     const double probability = place_probability(certain);
@@ -283,7 +283,7 @@ TEST(PlaceModel, EvidenceForOneViewIsThatOfTheBestMatchWhereItIsTheOne) {
     for (std::size_t first = 0; first < views.size(); ++first) {
       std::swap(views.front(), views[first]);
       const PlaceEvidence one = in_parts.evidence_for_first(query, views);
-      EXPECT_EQ(one.tenth, best.tenth);
+      EXPECT_EQ(one.tenth_difference, best.tenth_difference);
       EXPECT_EQ(one.chance, best.chance);
       EXPECT_EQ(one.views, best.views);
       EXPECT_EQ(one.components, best.components);

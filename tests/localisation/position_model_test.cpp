@@ -16,7 +16,7 @@ namespace {
 
 std::vector<RankedMatch> ranked_matches(const VisualMemory& memory, const PackedSignature& query) {
   return ColumnRanking(memory).rank(
-      query, memory.search(query, {.top = PositionModel::candidates}).matches);
+      query, memory.search(query, {.top = PositionModel::max_candidates}).matches);
 }
 
 TEST(InterpolatedPosition, OfAMemorisedViewIsItsPosition) {

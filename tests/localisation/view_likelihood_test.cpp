@@ -154,7 +154,7 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   // In another order they are the same particles, and those of one cell follow each other.
   particles.weight = ratios;
   auto arranged = particles;
-  likelihood.arrange(arranged);
+  likelihood.reorder_by_cell(arranged);
   likelihood.compute_log_ratios(arranged, ratios);
   for (std::size_t i = 0; i < arranged.size(); ++i) EXPECT_EQ(ratios[i], arranged.weight[i]);
   const auto in_order = [](const Particles& p) {

@@ -40,7 +40,7 @@ void expect_partition(const NavigationGraph& graph, const SubAreas& areas) {
     views += areas.nodes[a].size();
     for (std::size_t place = 0; place < areas.nodes[a].size(); ++place) {
       EXPECT_EQ(areas.area_of[areas.nodes[a][place]], a);
-      EXPECT_EQ(areas.place_of[areas.nodes[a][place]], place);
+      EXPECT_EQ(areas.index_in_area[areas.nodes[a][place]], place);
     }
   }
   EXPECT_EQ(views, graph.size());
@@ -145,11 +145,11 @@ TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
         for (std::size_t p = seed; p < closed.size(); p += 9) shut.push_back(p);
         for (const std::size_t p : shut) closed[p] = 1;
         planner.block(shut);
-        EXPECT_EQ(planner.blocked_edges(), shut.size());
+        EXPECT_EQ(planner.blocked_edge_count(), shut.size());
       } else if (round == 2) {
         std::ranges::fill(closed, std::uint8_t{0});
         planner.unblock_all();
-        EXPECT_EQ(planner.blocked_edges(), 0U);
+        EXPECT_EQ(planner.blocked_edge_count(), 0U);
       }
       const auto ways = all_ways(graph, closed);
       for (std::size_t goal = 0; goal < graph.size(); goal += 17) {
@@ -184,7 +184,7 @@ TEST(AreaPlanner, FewGatesReachTheGoalFromEverywhereByWaysHardlyLonger) {
   }
   const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   AreaPlanner planner(graph, {.areas = {.views_per_area = 100}});
-  EXPECT_LT(planner.used_gates(), planner.areas().gates.size());
+  EXPECT_LT(planner.used_gate_count(), planner.areas().gates.size());
   double longer = 0.0;
   int pairs = 0;
   for (int i = 0; i < 40; ++i) {

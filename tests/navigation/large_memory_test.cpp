@@ -54,7 +54,7 @@ TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
     EXPECT_EQ(decision.area, areas.area_of[node]);
     entered.insert(decision.area);
     // An area and those views of its neighbours that its gates lead to.
-    EXPECT_LT(navigator.loaded_views(), 600U);
+    EXPECT_LT(navigator.loaded_view_count(), 600U);
   }
   EXPECT_GT(entered.size(), 5U);
 }

@@ -103,7 +103,7 @@ Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t
     if (decision.state != NavigationDecision::State::moving) break;
     obstacle = robot.go(decision.direction_rad, decision.advance_m);
     if (options.kidnapped_to && run.on_route() == 6) {
-      robot.carry_to(*options.kidnapped_to);
+      robot.teleport_to(*options.kidnapped_to);
     }
   }
   return run;

@@ -91,7 +91,7 @@ struct Scene {
     Drive run;
     RobotReport report;
     for (int step = 1; step <= 600; ++step) {
-      if (step == kidnap_step) robot.carry_to(kidnap_to);
+      if (step == kidnap_step) robot.teleport_to(kidnap_to);
       run.end = navigator.observe(two_rooms_signature(world, robot.pose(), noise, light), report);
       run.events.insert(run.events.end(), run.end.events.begin(), run.end.events.end());
       run.bytes_read += run.end.bytes_read;

@@ -38,7 +38,7 @@ std::vector<bool> walk(const std::filesystem::path& memory, bool in_step, std::s
       const auto answer = live.answer(seen);
       known.push_back(answer.place && answer.place->known);
       RunMoment moment{.stamp_s = *seen.stamp_s, .truth = seen.pose};
-      if (answer.place) describe(moment, *answer.place);
+      if (answer.place) set_localisation(moment, *answer.place);
       recorder.add(std::move(moment));
       if (answer.is_new) live.add(std::move(seen));
     }

@@ -69,7 +69,7 @@ TEST(JpegStream, GivesTheSamePicturesHoweverTheBytesCome) {
       at += some;
     }
     EXPECT_EQ(found, pictures) << largest;
-    EXPECT_EQ(cut.unfinished(), 0U);
+    EXPECT_EQ(cut.unfinished_bytes(), 0U);
   }
 }
 

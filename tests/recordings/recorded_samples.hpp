@@ -34,18 +34,20 @@ inline std::vector<std::uint32_t> all_topics(const Recording& recording) {
 
 inline Messages in_sequence(const Recording& recording, std::optional<TimeSpan> within = {}) {
   Messages messages;
-  recording.for_each(all_topics(recording), within, [&](const MessageLocation& place, auto bytes) {
-    messages.push_back(
-        {recording.topics()[place.topic].name, place.time_ns, {bytes.begin(), bytes.end()}});
-  });
+  recording.for_each(all_topics(recording), within,
+                     [&](const MessageLocation& location, auto bytes) {
+                       messages.push_back({recording.topics()[location.topic].name,
+                                           location.time_ns,
+                                           {bytes.begin(), bytes.end()}});
+                     });
   return messages;
 }
 
 inline Messages one_by_one(const Recording& recording, std::optional<TimeSpan> within = {}) {
   Messages messages;
-  for (const auto& place : recording.places(all_topics(recording), within)) {
+  for (const auto& location : recording.locations(all_topics(recording), within)) {
     messages.push_back(
-        {recording.topics()[place.topic].name, place.time_ns, recording.read(place)});
+        {recording.topics()[location.topic].name, location.time_ns, recording.read(location)});
   }
   return messages;
 }

@@ -89,27 +89,27 @@ TEST_F(RecordingTest, ASpanAndTopicsAreAFilterOfAll) {
     Messages only_b;
     for (std::uint32_t topic = 0; topic < 3; ++topic) {
       if (recording->topics()[topic].name != "/b") continue;
-      for (const auto& place : recording->places(std::array{topic}, within)) {
-        only_b.push_back({"/b", place.time_ns, recording->read(place)});
+      for (const auto& location : recording->locations(std::array{topic}, within)) {
+        only_b.push_back({"/b", location.time_ns, recording->read(location)});
       }
     }
     EXPECT_EQ(only_b, expected);
   }
   EXPECT_GT(found, 1000U);
-  EXPECT_THROW((void)recording->places(std::array<std::uint32_t, 1>{3}), ContractError);
+  EXPECT_THROW((void)recording->locations(std::array<std::uint32_t, 1>{3}), ContractError);
 }
 
 TEST_F(RecordingTest, ThreadsReadAtATime) {
   const Written written = write_some(folder / "a.mcap", {McapCompression::zstd, 3000, ""}, 400, 4);
   const auto recording = Recording::open(written.path);
-  const auto places = recording->places(all_topics(*recording));
-  ASSERT_EQ(places.size(), written.messages.size());
+  const auto locations = recording->locations(all_topics(*recording));
+  ASSERT_EQ(locations.size(), written.messages.size());
   std::vector<int> wrong(4);
   std::vector<std::thread> threads;
   for (std::size_t t = 0; t < wrong.size(); ++t) {
     threads.emplace_back([&, t] {
-      for (std::size_t i = t; i < places.size(); i += wrong.size() - 1) {
-        wrong[t] += recording->read(places[i]) != written.messages[i].bytes ? 1 : 0;
+      for (std::size_t i = t; i < locations.size(); i += wrong.size() - 1) {
+        wrong[t] += recording->read(locations[i]) != written.messages[i].bytes ? 1 : 0;
       }
     });
   }
@@ -172,9 +172,10 @@ TEST_F(RecordingTest, ADamagedChunkIsLeftOutAndNamed) {
   const Written written = write_some(folder / "a.mcap", {McapCompression::none, 900, ""}, 60, 2);
   std::string bytes = bytes_of(written.path);
   // Within the bytes of the last message of the second chunk.
-  const auto places = Recording::open(written.path)->places(std::array<std::uint32_t, 3>{0, 1, 2});
-  const auto in_second = std::ranges::find(places, 1U, &MessageLocation::block);
-  ASSERT_NE(in_second, places.end());
+  const auto locations =
+      Recording::open(written.path)->locations(std::array<std::uint32_t, 3>{0, 1, 2});
+  const auto in_second = std::ranges::find(locations, 1U, &MessageLocation::block);
+  ASSERT_NE(in_second, locations.end());
   const auto& victim = *in_second;
   const auto content = Recording::open(written.path)->read(victim);
   ASSERT_GE(content.size(), 8U);
@@ -182,8 +183,8 @@ TEST_F(RecordingTest, ADamagedChunkIsLeftOutAndNamed) {
   ASSERT_NE(at, std::string::npos);
   bytes[at + 3] = static_cast<char>(bytes[at + 3] ^ 1);
   Messages others;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (places[i].block != victim.block) others.push_back(written.messages[i]);
+  for (std::size_t i = 0; i < locations.size(); ++i) {
+    if (locations[i].block != victim.block) others.push_back(written.messages[i]);
   }
   const auto damaged = folder.write("damaged.mcap", bytes);
   // Without its footer the file is read from its beginning to its end.
@@ -198,7 +199,7 @@ TEST_F(RecordingTest, ADamagedChunkIsLeftOutAndNamed) {
   EXPECT_THROW((void)Recording::open(damaged)->read(victim), FileError);
   // Times outside of the chunk do not touch it: the index says where it lies.
   const auto recording = Recording::open(damaged);
-  const auto last = TimeSpan{places.back().time_ns, places.back().time_ns};
+  const auto last = TimeSpan{locations.back().time_ns, locations.back().time_ns};
   EXPECT_EQ(in_sequence(*recording, last).size(), 1U);
   EXPECT_TRUE(recording->warnings().empty());
 }
@@ -219,11 +220,11 @@ TEST_F(RecordingTest, PackedMessagesAreUnpackedUpToTheLimit) {
                                  mcap_message(2, long_frame(10000)) +
                                  mcap_message(3, long_frame(10).substr(0, 20)) + mcap_end);
   const auto recording = Recording::open(path, {.chunk_bytes = 2U << 20U});
-  const auto places = recording->places(std::array{0U});
-  ASSERT_EQ(places.size(), 3U);
-  EXPECT_EQ(recording->read(places[0]), std::vector<std::uint8_t>(1310720, 'x'));
+  const auto locations = recording->locations(std::array{0U});
+  ASSERT_EQ(locations.size(), 3U);
+  EXPECT_EQ(recording->read(locations[0]), std::vector<std::uint8_t>(1310720, 'x'));
   for (const std::size_t damaged : {1, 2}) {
-    EXPECT_TRUE(contains(message_of<FileError>([&] { (void)recording->read(places[damaged]); }),
+    EXPECT_TRUE(contains(message_of<FileError>([&] { (void)recording->read(locations[damaged]); }),
                          "a packed message cannot be unpacked, or not to 2097152 bytes"));
   }
 }
@@ -332,9 +333,9 @@ TEST_F(RecordingTest, MutatedFilesNeitherCrashNorEndInSeveralLines) {
         const auto recording = Recording::open(path, limits);
         const Messages messages = in_sequence(*recording);
         changed += messages != golden_messages() ? 1 : 0;
-        for (const auto& place : recording->places(all_topics(*recording))) {
+        for (const auto& location : recording->locations(all_topics(*recording))) {
           try {
-            (void)recording->read(place);
+            (void)recording->read(location);
           } catch (const FileError&) {
           }
         }

@@ -183,7 +183,7 @@ TEST(RosPoses, AgreeWithThePlane) {
     expect_near(ros::to_pose2(ros::inverse(ros::to_pose(a))), inverse(a));
     const double share = random.uniform(0.0, 1.0);
     const double turn = angle_difference(b.heading_rad, a.heading_rad);
-    expect_near(ros::to_pose2(ros::between(ros::to_pose(a), ros::to_pose(b), share)),
+    expect_near(ros::to_pose2(ros::interpolate(ros::to_pose(a), ros::to_pose(b), share)),
                 {std::lerp(a.x_m, b.x_m, share), std::lerp(a.y_m, b.y_m, share),
                  wrap_angle(a.heading_rad + share * turn)});
     const Tilt tilt{random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5)};

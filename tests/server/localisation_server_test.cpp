@@ -333,11 +333,11 @@ TEST_F(LocalisationServerTest, RefusesHeadsThatOthersWouldReadInAnotherWay) {
 TEST_F(LocalisationServerTest, ReadsAChangedMemoryAgain) {
   std::vector<std::string> notes;
   std::mutex mutex;
-  const LocalisationServer server(
-      hall(), {.look_every = std::chrono::milliseconds(20), .note = [&](const std::string& line) {
-                 const std::lock_guard lock(mutex);
-                 notes.push_back(line);
-               }});
+  const LocalisationServer server(hall(), {.poll_interval = std::chrono::milliseconds(20),
+                                           .note = [&](const std::string& line) {
+                                             const std::lock_guard lock(mutex);
+                                             notes.push_back(line);
+                                           }});
   const auto views = [&] { return body_of(get(server, "/v1/memories/hall"))["views"]; };
   EXPECT_EQ(views(), 40);
   std::this_thread::sleep_for(std::chrono::milliseconds(200));

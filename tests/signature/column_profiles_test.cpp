@@ -293,7 +293,7 @@ TEST(MatchColumnsTwice, FindsTheSecondTurnOnTheOtherSide) {
     }
   }
   const ColumnProfiles profiles(packed(view));
-  const auto [best, other] = match_columns_two_best(profiles, profiles);
+  const auto [best, other] = find_two_best_column_matches(profiles, profiles);
   const ColumnMatch alone = match_columns(profiles, profiles);
   EXPECT_EQ(best.difference, alone.difference);
   EXPECT_EQ(best.heading_rad, alone.heading_rad);
@@ -301,7 +301,7 @@ TEST(MatchColumnsTwice, FindsTheSecondTurnOnTheOtherSide) {
   EXPECT_GT(other.difference, best.difference);
 
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const auto [nearest, farther] = match_columns_two_best(
+    const auto [nearest, farther] = find_two_best_column_matches(
         ColumnProfiles(packed(smooth_view(seed))), ColumnProfiles(packed(smooth_view(seed + 50))));
     EXPECT_GE(farther.difference, nearest.difference);
     EXPECT_GE(std::abs(angle_difference(farther.heading_rad, nearest.heading_rad)),

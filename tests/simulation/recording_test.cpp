@@ -101,10 +101,10 @@ TEST_F(Recording, TiltChangesTheViewAndNothingElseDoes) {
   Random random(4);
   const Pose2 pose = space_.random_pose(random);
   const SensorOptions ideal{.read_noise = 0.0, .full_well = 1e12, .eight_bit = false};
-  const auto level = take_panorama(renderer, pose, small_, {}, ideal, 1, executor_);
-  const auto again = take_panorama(renderer, pose, small_, {}, ideal, 2, executor_);
+  const auto level = capture_panorama(renderer, pose, small_, {}, ideal, 1, executor_);
+  const auto again = capture_panorama(renderer, pose, small_, {}, ideal, 2, executor_);
   const auto tilted =
-      take_panorama(renderer, pose, small_, {.tilt_rad = radians(5.0)}, ideal, 1, executor_);
+      capture_panorama(renderer, pose, small_, {.tilt_rad = radians(5.0)}, ideal, 1, executor_);
   double largest_again = 0.0;
   double mean_tilted = 0.0;
   for (std::size_t i = 0; i < level.values().size(); ++i) {
@@ -155,8 +155,8 @@ TEST_F(Recording, TiltLeansTheHorizonByItsAngleInAnyDirection) {
   double north = 0.0;
   constexpr int pictures = 40;
   for (int i = 0; i < pictures; ++i) {
-    const Panorama view = take_panorama(renderer, {0.0, 0.0, 0.5}, fine, {.tilt_rad = tilt}, ideal,
-                                        static_cast<std::uint64_t>(i), executor_);
+    const Panorama view = capture_panorama(renderer, {0.0, 0.0, 0.5}, fine, {.tilt_rad = tilt},
+                                           ideal, static_cast<std::uint64_t>(i), executor_);
     // Height of the horizon in each column, and its first harmonic.
     double cosine = 0.0;
     double sine = 0.0;
@@ -182,7 +182,7 @@ TEST_F(Recording, TheCameraStandsAtItsHeight) {
   const SensorOptions ideal{.read_noise = 0.0, .full_well = 1e12, .eight_bit = false};
   for (const double height_m : {0.08, 0.6, 0.9}) {
     const Panorama view =
-        take_panorama(renderer, {}, fine, {.camera_height_m = height_m}, ideal, 1, executor_);
+        capture_panorama(renderer, {}, fine, {.camera_height_m = height_m}, ideal, 1, executor_);
     const double row_rad = 1.8 / view.rows();
     int sky = 0;
     int floor = 0;
@@ -206,7 +206,7 @@ TEST_F(Recording, BadInputIsNamed) {
   EXPECT_THROW((void)plan_recording(scene_, space_, options, {}, 1, one), ContractError);
   const Renderer renderer(scene_);
   EXPECT_THROW(
-      (void)take_picture(renderer, {}, small_, {.camera_height_m = -1.0}, {}, 1, executor_),
+      (void)capture_image(renderer, {}, small_, {.camera_height_m = -1.0}, {}, 1, executor_),
       OptionError);
 }
 

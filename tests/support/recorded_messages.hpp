@@ -34,11 +34,11 @@ class RecordedMessages : public recordings::Recording {
       found = topics_.end() - 1;
     }
     ++found->messages;
-    recordings::MessageLocation place;
-    place.time_ns = log_ns;
-    place.topic = static_cast<std::uint32_t>(found - topics_.begin());
-    place.offset = messages_.size();
-    places_.push_back(place);
+    recordings::MessageLocation location;
+    location.time_ns = log_ns;
+    location.topic = static_cast<std::uint32_t>(found - topics_.begin());
+    location.offset = messages_.size();
+    locations_.push_back(location);
     messages_.push_back(std::move(bytes));
   }
 
@@ -49,30 +49,31 @@ class RecordedMessages : public recordings::Recording {
     return std::nullopt;
   }
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
-  [[nodiscard]] std::vector<recordings::MessageLocation> places(
+  [[nodiscard]] std::vector<recordings::MessageLocation> locations(
       std::span<const std::uint32_t> topics,
       std::optional<recordings::TimeSpan> /*within*/) const override {
     std::vector<recordings::MessageLocation> found;
-    for (const auto& place : places_) {
-      if (std::ranges::find(topics, place.topic) != topics.end()) found.push_back(place);
+    for (const auto& location : locations_) {
+      if (std::ranges::find(topics, location.topic) != topics.end()) found.push_back(location);
     }
     std::ranges::stable_sort(found, {}, &recordings::MessageLocation::time_ns);
     return found;
   }
   [[nodiscard]] std::vector<std::uint8_t> read(
-      const recordings::MessageLocation& place) const override {
-    return messages_.at(place.offset);
+      const recordings::MessageLocation& location) const override {
+    return messages_.at(location.offset);
   }
   void for_each(std::span<const std::uint32_t> topics, std::optional<recordings::TimeSpan> within,
                 const std::function<void(const recordings::MessageLocation&,
                                          std::span<const std::uint8_t>)>& use) const override {
-    for (const auto& place : places(topics, within)) use(place, messages_.at(place.offset));
+    for (const auto& location : locations(topics, within))
+      use(location, messages_.at(location.offset));
   }
 
  private:
   recordings::MessageEncoding encoding_;
   std::vector<recordings::RecordedTopic> topics_;
-  std::vector<recordings::MessageLocation> places_;
+  std::vector<recordings::MessageLocation> locations_;
   std::vector<std::vector<std::uint8_t>> messages_;
 };
 

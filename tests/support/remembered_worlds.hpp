@@ -183,7 +183,7 @@ class SimulatedRobot final : public RobotBase {
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
   /// Its wheels do not tell.
-  void carry_to(const Pose2& pose) { pose_ = pose; }
+  void teleport_to(const Pose2& pose) { pose_ = pose; }
   /// The motion that its wheels tell since the last time.
   [[nodiscard]] Pose2 take_odometry() { return std::exchange(odometry_, Pose2{}); }
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }

@@ -251,8 +251,8 @@ TEST_F(ReportPages, RunsKeepTheirPicturesChangesAndRoute) {
   second.goal = Pose2{7.0, 8.0, 0.0};
   run.add(second);
   run.set_unordered();
-  run.route({.title = "route", .columns = 1, .rows = 1, .values = {0.5F}},
-            {{.along_m = 1.5, .changed_deg = {{-10.04, 20.06}}}, {.true_along_m = 2.5}});
+  run.set_route({.title = "route", .columns = 1, .rows = 1, .values = {0.5F}},
+                {{.along_m = 1.5, .changed_deg = {{-10.04, 20.06}}}, {.true_along_m = 2.5}});
   EXPECT_EQ(run.size(), 2U);
   ReportPage page("t", "l");
   page.add_run(run);

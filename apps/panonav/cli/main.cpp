@@ -33,12 +33,12 @@ void report(std::string_view verb, std::string_view message) {
 class LeftOutWarnings {
  public:
   LeftOutWarnings(panonav::command::Session& session, std::string_view verb) {
-    panonav::set_left_out_handler([&session, verb](const auto& memory, const auto& row) {
+    panonav::set_skipped_row_handler([&session, verb](const auto& memory, const auto& row) {
       session.note("panonav " + std::string(verb) + ": warning: " +
                    panonav::to_readable_line(memory.string() + ": left out: " + row.what));
     });
   }
-  ~LeftOutWarnings() { panonav::set_left_out_handler({}); }
+  ~LeftOutWarnings() { panonav::set_skipped_row_handler({}); }
   LeftOutWarnings(const LeftOutWarnings&) = delete;
   LeftOutWarnings& operator=(const LeftOutWarnings&) = delete;
 };

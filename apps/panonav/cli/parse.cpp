@@ -114,8 +114,9 @@ std::shared_ptr<DeclaredVerb> declare(const Verb& verb) {
   declared->run = verb.declare(arguments);
   declared->own_argument_count = arguments.infos().size();
   arguments.flag("--json", common.session.json, "Print results as JSON on standard output");
-  arguments.flag("-q,--quiet", common.session.quiet,
-                 "Print only results and errors: no progress, no notes and no \"Next:\" lines");
+  arguments.flag(
+      "-q,--quiet", common.session.quiet,
+      "Print only results and errors: no progress, no notes and no suggested next commands");
   arguments.flag("-v,--verbose", common.session.verbose,
                  "Print each step and its duration on standard error");
   arguments.option("--threads", common.session.threads, 0, "Number of threads; 0: one per core");

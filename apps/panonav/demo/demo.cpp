@@ -53,34 +53,35 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
       std::hypot(found.centre.u_px - truth.centre.u_px, found.centre.v_px - truth.centre.v_px), 2);
   page.begin_part("Camera",
                   {centre_px + " pixels",
-                   "error of the mirror's centre after calibration from the robot's own images"});
+                   "error of the mirror's centre after calibration with the robot's own images"});
   page.add_text(
       "The camera points up at a curved mirror and takes images of the whole surroundings. The "
-      "dark disc in the middle is the reflection of the camera. First, a calibration finds the "
-      "centre, the rim and the inner radius of the mirror in some of the raw images. All parts of "
-      "this page use the calibrated values, not the true values of the simulation.");
+      "dark disc in the middle of an image is the reflection of the camera itself. First, the "
+      "robot calibrates its camera: in some unprocessed (raw) images, it finds the centre of the "
+      "mirror, its rim, and the inner radius, inside which nothing but the camera is visible. All "
+      "parts of this page use the calibrated values, not the true values of the simulation.");
   viewer::ReportPicture mirror = embed_image(
       colour.view(), "Raw image of the mirror camera, " + std::to_string(truth.image_size.width) +
                          " x " + std::to_string(truth.image_size.height) +
-                         " pixels. The robot itself uses grey images.");
+                         " pixels. The robot itself uses greyscale images.");
   page.add_pictures(
       {mirror,
-       embed_image(overlay.view(),
-                   "Calibration from " + std::to_string(recordings.calibration_image_count) +
-                       " raw images. Green: rim; orange: inner radius; red: centre. The error of "
-                       "the centre is " +
-                       centre_px + " pixels. The error of the rim's radius is " +
-                       format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) +
-                       ".")});
+       embed_image(
+           overlay.view(),
+           "Result of the calibration from " + std::to_string(recordings.calibration_image_count) +
+               " raw images. Green: rim; orange: inner radius; red: centre. The error of "
+               "the centre is " +
+               centre_px + " pixels. The error of the rim's radius is " +
+               format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) + " pixels.")});
   page.add_text(
-      "The robot then unwraps the image to a panorama of 80 rows. It stores only the first 15 "
-      "Fourier components of each row: 2.4 kB per view. The magnitudes of the components do not "
-      "change when the robot rotates, so they identify the place at any heading. The phases give "
-      "the heading.");
+      "The robot then unwraps each image into a panorama of 80 rows. For each row it stores only "
+      "the first 15 components of the Fourier transform. A stored view therefore takes 2.4 kB. The "
+      "magnitudes of the components do not change when the robot rotates, so they identify the "
+      "place at any heading. The phases give the heading.");
   page.add_views({{std::move(cylinder),
                    {},
-                   "The same image as a panorama of 512 x 80 pixels. The forward direction is in "
-                   "the middle."}});
+                   "The same image as a panorama of 512 x 80 pixels. The robot's forward direction "
+                   "is in the middle."}});
   return mirror;
 }
 
@@ -147,19 +148,20 @@ void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapL
   const std::string spacing = format_fixed(100.0 * spacing_m, 0) + " cm";
   page.begin_part("Localisation", {format_median(in_office.errors_m, 100.0, 1, "cm"),
                                    "median error of the position computed from one image"});
-  page.add_text("The robot stored a view every " + spacing + ". Then it was placed at " +
-                std::to_string(queries.size()) +
-                " random positions between these views, with random headings. At each position it "
-                "computed its position and heading from one new image. It was also placed in "
-                "another room. There, the correct answer is that the place is unknown.");
+  page.add_text(
+      "The robot stored views of an office on a grid with a spacing of " + spacing +
+      ". Then it was placed at " + std::to_string(queries.size()) +
+      " random positions between these views, with random headings. At each of these positions, it "
+      "took one new image and computed its position and heading from this image. The robot was "
+      "also placed in another room. The correct answer in that room is that the place is unknown.");
   page.add_figures(
       {{std::to_string(memory.size()), "stored views with a spacing of " + spacing},
        {format_median(in_office.errors_m, 100.0, 1, "cm"), "median error of the position"},
        {format_median(in_office.heading_errors_rad, degrees(1.0), 2, "degrees"),
         "median error of the heading"},
-       {format_percent(in_office.known), "of the places in the office recognised"},
+       {format_percent(in_office.known), "of the places in the office were recognised"},
        {format_percent(in_other_room.known),
-        "of the images from the other room wrongly recognised"}});
+        "of the images from the other room were wrongly recognised"}});
   page.add_text(
       "The circles on the map are the stored views. The green crosses are the true positions of "
       "the robot. A line leads from each cross to the position that the robot computed; a short "
@@ -167,8 +169,8 @@ void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapL
       "answer, the median error would be " +
       format_median(in_office.nearest_errors_m, 100.0, 1, "cm") +
       ". The robot is more accurate because it interpolates between views.");
-  page.add_plots(
-      {{draw_answers(memory, scene, queries), "True positions and the error of each answer"}});
+  page.add_plots({{draw_answers(memory, scene, queries),
+                   "True positions of the robot, and the error of each computed position"}});
 }
 
 /// Returns the first image whose place was recognised, or the first image.
@@ -185,32 +187,32 @@ viewer::MapAnimation add_levels_part(const VisualMemory& memory,
   AreaAnimation areas = draw_areas(memory, scene, view);
   const std::string first = format_fixed(areas.areas_m2.front(), 1);
   const std::string last = format_fixed(areas.areas_m2.back(), 2);
-  page.begin_part(
-      "Adjustable accuracy",
-      {first + " to " + last + " m²",
-       "area in which the robot may be: from a fast, rough answer to an accurate answer"});
-  page.add_text("With one Fourier component, the robot may be anywhere in an area of " + first +
-                " square metres. Each additional component reduces this area, down to " + last +
-                " square metres. In open space a rough answer is sufficient and takes less "
-                "computation. At a door the robot needs an accurate answer.");
+  page.begin_part("Adjustable accuracy", {first + " to " + last + " m²",
+                                          "size of the area in which the robot may be: large for a "
+                                          "fast, rough answer, small for an accurate answer"});
+  page.add_text(
+      "If the robot compares only one Fourier component, it may be anywhere in an area of " +
+      first + " square metres. More components reduce this area, down to " + last +
+      " square metres. In open space a rough answer is sufficient and takes less "
+      "computation. At a door the robot needs an accurate answer.");
   page.add_plots(
       {{areas.map,
-        "Orange: the area in which the robot may be, for an increasing number of "
-        "components. Cross: the true position."},
+        "Orange: the area in which the robot may be. The number of components increases from step "
+        "to step. Cross: the true position."},
        {draw_similarity(memory, spacing_m, view),
-        "Similarity of each stored view to an image taken at the cross. The nearest view is the "
-        "most similar one. Similarity decreases with distance in all directions. The areas in the "
-        "other plot are computed from these similarities."}});
+        "Similarity of each stored view to the image that the robot took at the cross. The view "
+        "nearest to the cross is the most similar one. Similarity decreases with distance in all "
+        "directions. The areas in the other plot are computed from these similarities."}});
   return std::move(areas.map);
 }
 
 void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
                   const DemoNavigation& navigation, viewer::ReportPage& page) {
   const auto path_in_out = [&](const char* name) { return (options.out / name).string(); };
-  page.begin_section("Commands for this data");
+  page.begin_section("Commands for these data");
   page.add_text(
-      "The recordings and the memory of this run are in the folder of this page. Every command has "
-      "the option --help.");
+      "The recordings and the memories of this demonstration are in the folder of this page. Every "
+      "command has the option --help.");
   const std::string memory = path_in_out("office.panonav");
   const simulation::SimulatedWorldOptions world_options = demo_world_options(options, 0);
   std::string mission;
@@ -219,7 +221,7 @@ void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
       {"alias panonav=build/release/bin/panonav", "panonav info " + memory,
        "panonav localise " + memory + " " + path_in_out("query_run"),
        "panonav localise " + memory + " " + path_in_out("elsewhere_run") +
-           "    # another room: unknown",
+           "    # another room: unknown place",
        "panonav localise " + memory + " " + recordings.query_run.entries.front().path.string() +
            " --areas",
        "panonav track " + path_in_out("corridor.panonav") + " " + path_in_out("walk_run") +
@@ -253,7 +255,7 @@ ordered_json median_or_null(const std::vector<double>& values) {
 }
 
 ordered_json to_json(const simulation::MissionRun& run) {
-  return {{"end", name_of(run.end)},
+  return {{"end", to_string(run.end)},
           {"goal_distance_m", run.end_distance_m},
           {"steps", run.decisions.size()},
           {"travelled_m", run.travelled_m},
@@ -339,9 +341,9 @@ void print(const DemoResults& done, Session& session) {
       "  navigation: " + format_part_of(navigation.arrived, navigation.runs.size()) +
       " missions arrived; median ratio of driven path to shortest path " +
       (navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2)) +
-      "; mission with a kidnapped robot: " + std::string(name_of(navigation.kidnapped.end)) +
+      "; mission with a kidnapped robot: " + std::string(to_string(navigation.kidnapped.end)) +
       "; mission with a new obstacle on the path: " +
-      (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
+      (navigation.screened ? std::string(to_string(navigation.screened->end)) : "none"));
 }
 
 MemoryFile memorise_run(const Dataset& run, const fs::path& path, Executor& executor) {
@@ -443,8 +445,9 @@ Run declare_demo(Arguments& arguments) {
                    "Folder for the page: a new folder, or the folder of an earlier demo");
   arguments.declare_outputs({"--out"});
   arguments.option("--seed", *seed, "Seed of the simulated office (default: 1)");
-  arguments.flag("--quick", values->quick,
-                 "Run a short demonstration with fewer and smaller images and fewer missions");
+  arguments.flag(
+      "--quick", values->quick,
+      "Run a short demonstration with fewer and smaller images and fewer drives to goals");
   return [values, out, seed](Session& session) {
     values->out = *out;
     values->seed = seed->value_or(1);

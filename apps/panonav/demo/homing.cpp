@@ -80,9 +80,10 @@ std::vector<viewer::ReportView> make_report_views(const Panorama& home, const Pa
   }
   const double columns = -vector.heading_rad / (2.0 * std::numbers::pi) * home.columns();
   return {{rotate_columns(home, static_cast<int>(std::lround(columns))), marks,
-           "First run: the view at home, rotated to the robot's heading at the start."},
+           "First run: the stored view of home, rotated to the heading that the robot had at the "
+           "start."},
           {current, marks,
-           "First run: the image at the start. Orange: the direction home; objects in this "
+           "First run: the robot's image at the start. Orange: the direction home; objects in this "
            "direction become larger during the drive. Blue: the opposite direction. Grey: the "
            "robot's forward direction."}};
 }
@@ -103,30 +104,32 @@ DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::ui
   }
   const auto take_view_at = [&](const Pose2& pose) {
     const lab::HomingCamera& camera = place.camera;
-    return simulation::take_panorama(*place.renderer, pose, camera.rendering, camera.frame,
-                                     camera.sensor, seed, session.executor());
+    return simulation::capture_panorama(*place.renderer, pose, camera.rendering, camera.frame,
+                                        camera.sensor, seed, session.executor());
   };
   const lab::HomingRun& shown = homing.runs.front();
 
-  page.begin_part("Homing",
-                  {std::to_string(homing.arrived) + " of " + std::to_string(runs),
-                   "robots drove home from a distance of one metre with one stored view"});
+  page.begin_part(
+      "Homing",
+      {std::to_string(homing.arrived) + " of " + std::to_string(runs),
+       "runs reached home; each run started one metre away and used one stored view of home"});
   page.add_text(
-      "The robot has one stored view of a place, its home. It compares the Fourier components of "
-      "this view and of its current image, and computes the direction home. It needs no map and "
-      "does not know its heading. In this test the robot was placed one metre away from " +
+      "The robot has one stored view of one place: its home. It compares the Fourier components of "
+      "this view with those of its current image. From the difference, it computes the direction "
+      "home. It needs no map and does not know its heading. This test has " +
       std::to_string(runs) +
-      " places, with random headings. It took an image, drove one step, and repeated this until it "
-      "was home. Its odometry and its images contain noise.");
+      " runs, each with a different home. Each run started one metre from home, with a random "
+      "heading. The robot took an image, drove one step, and repeated this until it was home. Its "
+      "odometry and its images contain noise.");
   page.add_figures(
       {{std::to_string(homing.arrived) + " of " + std::to_string(runs),
-        "runs that ended within 10 cm of home and reported so"},
+        "runs ended within 10 cm of home, and the robot reported its arrival"},
        {format_fixed(100.0 * median(homing.distances_m), 1) + " cm",
         "median distance from home at the end"},
        {format_fixed(static_cast<double>(steps) / runs, 0), "steps per run on average"}});
   page.add_plots({{draw_runs(office, homing.runs),
-                   "All runs at once, step by step, from the green circles to the black squares. A "
-                   "run that ends at another place turns orange."}});
+                   "All runs at once, step by step. Each run starts at a green circle; its home is "
+                   "a black square. The path of a run that ends at another place turns orange."}});
   page.add_views(make_report_views(take_view_at(shown.goal), take_view_at(shown.path.front()),
                                    shown.vectors.front()));
   return homing;

@@ -57,8 +57,8 @@ std::vector<viewer::MapLayer> colour_by_position(const std::vector<Point2>& posi
                                viewer::PlotColour::orange, viewer::PlotColour::vermilion};
   std::vector<viewer::MapLayer> layers;
   for (const viewer::PlotColour colour : colours) layers.push_back({.colour = colour});
-  layers.front().label = "taken in the west";
-  layers.back().label = "taken in the east";
+  layers.front().label = "views taken in the west";
+  layers.back().label = "views taken in the east";
   const auto [west, east] = std::ranges::minmax(truth, {}, &Point2::x_m);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const double share = (truth[i].x_m - west.x_m) / std::max(1e-9, east.x_m - west.x_m);
@@ -151,15 +151,17 @@ std::vector<std::pair<std::string, std::string>> make_figures(const DemoMaps& ma
   if (maps.lattice) {
     figures.push_back(
         {format_centimetres(maps.lattice->truth_from_map.rms_m),
-         "error of the arranged views (root mean square) in a room " +
-             format_fixed(room_length_m(office), 1) + " m long; this is " +
+         "root mean square error of the computed positions of the views, in a room " +
+             format_fixed(room_length_m(office), 1) + " m long; this error is " +
              format_fixed(100.0 * maps.lattice->truth_from_map.rms_m / room_length_m(office), 1) +
-             " % of the length"});
+             " % of the length of the room"});
   }
   figures.push_back({format_centimetres(maps.map_rms_m),
-                     "error of the map of a drive of " +
-                         format_fixed(spacing_m * static_cast<double>(drive_views), 0) + " m"});
-  figures.push_back({format_centimetres(maps.wheels_rms_m), "error of the odometry alone"});
+                     "error of the map from the images of a drive that is " +
+                         format_fixed(spacing_m * static_cast<double>(drive_views), 0) +
+                         " m long"});
+  figures.push_back(
+      {format_centimetres(maps.wheels_rms_m), "error of the path from odometry alone"});
   return figures;
 }
 
@@ -196,28 +198,29 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
       maps.lattice ? format_centimetres(maps.lattice->truth_from_map.rms_m) : "none";
   page.begin_part("Maps", {arranged, "error of a map that was made from images alone"});
   page.add_text(
-      "This part makes a map from images alone, without their order and without positions. The "
-      "algorithm connects similar views with springs. The springs pull the views to their "
-      "positions.");
+      "In this part, an algorithm makes a map from images alone. It knows neither the order of the "
+      "images nor their positions. It connects similar views by virtual springs, which pull the "
+      "views to their positions.");
   page.add_plots(
       {{draw_growth(maps.arranged, office, growth, seed),
         "At first the positions are random. Similar views form groups, and the groups grow until "
-        "all views are connected. Each group is drawn at its final position. The map is rotated "
-        "and scaled to fit the true positions, because images do not contain the north direction "
-        "or a length in metres."},
+        "all views are connected. The animation draws each group at its final position from the "
+        "beginning. The map is rotated and scaled to fit the true positions, because the images "
+        "show neither the north direction nor lengths in metres."},
        {draw_truth(office),
-        "The true positions, which the algorithm did not use. Colours change from west to east. If "
-        "the result were perfect, the last step of the other map would look like this map."}});
+        "The true positions, which the algorithm did not use. In both maps, the colour of a view "
+        "shows its true position from west to east. If the result were perfect, the last step of "
+        "the other map would look like this map."}});
   page.add_text(
-      "Below, a robot drives through unknown rooms and makes a map of its path from images, "
-      "without odometry. When it passes a place again, it recognises the place and corrects the "
-      "map.");
-  page.add_plots(
-      {{draw_drive(place, recording, mapped),
-        "A drive with " + std::to_string(recording.truth.size()) + " views and a spacing of " +
-            format_centimetres(spacing_m) +
-            ". Black: true path. Blue: map from images. Orange: odometry of a low-cost robot. The "
-            "map and the odometry are scaled to the size of the true path."}});
+      "In a second test, a robot drives through unknown rooms and makes a map of its path from "
+      "images, without odometry. When the robot passes a place again, it recognises this place and "
+      "corrects the map.");
+  page.add_plots({{draw_drive(place, recording, mapped),
+                   "A drive with " + std::to_string(recording.truth.size()) + " views, one every " +
+                       format_centimetres(spacing_m) +
+                       ". Black: true path. Blue: map from images. Orange: for comparison, the "
+                       "path from the odometry of a low-cost robot. The blue and the orange path "
+                       "are scaled to the size of the true path."}});
   page.add_figures(make_figures(maps, office, recording.truth.size()));
   return maps;
 }

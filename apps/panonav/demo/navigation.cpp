@@ -155,7 +155,7 @@ viewer::MapAnimation draw_run(const std::string& title, const simulation::Missio
     driven.dots = {run.path[step].position()};
     map.frames.push_back({.title = step < run.decisions.size()
                                        ? "image " + std::to_string(step + 1) + ": " +
-                                             std::string(name_of(run.decisions[step].state))
+                                             std::string(to_string(run.decisions[step].state))
                                        : "the end",
                           .layers = {driven}});
   }
@@ -170,7 +170,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
                            const simulation::MissionRun& run) {
   const simulation::SimulatedWorldOptions& world_options = recordings.office_world->options();
   std::optional<Panorama> last_panorama;
-  const auto take_view = simulation::make_view_sensor(
+  const auto capture_view = simulation::make_view_sensor(
       place.renderer, recordings.true_camera, world_options.frame, world_options.sensor, encoder,
       nullptr,
       [&](const Image& /*picture*/, const Panorama& panorama) { last_panorama = panorama; });
@@ -184,14 +184,14 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
     recordings::RunMoment moment{.stamp_s = 0.5 * static_cast<double>(i), .pose = pose};
     moment.truth = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
     moment.sure = decision.probability >= 0.5;
-    moment.state = name_of(decision.state);
+    moment.state = to_string(decision.state);
     moment.probability = decision.probability;
     for (const NavigationDecision::Event event : decision.events) {
-      std::string name(name_of(event));
+      std::string name(to_string(event));
       std::ranges::replace(name, '_', ' ');
       moment.values.emplace_back("event", std::move(name));
     }
-    const FourierSignature signature = take_view(pose, i);
+    const FourierSignature signature = capture_view(pose, i);
     moment.panorama = std::exchange(last_panorama, std::nullopt);
     if (decision.nearest) {
       moment.values.emplace_back("best_match", remembered.memory.info(*decision.nearest).name);
@@ -226,7 +226,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
 }
 
 std::string describe_end(const simulation::MissionRun& run, double within_m) {
-  const std::string name(name_of(run.end));
+  const std::string name(to_string(run.end));
   if (run.end != NavigationDecision::State::arrived) return name;
   return run.has_arrived(within_m) ? "arrived" : "arrived, but too far from the goal";
 }
@@ -243,9 +243,9 @@ std::string format_log(const std::string& title, const std::string& goal,
 /// Describes the result of a mission in a sentence.
 std::string describe_run(const simulation::MissionRun& run, double within_m) {
   return "Result: " + describe_end(run, within_m) + ", " +
-         format_fixed(100.0 * run.end_distance_m, 0) + " cm from the goal after " +
-         std::to_string(run.decisions.size()) + " steps and " + format_fixed(run.travelled_m, 1) +
-         " m.";
+         format_fixed(100.0 * run.end_distance_m, 0) + " cm from the goal, after " +
+         std::to_string(run.decisions.size()) + " steps and a drive of " +
+         format_fixed(run.travelled_m, 1) + " m.";
 }
 
 /// The plots of the page.
@@ -260,49 +260,54 @@ void add_part(const DemoNavigation& navigation, MissionPlots plots, viewer::Repo
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
   const std::string within = format_fixed(100.0 * navigation.within_m, 1) + " cm";
-  page.begin_part("Navigation", {arrived, "missions reached their goal with images alone"});
+  page.begin_part("Navigation", {arrived, "robots reached their goals with images alone"});
   page.add_text(
-      "The goal is a stored view. The robot knows no positions: not its start, not its heading and "
-      "not the positions of the views. It has no map of walls and only detects obstacles directly "
-      "in front of it. It uses the arrangement of the views (part 5), which gives each stored view "
-      "a direction towards the goal. The robot takes an image, finds the most similar stored view, "
-      "and drives one step in the direction of this view. It repeats this until it is near the "
-      "goal. Then it drives to the goal with the method of part 6.");
+      "The goal is a stored view. The robot does not know its start position, its heading, or the "
+      "true positions of the views. It has no map of the walls and detects only obstacles directly "
+      "in front of it. It uses the arrangement of the views that was computed in part 5. From this "
+      "arrangement, it computes a direction towards the goal for each stored view. The robot takes "
+      "an image, finds the most similar stored view, and drives one step in the direction that "
+      "belongs to this view. It repeats this until it is near the goal. Then it drives to the goal "
+      "with the method of part 6.");
   page.add_text(
-      "The robots started at " + count + " random places and were sent to " + count +
-      " random stored views. In one additional mission the robot was moved by hand "
-      "(kidnapped) on its path. In another one a new obstacle, a screen, stood across the "
-      "path. A mission is successful if the robot reports its arrival and is not farther "
-      "from the goal than half the spacing of the views, " +
+      "In each mission, a robot drives to one goal. The robots started at " + count +
+      " random places and were sent to " + count +
+      " random stored views. In one additional mission, the robot was kidnapped (moved by hand) "
+      "during its drive. In another additional mission, a new obstacle stood across the path: a "
+      "screen. A mission is successful if the robot reports its arrival and its distance from the "
+      "goal is at most half the spacing of the views, which is " +
       within + ".");
   page.add_figures(
-      {{arrived, "missions ended within " + within + " of the goal and reported their arrival"},
+      {{arrived, "missions were successful: the robot reported its arrival within " + within +
+                     " of the goal"},
        {navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2),
-        "median ratio of the driven path to the shortest path"},
+        "median ratio of the length of the driven path to that of the shortest path"},
        {format_fixed(median(navigation.steps), 0), "median number of steps per mission"},
-       {describe_end(navigation.kidnapped, navigation.within_m), "result of the kidnapped robot"},
+       {describe_end(navigation.kidnapped, navigation.within_m),
+        "result of the mission with the kidnapped robot"},
        {navigation.screened ? describe_end(*navigation.screened, navigation.within_m) : "none",
-        navigation.screened ? "result of the robot with a screen across its path"
-                            : "no test with a screen: it would block every path"}});
+        navigation.screened
+            ? "result of the mission with a screen across the path"
+            : "no mission with a screen, because the screen would block every path"}});
   page.add_text(
-      "The first mission, image by image. Short lines: the direction in which each stored view "
-      "sends the robot. Thick line: the planned path. The stored view that is most similar to the "
-      "robot's image is shown below the image, rotated to the same heading.");
+      "The animation below shows the first mission, image by image. Short lines: the direction "
+      "towards the goal at each stored view. Thick line: the planned path. Below the robot's "
+      "image, the page shows the most similar stored view, rotated to the robot's heading.");
   page.add_run(plots.first);
   std::vector<viewer::ReportPlot> maps{
       {std::move(plots.all),
-       "All missions at once. The path of a mission that did not reach its goal is orange."},
+       "All missions at once. If a robot does not reach its goal, its path turns orange."},
       {std::move(plots.kidnapped),
-       "This robot was kidnapped in the middle of its path to the purple square. " +
+       "In the middle of its drive, this robot was carried by hand to the purple square. " +
            describe_run(navigation.kidnapped, navigation.within_m)}};
   if (plots.screened) {
     maps.push_back({std::move(*plots.screened),
                     "A screen (short dark line) stands across the middle of the planned path. The "
-                    "memory does not contain it. There is a path around it. " +
+                    "stored views do not show this screen, but there is a path around it. " +
                         describe_run(*navigation.screened, navigation.within_m)});
   }
   page.add_plots(maps);
-  page.add_link("mission.log", "Log of all decisions");
+  page.add_link("mission.log", "Log of all decisions of the robots");
 }
 
 }  // namespace
@@ -345,8 +350,8 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
   MissionPlots plots{.first = replay_run(place, remembered, recordings, file, encoder,
                                          settings.planner, first.goal, navigation.runs.front()),
                      .all = draw_runs(navigation, remembered, missions, recordings.office_scene),
-                     .kidnapped = draw_mission("Kidnapped on its path", place, missions.back(),
-                                               navigation.kidnapped)};
+                     .kidnapped = draw_mission("Mission with a kidnapped robot", place,
+                                               missions.back(), navigation.kidnapped)};
   navigation.all = plots.all;
   std::string log;
   const auto add_log = [&](const std::string& title, const simulation::Mission& mission,
@@ -356,7 +361,7 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
   for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
     add_log("Mission " + std::to_string(i + 1), missions[i], navigation.runs[i]);
   }
-  add_log("Kidnapped on its path", missions.back(), navigation.kidnapped);
+  add_log("Mission with a kidnapped robot", missions.back(), navigation.kidnapped);
   navigation.first_mission = {"--goal", memory.info(first.goal).name, "--start",
                               format_fixed(first.start.x_m, 3) + "," +
                                   format_fixed(first.start.y_m, 3) + "," +
@@ -368,9 +373,9 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
     navigation.screened = simulation::run_missions(screened->place, remembered, {screened->mission},
                                                    settings, noise, executor)
                               .front();
-    plots.screened = draw_mission("A screen across the path", screened->place, screened->mission,
-                                  *navigation.screened);
-    add_log("A screen across the path", screened->mission, *navigation.screened);
+    plots.screened = draw_mission("Mission with a screen across the path", screened->place,
+                                  screened->mission, *navigation.screened);
+    add_log("Mission with a screen across the path", screened->mission, *navigation.screened);
   }
   write_file(options.out / "mission.log", std::string_view(log));
   add_part(navigation, std::move(plots), page);

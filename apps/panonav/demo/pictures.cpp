@@ -87,7 +87,7 @@ viewer::HeatMap draw_similarity(const VisualMemory& memory, double spacing_m,
     return static_cast<int>(std::lround((y_m - low.y_m) / spacing_m));
   };
   viewer::HeatMap map{.title = "Similarity of every stored view to the current image",
-                      .value_label = "similarity, 0 to 1000",
+                      .value_label = "similarity (0 to 1000)",
                       .columns = column_of(high.x_m) + 1,
                       .rows = row_of(high.y_m) + 1,
                       .first_cell = low,

@@ -21,8 +21,8 @@ constexpr double seconds_per_image = 0.3;
 
 viewer::PicturePlot draw_route_image(const RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
-  viewer::PicturePlot plot{.title = "Stored route: each row is the horizon at one place",
-                           .x_label = "azimuth from straight ahead [degrees], left positive",
+  viewer::PicturePlot plot{.title = "Stored route: each row shows the horizon at one place",
+                           .x_label = "azimuth [degrees]: 0 is straight ahead, positive is left",
                            .y_label = "distance along the route [m]",
                            .x_range = {180.0, -180.0},
                            .y_range = {0.0, route.length_m()},
@@ -53,7 +53,7 @@ viewer::RunPage replay_run(const lab::RouteScene& place, const RoutePanorama& pa
     moment.state = fix ? "on the route" : "off the route";
     moment.values.emplace_back("lateral offset", format_fixed(100.0 * run.lateral_m[i], 1) + " cm");
     if (fix) moment.pose = fix->pose;
-    moment.panorama = simulation::take_panorama(
+    moment.panorama = simulation::capture_panorama(
         *place.renderer, truth, {.rows = 40, .columns = 256, .rays_per_axis = 1},
         {.camera_height_m = place.scene.camera_height_m}, place.camera.sensor, seed, executor);
     if (i == 0) {
@@ -63,7 +63,7 @@ viewer::RunPage replay_run(const lab::RouteScene& place, const RoutePanorama& pa
     page.add(moment);
     marks.push_back({.along_m = fix ? std::optional(fix->along_m) : std::nullopt});
   }
-  page.route(draw_route_image(panorama), marks);
+  page.set_route(draw_route_image(panorama), marks);
   return page;
 }
 
@@ -75,11 +75,12 @@ DemoRoute repeat_and_measure(const lab::RouteScene& place, const RoutePanorama& 
   route.length_m = panorama.length_m();
   route.bytes = panorama.size() * static_cast<std::size_t>(panorama.columns());
   route.runs.resize(2);
-  executor.for_chunks(route.runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      route.runs[i] = lab::repeat_route(place, tracker, {.back = i == 1}, seed + i);
-    }
-  });
+  executor.for_each_chunk(
+      route.runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          route.runs[i] = lab::repeat_route(place, tracker, {.back = i == 1}, seed + i);
+        }
+      });
   for (const lab::RouteRun& run : route.runs) {
     route.completed += run.has_completed() ? 1 : 0;
     double travelled_m = 0.0;
@@ -112,32 +113,35 @@ DemoRoute demonstrate_route(const simulation::Scene& office, double length_m, st
   };
   page.begin_part("Routes",
                   {median_cm(route.lateral_m),
-                   "median distance of the robot from a route that it drove once before"});
+                   "median distance of the robot from a route that it had driven once before"});
   page.add_text(
-      "The robot stores a route as one line of pixels every 10 cm. Each line is the horizon around "
-      "the robot, one byte per degree. The lines also allow it to predict the horizon at positions "
-      "beside the route. A robot was driven once along a route of " +
+      "The robot stores one line of pixels for every 10 cm of a route. Each line shows the horizon "
+      "around the robot, with one byte per degree. From these lines, the robot can also predict "
+      "how the horizon looks from positions beside the route. In this test, the robot was driven "
+      "once along a route of " +
       format_fixed(route.length_m, 0) +
-      " m. Then it was placed 0.3 m beside the start, and it did not know this offset. Its "
-      "odometry has an error of 5 %. It drove the route to the end. A second robot drove the route "
-      "in the opposite direction.");
+      " m. Then it was placed 0.3 m beside the start of the route, and it did not know this "
+      "offset. From there it drove the route again by itself. A second robot drove the route in "
+      "the opposite direction. The odometry of both robots has an error of 5 %.");
   page.add_figures(
       {{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
-        "runs that reached the end of the route and reported it"},
+        "robots reached the end of the route and reported it"},
        {median_cm(route.lateral_m), "median distance from the route after the first metre"},
-       {median_cm(route.position_m), "median error of the position"},
+       {median_cm(route.position_m), "median error of the position that the robot computed"},
        {format_fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
-        "size of the route before compression"}});
+        "size of the stored route before compression"}});
   page.add_text(
-      "The animation below shows the first run. The striped image is the stored route. Each row "
-      "shows the horizon at one place. The start is the lowest row, the end is the highest row, "
-      "and the forward direction is in the middle. An object that the robot passes makes a curve "
-      "from the middle to one side. The mark shows the row of the robot's computed position.");
+      "The animation below shows the drive of the first robot. The striped image is the stored "
+      "route. Each row of it shows the horizon at one place. The lowest row is the start of the "
+      "route, and the highest row is the end. The forward direction is in the middle of each row. "
+      "An object that the robot passes appears as a curve from the middle to one side. The mark "
+      "shows which row belongs to the position that the robot computed.");
   page.add_run(replay_run(place, panorama, route.runs.front(), seed, executor));
-  page.add_plots({{map,
-                   "Black: the stored route. Colours: both drives, one forward and one back. Each "
-                   "robot started at a circle, 0.3 m beside the route, and returned to the route. "
-                   "Where only one line is visible, the drives coincide with the route."}});
+  page.add_plots(
+      {{map,
+        "Black: the stored route. Blue: the drive forward. Green: the drive in the opposite "
+        "direction. Each robot started 0.3 m beside the route, at an orange circle, and then moved "
+        "onto the route. Where only one line is visible, the drives coincide with the route."}});
   return route;
 }
 

@@ -52,7 +52,8 @@ std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, 
   if (image.index == kidnapped_after + 1) return number + "the robot was moved by hand";
   switch (image.estimate.state) {
     case LocalisationState::localised:
-      return number + (is_correct(image, within_m) ? "localised" : "wrong, not yet noticed");
+      return number +
+             (is_correct(image, within_m) ? "localised" : "wrong position, not yet noticed");
     case LocalisationState::ambiguous:
       return number + "several places are possible";
     case LocalisationState::lost:
@@ -91,19 +92,23 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
       track.errors_m.empty() ? "none" : format_fixed(100.0 * median(track.errors_m), 1) + " cm";
   page.begin_part("Tracking",
                   {format_image_count(track.until_localised),
-                   "until the robot was localised. At first, " +
+                   "until the robot was localised; at first, " +
                        std::to_string(track.places_at_first) + " places were possible"});
   page.add_text(
-      "The robot drives in a corridor with identical doors and eight identical junctions. It knows "
-      "neither its position nor its heading. It starts in one of two narrow crossings. The floor "
-      "plan is symmetric, so several places match the first image. Each dot is a particle: a "
-      "possible pose of the robot. The odometry, which contains errors, moves the particles. After "
-      "each image only the particles that match it remain. They first concentrate in a few places. "
-      "After more images with small differences, they concentrate in one place.");
-  page.add_text("After " + std::to_string(kidnapped_after + 1) +
-                " images the robot is moved by hand to the other crossing (kidnapped). The robot "
-                "counts as correctly localised if it reports a position with an error of at most " +
-                format_fixed(100.0 * spacing_m, 0) + " cm.");
+      "The robot drives in a corridor with identical doors and eight identical junctions. At first "
+      "it knows neither its position nor its heading. It starts in one of two narrow "
+      "cross-corridors. The floor plan is symmetric, so the first image matches more than one "
+      "place. Each dot is a particle: a possible pose (position and heading) of the robot. The "
+      "particles move by the motion that the robot measures (odometry). This measurement contains "
+      "errors. After each image, only the particles that match the image remain. They first "
+      "concentrate in a few places, which look almost the same. After more images, the small "
+      "differences between these places are sufficient, and the particles concentrate in one "
+      "place.");
+  page.add_text(
+      "After " + std::to_string(kidnapped_after + 1) +
+      " images the robot is kidnapped: it is moved by hand to the other cross-corridor. The robot "
+      "counts as correctly localised if it reports a position with an error of at most " +
+      format_fixed(100.0 * spacing_m, 0) + " cm.");
   page.add_figures(
       {{std::to_string(track.places_at_first), "possible places after the first image"},
        {format_image_count(track.until_localised), "until the robot was localised"},
@@ -115,9 +120,9 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
         "kidnapped"}});
   page.add_run(replay_page);
   page.add_plots({{path_map,
-                   "The whole run. Black: the true path, which starts again at the place to which "
-                   "the robot was moved. Blue: the estimated path. Both agree except for the "
-                   "images after the robot was kidnapped."}});
+                   "The whole run. Black: the true path. It has two parts because the robot was "
+                   "kidnapped. Blue: the estimated path. The two paths agree except just after the "
+                   "robot was kidnapped."}});
 }
 
 }  // namespace

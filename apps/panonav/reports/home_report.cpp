@@ -76,12 +76,11 @@ std::vector<viewer::ReportView> make_report_views(const std::optional<Panorama>&
   std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};
   if (answer.result.direction_rad) {
     const double towards = found.direction_rad();
-    marks.push_back({.azimuth_rad = towards,
-                     .colour = viewer::PlotColour::vermilion,
-                     .dashed_through_view = true});
+    marks.push_back(
+        {.azimuth_rad = towards, .colour = viewer::PlotColour::vermilion, .is_dashed_line = true});
     marks.push_back({.azimuth_rad = wrap_angle(towards + std::numbers::pi),
                      .colour = viewer::PlotColour::blue,
-                     .dashed_through_view = true});
+                     .is_dashed_line = true});
   }
   std::vector<viewer::ReportView> views;
   if (home) {  // rotates the view to the current heading

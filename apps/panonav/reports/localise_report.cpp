@@ -48,7 +48,7 @@ recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t numbe
                                .panorama = std::move(panorama)};
   moment.truth = query.pose;
   const auto& matches = query.place.matches;
-  describe(moment, query.place);
+  set_localisation(moment, query.place);
   moment.values = {{"image", query.file}, {"answer", describe_answer(query)}};
   if (const auto& position = query.place.position) {
     moment.values.emplace_back("position", format_position(*position));

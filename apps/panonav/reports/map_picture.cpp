@@ -52,7 +52,7 @@ void declare_map_files(Arguments& arguments, MapFileArguments& files) {
   arguments.option("--tum FILE", files.tum,
                    "Write the poses of the largest connected component to this file: as CSV if the "
                    "name ends in .csv, otherwise as TUM text");
-  arguments.option("--graphml FILE", files.graph, "Write the map as a graph to this file");
+  arguments.option("--graphml FILE", files.graph, "Write the map as a GraphML graph to this file");
   arguments.option(
       "--picture FILE", files.picture,
       "Draw the map into this PNG or SVG file, next to the true positions if they are known");

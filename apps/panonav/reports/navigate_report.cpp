@@ -16,7 +16,7 @@ void write_navigate_report(const std::filesystem::path& folder, const MissionRep
                           "A simulated robot was sent to a stored view. It uses only images. It "
                           "knows neither its own position nor the positions of the stored views.");
   std::vector<std::pair<std::string, std::string>> figures{
-      {std::string(name_of(run.end)), mission.reason},
+      {std::string(to_string(run.end)), mission.reason},
       {std::to_string(run.decisions.size()), "steps with one image and one decision each"}};
   if (std::isfinite(run.end_distance_m)) {
     figures.emplace_back(format_fixed(100.0 * run.end_distance_m, 0) + " cm",

@@ -38,9 +38,8 @@ bool is_replaceable(const std::filesystem::path& folder, const std::string& page
 void declare_report(Arguments& arguments, std::optional<std::string>& report,
                     std::string_view content) {
   arguments.option("--report FOLDER", report,
-                   "Write " + std::string(content) +
-                       " into this folder; the folder must be new, empty or contain an earlier "
-                       "report");
+                   "Write into this folder " + std::string(content) +
+                       "; the folder must be new or empty, or contain an earlier report");
   arguments.declare_outputs({"--report"});
 }
 

@@ -230,7 +230,7 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
       "A robot drives the route again, or drives beside it. panonav searches for the pose at which "
       "the stored lines predict the robot's current image.");
   page.add_figures(figures);
-  replay_page.route(draw_panorama(route.panorama), make_marks(images));
+  replay_page.set_route(draw_panorama(route.panorama), make_marks(images));
   page.begin_section("The run, image by image");
   page.add_text(
       "The map shows the stored route and the robot's position. The route panorama is below. Each "
@@ -256,7 +256,7 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
     page.add_plots({{draw_errors(images),
                      "Distance of each computed position from the position in the data set"}});
   }
-  const auto stretches = changed_stretches(images);
+  const auto stretches = find_changed_sections(images);
   if (!stretches.empty()) {
     page.begin_section("Changed scene");
     page.add_text(

@@ -38,7 +38,7 @@ viewer::MapLayer draw_true_path(const std::vector<TrackedImage>& images,
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (images[i].truth) positions[i] = images[i].truth->position();
   }
-  return {.label = "ground truth",
+  return {.label = "true path",
           .colour = viewer::PlotColour::black,
           .lines = split_lines(positions, background.kidnapped_after)};
 }

@@ -75,7 +75,8 @@ std::vector<std::vector<std::string>> make_stretch_rows(const std::vector<Tracke
     }
     const std::string from = std::to_string(begin + 1);
     rows.push_back(
-        {end == begin + 1 ? from : from + " to " + std::to_string(end), std::string(name_of(state)),
+        {end == begin + 1 ? from : from + " to " + std::to_string(end),
+         std::string(to_string(state)),
          errors.empty() ? "-" : format_fixed(median(errors), 3) + " m",
          errors.empty() ? "-" : format_fixed(*std::ranges::max_element(errors), 3) + " m"});
     begin = end;

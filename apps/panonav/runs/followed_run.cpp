@@ -23,7 +23,7 @@ void fill_moment(recordings::RunMoment& moment, const FollowedImage& image) {
   if (!image.fix) return;
   moment.pose = image.fix->pose;
   moment.covariance = image.fix->covariance;
-  moment.values = {{"origin", std::string(name_of(image.fix->origin))},
+  moment.values = {{"origin", std::string(to_string(image.fix->origin))},
                    {"along_m", format_fixed(image.fix->along_m, 3)},
                    {"lateral_m", format_fixed(image.fix->lateral_m, 3)},
                    {"correlation", format_fixed(image.fix->correlation, 4)},
@@ -115,7 +115,8 @@ FollowSummary summarise_follow(const std::vector<FollowedImage>& images, bool he
   return summary;
 }
 
-std::vector<std::pair<double, double>> changed_stretches(const std::vector<FollowedImage>& images) {
+std::vector<std::pair<double, double>> find_changed_sections(
+    const std::vector<FollowedImage>& images) {
   std::vector<std::pair<double, double>> stretches;
   bool is_continued = false;
   for (const FollowedImage& image : images) {
@@ -131,7 +132,7 @@ std::vector<std::pair<double, double>> changed_stretches(const std::vector<Follo
   return stretches;
 }
 
-std::string_view name_of(RouteFix::Origin origin) {
+std::string_view to_string(RouteFix::Origin origin) {
   switch (origin) {
     case RouteFix::Origin::prediction:
       return "prediction";

@@ -57,9 +57,9 @@ struct FollowSummary {
 
 /// Returns the stretches of the route on which the scene has changed: begin and end along the
 /// route, in metres.
-[[nodiscard]] std::vector<std::pair<double, double>> changed_stretches(
+[[nodiscard]] std::vector<std::pair<double, double>> find_changed_sections(
     const std::vector<FollowedImage>& images);
 
-[[nodiscard]] std::string_view name_of(RouteFix::Origin origin);
+[[nodiscard]] std::string_view to_string(RouteFix::Origin origin);
 
 }  // namespace panonav::command

@@ -14,11 +14,11 @@ const std::vector<std::string> rise_flags{"--vertical-motion", "--tilt"};
 
 void declare_homing(Arguments& arguments, HomingArguments& values) {
   arguments.flag("--horizon", values.views.horizon,
-                 "Compare only one row: the mean of the rows within 5 degrees of the horizon, as "
-                 "in [S06] (all rows if elevations are not known)");
+                 "Compare only one row, as in paper [S06]: the mean of the rows within 5 degrees "
+                 "of the horizon, or of all rows if the elevations are unknown");
   arguments.option(
       "--published K", values.published, 1,
-      "Use the published rule [S06] with K frequencies; can be combined with --iterations");
+      "Use the rule published in paper [S06] with K frequencies; --iterations can be used with it");
   arguments.options("signature", values.views.signature);
   arguments.options("preprocessing", values.views.preprocessing);
   arguments.options("homing", values.homing);

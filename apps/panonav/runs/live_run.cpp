@@ -47,7 +47,7 @@ class LinePrinter {
     line_added_.notify_one();
     thread_.join();
   }
-  [[nodiscard]] std::size_t dropped_lines() const noexcept { return dropped_lines_; }
+  [[nodiscard]] std::size_t dropped_line_count() const noexcept { return dropped_lines_; }
 
  private:
   void print_lines() {
@@ -131,9 +131,9 @@ double to_milliseconds(std::chrono::steady_clock::duration duration) {
 void declare_live(Arguments& arguments, LiveArguments& live) {
   arguments.option("--count N", live.count, 1, "Stop after N images");
   arguments.option("--camera-width", live.camera_width, 1,
-                   "Image width that the camera should use");
+                   "Image width in pixels that is requested from the camera");
   arguments.option("--camera-height", live.camera_height, 1,
-                   "Image height that the camera should use");
+                   "Image height in pixels that is requested from the camera");
   arguments.hide_from_help({"--count", "--camera-width", "--camera-height"});
 }
 
@@ -171,7 +171,7 @@ std::string describe_events(const LiveCounts& counts, std::size_t moments_left_o
   add(counts.skipped + counts.source.damaged, "could not be read");
   add(counts.source.dropped, "were skipped because they came too fast");
   add(counts.source.interruptions, "interruptions of the source");
-  add(counts.dropped_lines, "lines were not printed because the reader was too slow");
+  add(counts.dropped_line_count, "lines were not printed because the reader was too slow");
   add(moments_left_out, "moments were not recorded because the disk was too slow");
   if (!counts.delays_ms.empty()) {
     text += "; from arrival to answer " + format_fixed(quantile(counts.delays_ms, 0.5), 1) +
@@ -272,7 +272,7 @@ std::optional<double> LiveRun::decoding_ms() const {
 const LiveCounts& LiveRun::finish() {
   auto& self = *implementation_;
   self.printer.drain_and_join();
-  self.counts.dropped_lines = self.printer.dropped_lines();
+  self.counts.dropped_line_count = self.printer.dropped_line_count();
   if (self.live != nullptr) self.counts.source = self.live->live().counts();
   return self.counts;
 }

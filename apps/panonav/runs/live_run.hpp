@@ -36,8 +36,8 @@ void reject_live_options(const Arguments& arguments, const std::string& input, b
 /// Counts of a run over a source.
 struct LiveCounts {
   std::size_t pictures = 0;
-  std::size_t skipped = 0;        ///< images that could not be read or answered
-  std::size_t dropped_lines = 0;  ///< lines dropped because the reader was slow
+  std::size_t skipped = 0;             ///< images that could not be read or answered
+  std::size_t dropped_line_count = 0;  ///< lines dropped because the reader was slow
   /// For the last 100,000 images of a live source: time from arrival to answer, and the part of
   /// this time that decoding took.
   std::vector<double> delays_ms;

@@ -121,7 +121,7 @@ class RunMoments {
       moment.state = "no memory yet";
       return moment;
     }
-    describe(moment, *answer.place);
+    set_localisation(moment, *answer.place);
     StageClock clock;
     if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
     if (record.needs_images()) moment.best_match = load_best_match(*answer.place, *file_);

@@ -36,11 +36,11 @@ recordings::RunMoment MissionMoments::make(const NavigationDecision& decision, c
   moment.panorama = std::exchange(panorama_, std::nullopt);
   moment.truth = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
   moment.sure = decision.probability >= 0.5;
-  moment.state = name_of(decision.state);
+  moment.state = to_string(decision.state);
   moment.probability = decision.probability;
   moment.values.emplace_back("probability", format_fixed(decision.probability, 4));
   for (const NavigationDecision::Event event : decision.events) {
-    moment.values.emplace_back("event", name_of(event));
+    moment.values.emplace_back("event", to_string(event));
   }
   if (decision.nearest) {
     moment.values.emplace_back("nearest", robot_.info(*decision.nearest).name);

@@ -72,43 +72,46 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
 
 void declare_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
-                   "Type of the images; not needed if there is a dataset.toml");
+                   "Type of the images; not needed if a dataset.toml gives it");
   arguments.option("--camera FILE", pictures.camera,
-                   "Calibration of a mirror camera (panonav calibrate)");
-  arguments.choice(
-      "--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
-      "Direction in which the columns of the image run, seen from above; default clockwise");
+                   "Calibration file of the camera, made by panonav calibrate");
+  arguments.choice("--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
+                   "Direction in which the view turns from the left to the right edge of the "
+                   "image, seen from above; default clockwise");
   arguments.option(
       "--forward-column", pictures.forward_column,
-      "Position of the forward direction in the image, as a fraction of its width; default 0.5");
+      "Column that shows the forward direction, as a fraction of the image width; default 0.5");
   arguments.option("--elevation-deg", pictures.elevation_deg,
-                   "Elevation of the lower and upper edge of a panorama; for other images: the "
-                   "part that is used");
+                   "Elevations of the lower and upper edge of a panorama; for other images: of the "
+                   "part of the image that is used");
   arguments.hide_from_help({"--columns-run", "--forward-column"});
 }
 
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
+  arguments.option("--image-topic NAME", topics.image,
+                   "Topic of the images in a recording (MCAP, rosbag2, ROS 1 bag); needed if there "
+                   "are several such topics");
   arguments.option(
-      "--image-topic NAME", topics.image,
-      "Topic of the images in a recording (MCAP, rosbag2, ROS 1 bag); needed if there are several");
-  arguments.option("--odometry-topic NAME", topics.odometry,
-                   "Topic of the odometry (nav_msgs/Odometry); needed if there are several");
+      "--odometry-topic NAME", topics.odometry,
+      "Topic of the odometry (nav_msgs/Odometry); needed if there are several such topics");
   arguments.option("--odometry-frames", "ODOM BASE", topics.odometry_frames,
-                   "Read the odometry from the transforms (TF) between these frames; default "
-                   "without an odometry topic: odom base_link");
-  arguments.option("--imu-topic NAME", topics.imu,
-                   "Topic of the inertial sensor (roll and pitch); needed if there are several");
+                   "Read the odometry from the transforms (TF) between these two frames; if there "
+                   "is no odometry topic, the default is odom base_link");
+  arguments.option(
+      "--imu-topic NAME", topics.imu,
+      "Topic of the inertial sensor (roll and pitch); needed if there are several such topics");
   arguments.hide_from_help(
       {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
 }
 
 void declare_part(Arguments& arguments, PartArguments& part, bool every) {
   arguments.option("--from SECONDS", part.from_s,
-                   "Skip the first SECONDS of the recording; its images need stamps");
-  arguments.option("--to SECONDS", part.to_s, "Stop SECONDS after the first image");
+                   "Skip the first SECONDS of the recording; the images must have time stamps");
+  arguments.option("--to SECONDS", part.to_s,
+                   "Stop SECONDS after the first image of the recording");
   if (every) {
     arguments.option("--every N|TIME", part.every,
-                     "Use only every N-th image, or one image per interval, for example 0.5s");
+                     "Use only every N-th image, or only one image per TIME, for example 0.5s");
   }
   arguments.hide_from_help({"--from", "--to"});
   if (every) arguments.hide_from_help({"--every"});

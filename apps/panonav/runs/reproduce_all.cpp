@@ -123,7 +123,7 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
   require_enough_scenes(arguments);  // before files of an earlier run are removed
   const fs::path out(arguments.out.value_or("reproduction"));
   const ordered_json record = make_run_record(arguments);
-  const auto papers = reproduced_papers();
+  const auto papers = list_reproduced_papers();
   if (arguments.continues) {
     require_same_run(out, record);
   } else {

@@ -11,7 +11,7 @@ namespace panonav::command {
 
 namespace {
 
-std::string introduce_f11(const lab::ReproductionOptions& options) {
+std::string describe_f11(const lab::ReproductionOptions& options) {
   return "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
          " variants of two simulated places. Additional experiments: loop closures, which the "
          "authors left to future work; a corridor of identical doors; Gazebo worlds and recordings "
@@ -20,7 +20,7 @@ std::string introduce_f11(const lab::ReproductionOptions& options) {
          " views. The tables compare published and measured results.";
 }
 
-std::string introduce_m03(const lab::ReproductionOptions& options) {
+std::string describe_m03(const lab::ReproductionOptions& options) {
   return "Menegatti, Zoccarato, Pagello, Ishiguro 2003, run in " + std::to_string(options.scenes) +
          " simulated offices with a 25 cm grid of reference views, " +
          std::to_string(options.variants * options.runs) +
@@ -30,7 +30,7 @@ std::string introduce_m03(const lab::ReproductionOptions& options) {
          "intervals, so that a result can miss its target by chance.";
 }
 
-std::string introduce_m04(const lab::ReproductionOptions& options) {
+std::string describe_m04(const lab::ReproductionOptions& options) {
   std::string places;
   for (const lab::MissionGrid& grid : options.mission_grids) {
     places += (places.empty() ? "" : ", ") + grid.scene;
@@ -44,7 +44,7 @@ std::string introduce_m04(const lab::ReproductionOptions& options) {
          "confidence intervals, so that a result can miss its target by chance.";
 }
 
-std::string introduce_navigation(const lab::ReproductionOptions& options) {
+std::string describe_navigation(const lab::ReproductionOptions& options) {
   return "Topics that Menegatti, Maeda, Ishiguro 2004, section 3.5, name as future work: maps of "
          "drives, changed scenes, a kidnapped robot, blocked paths. " +
          std::to_string(options.runs) +
@@ -54,7 +54,7 @@ std::string introduce_navigation(const lab::ReproductionOptions& options) {
          "position nor the positions of its views.";
 }
 
-std::string introduce_elsewhere(const lab::ReproductionOptions& options) {
+std::string describe_elsewhere(const lab::ReproductionOptions& options) {
   return "panonav in places that were not used for its development: " +
          std::to_string(options.scenes) +
          " variants of each built-in scene, Gazebo worlds and recordings if they are available. "
@@ -62,7 +62,7 @@ std::string introduce_elsewhere(const lab::ReproductionOptions& options) {
          "methods process the same images in the same run.";
 }
 
-std::string introduce_s06(const lab::ReproductionOptions& options) {
+std::string describe_s06(const lab::ReproductionOptions& options) {
   return "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
          " simulated arenas of toy houses. Each arena is recorded twice with different noise, "
          "slightly different light and random headings. The images show the first arena. "
@@ -70,7 +70,7 @@ std::string introduce_s06(const lab::ReproductionOptions& options) {
          "tables compare published and measured results.";
 }
 
-std::string introduce_y03(const lab::ReproductionOptions& options) {
+std::string describe_y03(const lab::ReproductionOptions& options) {
   return "Yagi, Imai, Yachida 2003, run in " + std::to_string(options.scenes) +
          " variants of a simulated lab with a mirror camera and its noise. The images show the "
          "first variant. Additional experiments: routes of 60 m, each recorded once and then "
@@ -86,7 +86,7 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .subject = "visual odometry and maps",
      .runs = true,
      .data = true,
-     .lead = introduce_f11},
+     .lead = describe_f11},
     {.name = "m03",
      .title = "Monte-Carlo localisation: the experiments of [M03]",
      .subject = "Monte-Carlo localisation",
@@ -95,31 +95,31 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .data = true,
      .only = true,
      .allows_single_scene = true,
-     .lead = introduce_m03},
+     .lead = describe_m03},
     {.name = "m04",
      .title = "Image-based memory: the experiments of [M04]",
      .subject = "localisation and arrangement of views",
      .queries = true,
      .runs = true,
      .rows = true,
-     .lead = introduce_m04},
+     .lead = describe_m04},
     {.name = "navigation",
      .title = "Navigation: topics that [M04] names as future work",
      .subject = "future work of m04",
      .runs = true,
      .data = true,
-     .lead = introduce_navigation},
+     .lead = describe_navigation},
     {.name = "s06",
      .title = "Visual homing: the experiments of [S06]",
      .subject = "homing",
      .data = true,
-     .lead = introduce_s06},
+     .lead = describe_s06},
     {.name = "y03",
      .title = "Route panoramas: the experiments of [Y03]",
      .subject = "routes",
      .runs = true,
      .data = true,
-     .lead = introduce_y03},
+     .lead = describe_y03},
     {.name = "elsewhere",
      .title = "More scenes, worlds and recordings",
      .subject = "known and unknown places, recordings, rivals",
@@ -128,12 +128,12 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .rows = true,
      .data = true,
      .allows_single_scene = true,
-     .lead = introduce_elsewhere},
+     .lead = describe_elsewhere},
 }};
 
 }  // namespace
 
-std::span<const ReproducedPaper> reproduced_papers() {
+std::span<const ReproducedPaper> list_reproduced_papers() {
   return papers;
 }
 

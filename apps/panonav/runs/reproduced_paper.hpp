@@ -43,7 +43,7 @@ struct ReproducedPaper {
 };
 
 /// Returns all papers, in the order in which `reproduce all` runs them.
-[[nodiscard]] std::span<const ReproducedPaper> reproduced_papers();
+[[nodiscard]] std::span<const ReproducedPaper> list_reproduced_papers();
 
 /// Returns the options of the paper's experiments: its defaults, then what the caller set. Throws
 /// OptionError, FileError.

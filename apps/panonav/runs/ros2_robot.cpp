@@ -33,7 +33,7 @@ ExitCode Ros2Robot::run(const simulation::SimulatedWorld& world, Session& sessio
       {.node = "panonav_simulation"}, options_->robot,
       {start, [&](Point2 place) { return world.free_space().is_free(place); },
        [&](const Pose2& pose, std::uint64_t number) {
-         return world.take_picture(pose, number, session.executor());
+         return world.capture_image(pose, number, session.executor());
        }},
       world.options().odometry, seed, [&](const std::string& line) { session.note(line); });
   const StopSignals signals([&] { robot.stop(); });

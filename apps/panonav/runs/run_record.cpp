@@ -36,14 +36,15 @@ std::function<std::vector<std::uint8_t>(const std::string&)> make_thumbnail_read
 }  // namespace
 
 void declare_record(Arguments& arguments, RunRecordArguments& record) {
-  arguments.option("--record FILE", record.file,
-                   "Record images and answers in an MCAP file for Rerun, Foxglove and Lichtblick");
+  arguments.option(
+      "--record FILE", record.file,
+      "Record images and results in an MCAP file, which Rerun, Foxglove and Lichtblick can show");
   arguments.declare_outputs({"--record"});
 }
 
 void declare_view(Arguments& arguments, RunRecordArguments& record) {
   arguments.option("--view PORT", record.view,
-                   "Show the run in a browser on this computer, at this port (0: a free port); "
+                   "Show the run in a browser on this computer, at this port (0: any free port); "
                    "with ADDRESS:PORT, other computers in this network can also open the page");
 }
 

@@ -60,7 +60,7 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
   image.particles = recordings::resample_systematically(tracker.localiser().particles(),
                                                         settings.particles_per_image);
   if (moment) {
-    describe(*moment, image.estimate);
+    set_localisation(*moment, image.estimate);
     moment->particles = recordings::resample_systematically(tracker.localiser().particles(), 500);
     if (moment->panorama) {
       if (settings.shown_references != nullptr)
@@ -81,7 +81,7 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
   return image;
 }
 
-void note_viewer_pose(recordings::RunMoment& moment) {
+void record_viewer_pose(recordings::RunMoment& moment) {
   moment.values.emplace_back("event", "a viewer tells where the robot is");
 }
 
@@ -132,7 +132,7 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
       }
       const DatasetEntry& entry = entries[index];
       TrackedImage image = track_image(tracker, *signatures[i], settings, std::move(moments[i]));
-      if (image.moment && has_viewer_input) note_viewer_pose(*image.moment);
+      if (image.moment && has_viewer_input) record_viewer_pose(*image.moment);
       image.index = index;
       image.file = entry.file;
       image.stamp_s = entry.stamp_s;

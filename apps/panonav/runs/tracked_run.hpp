@@ -70,7 +70,7 @@ struct TrackSettings {
                                        std::optional<recordings::RunMoment> moment);
 
 /// Adds the event to the moment that a viewer has set the robot's pose.
-void note_viewer_pose(recordings::RunMoment& moment);
+void record_viewer_pose(recordings::RunMoment& moment);
 
 /// Adds the image to the page that replays the run. `image.moment` must be set.
 void add(viewer::RunPage& page, const TrackedImage& image);

@@ -33,9 +33,9 @@ std::array<double, 3> parse_circle(const std::string& text) {
 
 void declare_selection(Arguments& arguments, ViewSelection& selection) {
   arguments.option("--name PATTERN", selection.name,
-                   "Only views with a matching name: * is any text, ? is any character");
+                   "Use only views whose name matches PATTERN: * is any text, ? is any character");
   arguments.option("--near X,Y,METRES", selection.near,
-                   "Only views within METRES of the position X,Y");
+                   "Use only views within METRES of the position X,Y");
 }
 
 std::vector<ViewRecord> select_views(std::vector<ViewRecord> views,

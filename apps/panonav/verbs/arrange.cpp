@@ -173,8 +173,8 @@ Run declare_arrange(Arguments& arguments) {
   auto values = std::make_shared<ArrangeArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.option("--odometry DATASET", values->odometry,
-                   "Read the robot's motion between views from this data set or recording; images "
-                   "are assigned to views by their names");
+                   "Read the robot's motion between views from this data set or recording; each "
+                   "image is assigned to the view of the same name");
   declare_topics(arguments, values->pictures.topics);
   declare_map_files(arguments, values->files);
   declare_report(arguments, values->report, "a page that shows the arrangement step by step");
@@ -190,14 +190,13 @@ Run declare_arrange(Arguments& arguments) {
 }  // namespace
 
 Verb arrange_verb() {
-  return {
-      "arrange", "Compute the positions of all views of a memory from their similarity",
-      "The views may be in any order. Poses in the memory are only used to measure the error of "
-      "the result. If the views form several groups without connection, each group is a separate "
-      "component. The result is stored in the memory as a map with the name 'lattice'.",
-      "  panonav arrange office.panonav --report arranged\n"
-      "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
-      declare_arrange};
+  return {"arrange", "Compute the positions of all views of a memory from their similarity",
+          "The views may be in any order. Poses in the memory are only used to measure the error "
+          "of the result. If the views form several unconnected groups, each group is a separate "
+          "component. The result is stored in the memory as a map with the name 'lattice'.",
+          "  panonav arrange office.panonav --report arranged\n"
+          "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
+          declare_arrange};
 }
 
 }  // namespace panonav::command

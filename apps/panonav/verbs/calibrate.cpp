@@ -31,21 +31,23 @@ struct MirrorOptions {
 void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
   using T = MirrorOptions;
   constexpr OptionTable table{
-      choice<&T::profile>(
-          "Shape of the mirror; dual-fisheye: two fisheye lenses side by side in one image",
-          "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
-      option<&T::inner_elevation_deg>("Elevation at the inner radius (for equiangular)", -90, 90),
+      choice<&T::profile>("Shape of the mirror; dual-fisheye: no mirror, but two fisheye lenses "
+                          "side by side in one image",
+                          "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
+      option<&T::inner_elevation_deg>(
+          "Elevation at the inner radius of the mirror (only for equiangular)", -90, 90),
       option<&T::rim_elevation_deg>("Elevation at the mirror's rim", -90, 90),
       option<&T::mirror_a_mm>("Parameter a of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
       option<&T::mirror_b_mm>("Parameter b of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
       option<&T::xi>("Mirror parameter of the unified model", 0, 10),
       choice<&T::direction>(
-          "Direction in which the image moves when the robot rotates to the left: clockwise if the "
-          "camera points up into the mirror, counter-clockwise if it points down. dual-fisheye: "
-          "counter-clockwise if the image is mirrored",
+          "Direction in which the image rotates when the robot rotates to the left: clockwise if "
+          "the camera points up into the mirror, counter-clockwise if the camera points down. For "
+          "dual-fisheye: clockwise, or counter-clockwise if the image is mirrored",
           "clockwise", "counter-clockwise"),
-      option<&T::forward_angle_deg>("Robot's forward direction in the image: 0 is right, 90 is up",
-                                    -360, 360),
+      option<&T::forward_angle_deg>(
+          "Direction in the image that is the robot's forward direction: 0 is right, 90 is up",
+          -360, 360),
   };
   table.visit(options, visitor);
 }
@@ -70,10 +72,11 @@ void visit_options(LensesOptions& options, OptionVisitor& visitor) {
       option<&T::left_azimuth_deg>("Azimuth of the left lens relative to the robot's forward "
                                    "direction, counter-clockwise positive",
                                    -360, 360),
-      option<&T::field_of_view_deg>("Field of view of each lens; 0: estimated between 185 and 220",
-                                    0, 300),
+      option<&T::field_of_view_deg>(
+          "Field of view of each lens; 0: estimate a value from 185 to 220", 0, 300),
       option<&T::turn_deg>(
-          "Rotation of the camera to the left from one image to the next; 0: estimated", -360, 360),
+          "Rotation of the camera to the left from one image to the next; 0: estimate the rotation",
+          -360, 360),
   };
   table.visit(options, visitor);
 }
@@ -338,18 +341,19 @@ ExitCode calibrate(const Arguments& declared, const CalibrateArguments& argument
 
 Run declare_calibrate(Arguments& arguments) {
   auto values = std::make_shared<CalibrateArguments>();
-  arguments.positionals(
-      "INPUT", values->inputs,
-      "Raw images of one mirror camera; more images give a better result. For a camera with two "
-      "fisheye lenses: images at one place with different rotations of the camera. Folders, videos "
-      "and recordings are also allowed; - reads JPEG images from standard input");
+  arguments.positionals("INPUT", values->inputs,
+                        "Raw images of one mirror camera; more images give a better result. For a "
+                        "camera with two fisheye lenses: images from one place, each with a "
+                        "different rotation of the camera. Folders, videos and recordings are also "
+                        "allowed; with -, JPEG images are read from standard input");
   declare_topics(arguments, values->pictures.topics);
   declare_part(arguments, values->pictures.part, true);
   arguments.required_option("-o,--out", values->out, "Name of the new camera file (camera.toml)");
   arguments.option("--overlay FILE", values->overlay,
-                   "Write a PNG image with the result drawn over the first image");
-  arguments.option("--inner-radius-px", values->inner_radius_px,
-                   "Radius of the reflection of the camera; default: found in the images");
+                   "Write a PNG image that shows the calibration drawn over the first input image");
+  arguments.option(
+      "--inner-radius-px", values->inner_radius_px,
+      "Radius of the camera's reflection in the mirror; by default, it is measured in the images");
   arguments.options("mirror", values->mirror);
   arguments.options("lenses", values->lenses);
   arguments.options("mirror_search", values->search);
@@ -376,16 +380,17 @@ Run declare_calibrate(Arguments& arguments) {
 }  // namespace
 
 Verb calibrate_verb() {
-  return {"calibrate", "Calibrate a mirror camera or a 360 degree camera with two lenses",
-          "For two lenses, take three or four images at one place with many objects around. Rotate "
-          "the camera on its stand by about 90 degrees between the images. Look at the overlay "
-          "image before you use the camera file. The exit code is 1 if no image shows the rim of a "
-          "mirror, or if the images are not sufficient for two lenses.",
-          "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
-          "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
-          "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "
-          "--right-roll-deg -90 -o camera.toml",
-          declare_calibrate};
+  return {
+      "calibrate", "Calibrate a mirror camera or a 360 degree camera with two lenses",
+      "For a camera with two lenses, take three or four images at one place that has many objects "
+      "around it. Rotate the camera on its stand by about 90 degrees between the images. Check the "
+      "image of --overlay before you use the camera file. The exit code is 1 if no image shows the "
+      "rim of a mirror, or if the images are not sufficient to calibrate two lenses.",
+      "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
+      "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
+      "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "
+      "--right-roll-deg -90 -o camera.toml",
+      declare_calibrate};
 }
 
 }  // namespace panonav::command

@@ -287,20 +287,19 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
 
 Run declare_catchment(Arguments& arguments) {
   auto values = std::make_shared<CatchmentArguments>();
-  arguments.positional(
-      "DATASET", values->dataset,
-      "Data set, folder of images, video or recording; each view is used as a home. The "
-      "positions and headings of all images are needed (of a recording: poses on "
-      "/ground_truth), except with --ahead N");
+  arguments.positional("DATASET", values->dataset,
+                       "Data set, folder of images, video or recording; each view is used as a "
+                       "home. Except with --ahead N, the positions and headings of all images are "
+                       "needed (in a recording: poses on the topic /ground_truth)");
   arguments.option(
       "--current DATASET", values->current,
       "Data set of the current views, also with positions and headings; default: DATASET");
   declare_pictures(arguments, values->pictures);
   arguments.option("--up-to-m", values->settings.up_to_m,
-                   "Largest distance of two views whose results are averaged");
+                   "Average the results of all pairs of views up to this distance");
   arguments.option(
       "--bin-m", values->settings.bin_m,
-      "Step of the distance in the table of results; default: the spacing of the places");
+      "Step of the distance in the table of results; default: the spacing of the views");
   arguments.option(
       "--turn-randomly SEED", values->turn_seed,
       "Rotate each current view by a random number of columns; SEED is the random seed");
@@ -309,12 +308,12 @@ Run declare_catchment(Arguments& arguments) {
       "Drive home in stages; each K is the highest frequency of a stage, for example 2,4,10");
   arguments.option(
       "--ahead N", values->ahead, 1,
-      "Only compare each view with the view N images later; this measures the "
-      "direction of travel relative to the camera and needs no positions and headings");
+      "Compare each view only with the view N images later; this measures the direction of travel "
+      "relative to the camera, and needs no positions or headings");
   arguments.option(
       "--goal IMAGE", values->goal,
       "Image for which the report shows home vectors; default: the image in the middle");
-  declare_report(arguments, values->report, "curves and maps");
+  declare_report(arguments, values->report, "a page with curves and maps");
   declare_homing(arguments, values->homing);
   arguments.options("run", values->settings.run);
   arguments.hide_from_help({"--bin-m", "--goal"});
@@ -330,11 +329,13 @@ Run declare_catchment(Arguments& arguments) {
 }  // namespace
 
 Verb catchment_verb() {
-  return {"catchment", "Measure the distances from which the views of a data set lead home",
+  return {"catchment",
+          "Measure the distances from which a robot finds the way home to the views of a data set",
           "The verb computes the direction home for all pairs of views and simulates drives home "
-          "from place to place [S06 section 4]. By default a step is at most twice as long as the "
-          "spacing of the places. It must end at most 0.8 times this spacing from a place. The "
-          "typical distance of objects is estimated from pairs of near views.",
+          "from place to place [S06 section 4]. By default, a step is at most twice as long as the "
+          "spacing of the places, and the distance from its end to the nearest place is at most "
+          "0.8 times this spacing. The typical distance of objects is estimated from pairs of "
+          "views that are close together.",
           "  panonav catchment grid_run --up-to-m 0.3 --turn-randomly 1 --report catchment\n"
           "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"
           "  panonav catchment grid_run --published 10 --stages 2,4,10\n"

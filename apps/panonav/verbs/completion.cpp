@@ -20,7 +20,7 @@ Verb completion_verb() {
   return {"completion", "Print a script for the completion of verbs, options and values in a shell",
           "Load the bash script with 'source'. Save the fish script as "
           "~/.config/fish/completions/panonav.fish and the zsh script as _panonav in a folder of "
-          "fpath. An installed panonav already has these scripts.",
+          "$fpath. If panonav is installed, these scripts are installed, too.",
           "  panonav completion bash\n  panonav completion fish", declare_completion};
 }
 

@@ -85,9 +85,9 @@ Run declare_convert(Arguments& arguments) {
 Verb convert_verb() {
   return {"convert",
           "Convert a data set to a recording of ROS 2 messages, or a recording to a data set",
-          "Images are copied unchanged, with stamps, odometry, poses, roll and pitch. To convert a "
-          "recording to a data set, set --kind, because a recording does not contain the type of "
-          "its images.",
+          "Images are copied unchanged, together with their time stamps, odometry, poses, roll and "
+          "pitch. To convert a recording to a data set, set --kind, because a recording does not "
+          "contain the type of its images.",
           "  panonav convert walk walk.mcap\n"
           "  panonav convert drive.bag drive --kind equirectangular --image-topic /camera/image",
           declare_convert};

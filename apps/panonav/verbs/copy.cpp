@@ -42,8 +42,8 @@ Run declare_copy(Arguments& arguments) {
 Verb copy_verb() {
   return {"copy", "Copy a memory to another file, to a server or from a server",
           "The copy contains the same views, images, features, links, maps, routes and models, "
-          "with the same ids. It gives the same answers. If the copy is interrupted, nothing is "
-          "written. The address of a memory on a PostgreSQL server is "
+          "with the same ids, and it gives the same results. If copying is interrupted, no copy is "
+          "left. The address of a memory on a PostgreSQL server is "
           "postgresql://HOST/DATABASE?memory=NAME (docs/scale.md).",
           "  panonav copy office.panonav office_copy.panonav\n"
           "  panonav copy office.panonav 'postgresql://robots.example/panonav?memory=office'",

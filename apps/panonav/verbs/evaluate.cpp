@@ -109,14 +109,15 @@ Run declare_evaluate(Arguments& arguments) {
 }  // namespace
 
 Verb evaluate_verb() {
-  return {"evaluate", "Compare an estimated trajectory or map with the true trajectory",
-          "The true poses are interpolated to the stamps of the estimate. The estimate is first "
-          "aligned with the true trajectory by least squares, unless --align is false. The exit "
-          "code is 1 if fewer than two estimated poses have a true pose.",
-          "  panonav evaluate estimate.tum truth.tum\n"
-          "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
-          "  panonav evaluate office.panonav run/poses.csv",
-          declare_evaluate};
+  return {
+      "evaluate", "Compare an estimated trajectory or map with the true trajectory",
+      "The true poses are interpolated at the time stamps of the estimated poses. Unless --align "
+      "is false, the estimate is first aligned with the true trajectory by least squares. The exit "
+      "code is 1 if fewer than two estimated poses have a corresponding true pose.",
+      "  panonav evaluate estimate.tum truth.tum\n"
+      "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
+      "  panonav evaluate office.panonav run/poses.csv",
+      declare_evaluate};
 }
 
 }  // namespace panonav::command

@@ -96,9 +96,10 @@ Run declare_export(Arguments& arguments) {
 
 Verb export_verb() {
   return {"export", "Export the views, poses, thumbnails and signatures of a memory as a data set",
-          "A memory stores its images only as thumbnails. export enlarges them to panoramas that "
-          "memorise can read. views.csv and signatures.npy contain all views without loss. Links, "
-          "maps and routes are not exported. If the export is interrupted, no folder is written.",
+          "A memory stores its images only as thumbnails. The verb enlarges these thumbnails to "
+          "panoramas that panonav memorise can read. The files views.csv and signatures.npy "
+          "contain the poses and signatures of all views without loss. Links, maps and routes are "
+          "not exported. If the export is interrupted, no folder is written.",
           "  panonav export office.panonav -o office_views\n"
           "  panonav memorise office_views again.panonav --config office_views/memorise.toml",
           declare_export};

@@ -71,7 +71,7 @@ Run declare_forget(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.positionals("VIEW", values->views, "Names of views");
   arguments.flag("--dry-run", values->dry_run,
-                 "Print how many views and links would be deleted; do not change the memory");
+                 "Print how many views and links would be deleted, but do not change the memory");
   return [values](Session& session) { return forget(*values, session); };
 }
 

@@ -172,7 +172,7 @@ Run declare_gallery(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.required_option(
       "-o,--out FOLDER", values->out,
-      "Folder for the page; it must be new, empty or contain an earlier gallery");
+      "Folder for the page; it must be new or empty, or contain an earlier gallery");
   declare_selection(arguments, values->selection);
   arguments.declare_outputs({"--out"});
   return [values](Session& session) { return gallery(*values, session); };
@@ -184,7 +184,7 @@ Verb gallery_verb() {
   return {"gallery", "Write a page with the thumbnails of a memory",
           "The page gallery.html needs no other files, no network and no scripts. Views are "
           "grouped by the folder in their names, by the connected component of the map and by "
-          "place. The page shows at most 2000 views; select views with --name and --near.",
+          "place. The page shows at most 2000 views; use --name and --near to select them.",
           "  panonav gallery office.panonav -o gallery\n"
           "  panonav gallery office.panonav -o corner --near 1,1,0.8",
           declare_gallery};

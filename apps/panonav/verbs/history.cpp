@@ -51,9 +51,9 @@ Run declare_history(Arguments& arguments) {
 
 Verb history_verb() {
   return {"history", "List the changes of a memory, newest first",
-          "The list contains all changes by forget, prune, rename and localise --update. panonav "
-          "undo reverts the newest change; use it again to revert the previous change. The newest "
-          "100 changes (at most 64 MiB) can be reverted. The list contains up to 1000 changes.",
+          "The list contains the newest 1000 changes by forget, prune, rename and localise "
+          "--update. panonav undo reverts the newest change; run it again to revert the change "
+          "before. The newest 100 changes (at most 64 MiB in total) can be reverted.",
           "  panonav history office.panonav\n"
           "  panonav history office.panonav --json",
           declare_history};

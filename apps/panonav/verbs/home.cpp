@@ -173,12 +173,12 @@ Run declare_home(Arguments& arguments) {
 }  // namespace
 
 Verb home_verb() {
-  return {"home", "Compute the direction back to a place from one image of it",
-          "Directions are relative to the robot's current heading; this heading may be unknown. "
-          "The distance is given in units of R, the typical distance of the objects around the "
-          "robot. For an image in the folder of a data set, dataset.toml gives its type. The exit "
-          "code is 1 if no direction is found: the robot is already at home, or the images are not "
-          "more similar than random images.",
+  return {"home", "Compute the direction back to a place from one image of that place",
+          "Directions are relative to the robot's current heading, which may be unknown. The "
+          "distance is given in units of R, the typical distance of the objects around the robot. "
+          "If an image is in the folder of a data set, the type of the image is read "
+          "from dataset.toml. The exit code is 1 if no direction is found, because the robot is "
+          "already at home or because the images are not more similar than random images.",
           "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
           "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
           "  panonav home office_run/view_00012.png office_run --json",

@@ -179,12 +179,13 @@ ExitCode print_camera(const std::string& path, Session& session) {
   auto listed = ordered_json::array();
   for (const recordings::CameraFormat& format : formats) {
     auto sizes = ordered_json::array();
-    std::string line = format.pixels + (format.usable ? "" : "  (not used)");
+    std::string line = format.pixels + (format.is_supported ? "" : "  (not used)");
     for (const auto& [width, height] : format.sizes) {
       sizes.push_back({{"width", width}, {"height", height}});
       line += "  " + std::to_string(width) + " x " + std::to_string(height);
     }
-    listed.push_back({{"pixels", format.pixels}, {"usable", format.usable}, {"sizes", sizes}});
+    listed.push_back(
+        {{"pixels", format.pixels}, {"usable", format.is_supported}, {"sizes", sizes}});
     if (!session.json()) session.print(line);
   }
   if (session.json()) session.print(json_line({{"camera", path}, {"formats", listed}}));
@@ -227,7 +228,8 @@ Run declare_info(Arguments& arguments) {
 }  // namespace
 
 Verb info_verb() {
-  return {"info", "Show the content of a memory or recording, or the image sizes of a camera", "",
+  return {"info",
+          "Show the content of a memory or recording, or the image sizes that a camera offers", "",
           "  panonav info office.panonav\n  panonav info drive.mcap", declare_info};
 }
 

@@ -132,9 +132,9 @@ Run declare_list(Arguments& arguments) {
 
 Verb list_verb() {
   return {"list", "List the views, routes and maps of a memory",
-          "Each line gives the id, name, position, heading and stamp of a view, its number of "
-          "links, the connected component of its map, and whether it has a thumbnail. The exit "
-          "code is 1 if there is no such view.",
+          "Each line describes one view: id, name, position, heading, time stamp, number of links "
+          "to other views, connected component of the map that contains it, and whether it has a "
+          "thumbnail. The exit code is 1 if no view is listed.",
           "  panonav list office.panonav\n"
           "  panonav list office.panonav --near 1,1,0.5\n"
           "  panonav list office.panonav --name 'view_0001*' --csv",

@@ -23,8 +23,8 @@ namespace {
 
 /// Rotates the image by a random number of columns, with --turn-randomly, and returns the rotation
 /// in radians, counter-clockwise positive; otherwise 0.
-double turn_randomly(Observation& observation, const PlaceRecogniser& recogniser,
-                     const LocaliseArguments& arguments, std::size_t index) {
+double rotate_randomly(Observation& observation, const PlaceRecogniser& recogniser,
+                       const LocaliseArguments& arguments, std::size_t index) {
   if (!arguments.turn_seed) return 0.0;
   const Panorama panorama = recogniser.encoder().panorama(observation);
   Random random(*arguments.turn_seed, index);
@@ -67,7 +67,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
         } catch (const FileError& error) {
           return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
         }
-        const double turned_rad = turn_randomly(*observation, recogniser, arguments, i);
+        const double turned_rad = rotate_randomly(*observation, recogniser, arguments, i);
         // The entries of several typed images contain paths; the memory has file names.
         const std::string name =
             arguments.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
@@ -132,7 +132,7 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   if (arguments.report) {
     write_localise_report(*arguments.report, file, recogniser, answers, [&](std::size_t i) {
       Observation observation = read_observation(recording.entries[i]);
-      (void)turn_randomly(observation, recogniser, arguments, i);
+      (void)rotate_randomly(observation, recogniser, arguments, i);
       return recogniser.encoder().panorama(observation);
     });
     print_report_path(*arguments.report, session);
@@ -151,8 +151,8 @@ void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArgumen
                  "Update views of known places: add changed views, up to --appearances per place, "
                  "and replace views that repeatedly do not match");
   arguments.option("--route NAME", values->route,
-                   "Locate the robot relative to this route; with --add: record the route, one "
-                   "line every 0.1 m");
+                   "Locate the robot relative to this route; with --add: record the route as one "
+                   "line of pixels every 0.1 m");
   arguments.options("update", values->update_options);
   arguments.options("signature", values->signature, "new");
   arguments.options("preprocessing", values->preprocessing);
@@ -168,8 +168,8 @@ Run declare_localise(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.positionals("INPUT", values->inputs,
                         "Data set, folder of images, video, recording, one or more images, or a "
-                        "live source. Live sources: - for JPEG images on standard input, a camera "
-                        "(/dev/video0), an address (rtsp://, http://, tcp://)");
+                        "live source: - (JPEG images on standard input), a camera (/dev/video0), "
+                        "or an address (rtsp://, http://, tcp://)");
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   declare_record(arguments, values->record);
@@ -177,17 +177,17 @@ Run declare_localise(Arguments& arguments) {
   arguments.hide_from_help({"--record"});
   arguments.option("-o,--out FILE", values->out,
                    "Write the answers as CSV, one line for each image");
-  declare_report(arguments, values->report, "a page with each image above its best match");
+  declare_report(arguments, values->report, "a page that shows each image above its best match");
   arguments.flag(
       "--exclude-same-file", values->exclude_same_file,
-      "Do not compare an image with the view of the same file name (leave-one-out test)");
+      "Do not compare an image with the view that has the same file name (leave-one-out test)");
   arguments.option("--turn-randomly SEED", values->turn_seed,
                    "Rotate each image by a random number of columns; SEED is the random seed. "
                    "'turned_rad' in the answers is the rotation, counter-clockwise positive");
   arguments.hide_from_help({"--exclude-same-file", "--turn-randomly"});
   arguments.flag("--areas", values->areas,
-                 "Also print the area in which the robot may be, for an increasing number of "
-                 "Fourier components");
+                 "Also print the areas in which the robot may be; each area is computed from more "
+                 "Fourier components than the area before");
   arguments.options("localiser", values->localiser);
   arguments.options("accuracy", values->accuracy, "area");
   declare_changes(arguments, values);
@@ -204,11 +204,11 @@ Verb localise_verb() {
       "localise",
       "Find the position and heading of a robot from images",
       "An image without a dataset.toml is read with the image type of the memory. Images that "
-      "cannot be read are reported and skipped. For a live source, the verb always reads the "
-      "newest image, until Ctrl-C. --update uses odometry; without odometry it computes motion "
-      "from the images. panonav undo reverts an update. --route with --add records the poses of "
-      "the recording, its odometry, or motion computed from the images. The exit code is 1 if no "
-      "image shows a place of the memory.",
+      "cannot be read are reported and skipped. From a live source, the verb always reads the "
+      "newest image; press Ctrl-C to stop. --update uses the odometry; if there is none, motion is "
+      "computed from the images. panonav undo reverts an update. With --add, --route takes the "
+      "positions of the route from the recording's poses; if there are none, from its odometry; "
+      "otherwise from the images. The exit code is 1 if no image shows a place of the memory.",
       "  panonav localise office.panonav query_run --report answers\n"
       "  panonav localise office.panonav /dev/video0\n"
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"

@@ -44,7 +44,8 @@ ExitCode man(const ManArguments& arguments, Session& session) {
 
 Run declare_man(Arguments& arguments) {
   auto values = std::make_shared<ManArguments>();
-  arguments.optional_positionals("VERB", values->words, "Verb of the page; default: the overview",
+  arguments.optional_positionals("VERB", values->words,
+                                 "Verb whose page is printed; default: the overview of all verbs",
                                  verb_names());
   arguments.option("-o,--out FOLDER", values->out,
                    "Write the pages of all verbs as files into this folder");
@@ -56,8 +57,8 @@ Run declare_man(Arguments& arguments) {
 
 Verb man_verb() {
   return {"man", "Print the manual page of a verb",
-          "The page is printed in the format roff. To read a page that is saved in a file, use man "
-          "-l FILE. If panonav is installed, use for example man panonav-localise.",
+          "The page is printed in roff format. To read a page that is saved in a file, run man -l "
+          "FILE. If panonav is installed, you can also run, for example, man panonav-localise.",
           "  panonav man localise\n  panonav man --out pages", declare_man};
 }
 

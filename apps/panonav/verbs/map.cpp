@@ -335,12 +335,12 @@ Run declare_map(Arguments& arguments) {
       "DATASET", values->dataset,
       "Data set, folder of images, video or recording with images in the order of the drive");
   arguments.positional("MEMORY", values->memory,
-                       "Memory file (NAME.panonav); new views are added to it");
+                       "Memory file (NAME.panonav), to which new views are added");
   declare_pictures(arguments, values->pictures);
   declare_map_files(arguments, values->files);
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
-  declare_report(arguments, values->report, "a page that replays the drive on its map");
+  declare_report(arguments, values->report, "a page that replays the drive on the map");
   arguments.hide_from_help({"--record", "--picture"});
   arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
   arguments.options("signature", values->signature);
@@ -366,17 +366,18 @@ Run declare_map(Arguments& arguments) {
 }  // namespace
 
 Verb map_verb() {
-  return {"map", "Make a map from the images of a drive",
-          "The images must be in the order of the drive. Each step is computed from two "
-          "consecutive images. If the data set has odometry, the odometry gives the steps, and the "
-          "images correct their rotations. When the robot passes a place again, this corrects the "
-          "map (loop closure). Without odometry, --camera-height-m gives lengths in metres. If the "
-          "map has several parts without connection, each part is a separate component.",
-          "  panonav map office_run office.panonav\n"
-          "  panonav map office_run office.panonav --report mapped --graphml map.graphml\n"
-          "  panonav map walk walk.panonav --camera-height-m 0.6\n"
-          "  panonav map walk walk.panonav --capture-difference 0.1 --json",
-          declare_map};
+  return {
+      "map", "Make a map from the images of a drive",
+      "The images must be in the order of the drive. Each step is computed from two consecutive "
+      "images. If the data set has odometry, the steps come from the odometry instead, and the "
+      "images only correct the rotations of these steps. When the robot returns to a place, the "
+      "map is corrected (loop closure). Without odometry, set --camera-height-m to compute lengths "
+      "in metres. If the map has several unconnected parts, each part is a separate component.",
+      "  panonav map office_run office.panonav\n"
+      "  panonav map office_run office.panonav --report mapped --graphml map.graphml\n"
+      "  panonav map walk walk.panonav --camera-height-m 0.6\n"
+      "  panonav map walk walk.panonav --capture-difference 0.1 --json",
+      declare_map};
 }
 
 }  // namespace panonav::command

@@ -34,8 +34,8 @@ struct Skipped {
   std::string why;
 };
 
-void note_skipped(const std::string& file, const Error& error, std::vector<Skipped>& skipped,
-                  Session& session) {
+void record_skipped(const std::string& file, const Error& error, std::vector<Skipped>& skipped,
+                    Session& session) {
   session.note("skipped: " + to_readable_line(error.what()));
   skipped.push_back({file, error.what()});
 }
@@ -67,7 +67,7 @@ void memorise_missing(const Dataset& missing, const Dataset& recording, bool str
           break;
         }
         progress.clear();
-        note_skipped(entry.file, error, skipped, session);
+        record_skipped(entry.file, error, skipped, session);
       }
     }
     progress.advance(batch.size());
@@ -90,7 +90,7 @@ MemoriserOptions make_options(const MemoriseArguments& arguments, const PictureS
                            .left_out = {}};
   if (!arguments.strict) {
     options.left_out = [&](const Observation& observation, const Error& error) {
-      note_skipped(observation.name, error, skipped, session);
+      record_skipped(observation.name, error, skipped, session);
     };
   }
   return options;
@@ -186,18 +186,18 @@ Run declare_memorise(Arguments& arguments) {
   auto values = std::make_shared<MemoriseArguments>();
   arguments.positional("INPUT", values->input,
                        "Data set, folder of images, one image, video, recording (MCAP, rosbag2, "
-                       "ROS 1 bag), or a live source. Live sources: - for JPEG images on standard "
-                       "input, a camera (/dev/video0), an address (rtsp://, http://, tcp://)");
+                       "ROS 1 bag), or a live source: - (JPEG images on standard input), a camera "
+                       "(/dev/video0), or an address (rtsp://, http://, tcp://)");
   arguments.positional("MEMORY", values->memory, "Memory file (NAME.panonav), new or existing");
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
   arguments.flag("--no-features", values->no_features,
-                 "Do not store local features (4 kB per view); they distinguish views with a "
-                 "distance of 1 to 2 m");
+                 "Do not store local features (4 kB per view); local features help to distinguish "
+                 "places that are 1 to 2 m apart");
   arguments.flag("--strict", values->strict,
-                 "Stop at the first image that cannot be read or has another size; by default such "
-                 "images are reported and skipped");
+                 "Stop at the first image that cannot be read, or whose size differs from that of "
+                 "the other images; by default, such images are reported and skipped");
   arguments.flag("--recursive", values->pictures.recursive, "Also read the images in subfolders");
   arguments.options("signature", values->signature);
   arguments.options("preprocessing", values->preprocessing);
@@ -208,17 +208,18 @@ Run declare_memorise(Arguments& arguments) {
 }  // namespace
 
 Verb memorise_verb() {
-  return {"memorise",
-          "Store the images of a recording as views in a memory",
-          "Views are stored in batches of 16; the first batch of a new memory has 32 views. An "
-          "interruption never leaves an incomplete batch, and the same command then continues. An "
-          "image with the name of a stored view is refused if its pose, its stamp or its content "
-          "differs. For a live source, views are stored until Ctrl-C.",
-          "  panonav memorise office_run office.panonav\n"
-          "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
-          "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",
-          declare_memorise,
-          "memorize"};
+  return {
+      "memorise",
+      "Store the images of a recording as views in a memory",
+      "Views are stored in batches of 16; the first batch of a new memory has 32 views. An "
+      "interruption never leaves an incomplete batch. To continue, run the same command again. An "
+      "image with the same name as a stored view is refused if its pose, time stamp or content "
+      "differs from that view. From a live source, views are stored until you press Ctrl-C.",
+      "  panonav memorise office_run office.panonav\n"
+      "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
+      "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",
+      declare_memorise,
+      "memorize"};
 }
 
 }  // namespace panonav::command

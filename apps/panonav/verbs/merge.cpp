@@ -79,8 +79,10 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
 
 Run declare_merge(Arguments& arguments) {
   auto values = std::make_shared<MergeArguments>();
-  arguments.positional("FIRST", values->first, "Memory file; its coordinate frame is used");
-  arguments.positional("SECOND", values->second, "Memory file that is added to FIRST");
+  arguments.positional("FIRST", values->first,
+                       "Memory file whose coordinate frame the new memory uses");
+  arguments.positional("SECOND", values->second,
+                       "Memory file whose views are added to those of FIRST");
   arguments.required_option("-o,--out MEMORY", values->memory, "New memory file");
   arguments.options("merge", values->alignment);
   arguments.show_in_help({"--min-places"});
@@ -93,9 +95,10 @@ Run declare_merge(Arguments& arguments) {
 Verb merge_verb() {
   return {"merge", "Merge two memories that have places in common",
           "Common places are found by their appearance. The maps of both memories are joined at "
-          "these places and optimised together, in the coordinate frame of FIRST. If there is no "
-          "common place, the new map contains both maps as separate components, and the exit code "
-          "is 1. A view that both memories contain is stored once. Both files remain unchanged.",
+          "these places and optimised together, in the coordinate frame of FIRST. If no common "
+          "place is found, the new memory contains both maps as separate components, and the exit "
+          "code is 1. A view that both memories contain is stored only once. The files FIRST and "
+          "SECOND are not changed.",
           "  panonav merge monday.panonav tuesday.panonav -o both.panonav\n"
           "  panonav merge monday.panonav tuesday.panonav -o both.panonav --json",
           declare_merge};

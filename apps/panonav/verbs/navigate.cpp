@@ -70,9 +70,9 @@ ordered_json view_name_or_null(const std::optional<ViewId>& view, const RobotNav
 ordered_json to_json(const NavigationDecision& decision, const Pose2& pose,
                      const RobotNavigator& robot) {
   auto events = ordered_json::array();
-  for (const NavigationDecision::Event event : decision.events) events.push_back(name_of(event));
+  for (const NavigationDecision::Event event : decision.events) events.push_back(to_string(event));
   return {{"step", decision.step},
-          {"state", name_of(decision.state)},
+          {"state", to_string(decision.state)},
           {"direction_rad", decision.direction_rad},
           {"advance_m", decision.advance_m},
           {"homing", decision.homing},
@@ -114,7 +114,7 @@ std::string describe_event(NavigationDecision::Event event) {
     case NavigationDecision::Event::route_left:
       return "leaves the recorded route early";
   }
-  return std::string(name_of(event));
+  return std::string(to_string(event));
 }
 
 std::string format_line(const NavigationDecision& decision, const RobotNavigator& robot) {
@@ -156,15 +156,15 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
   return {{"memory", arguments.memory},
           {"goal", goal},
           {"scene", arguments.scene},
-          {"edges_from", name_of(robot.origin())},
+          {"edges_from", to_string(robot.origin())},
           {"route", to_json_or_null(arguments.route)},
           {"views", graph.size()},
           {"edges", graph.edges().size()},
           {"areas", planner.areas().nodes.size()},
-          {"end", name_of(run.end)},
+          {"end", to_string(run.end)},
           {"reason", explain_end(run.end)},
           {"steps", run.decisions.size()},
-          {"closed_edges", planner.blocked_edges()},
+          {"closed_edges", planner.blocked_edge_count()},
           {"start", pose_json(start)},
           {"pose", pose_json(run.path.back())},
           {"goal_distance_m", to_json_or_null(run.end_distance_m)},
@@ -175,7 +175,7 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
 }
 
 void print_summary(const simulation::MissionRun& run, Session& session) {
-  const std::string name(name_of(run.end));
+  const std::string name(to_string(run.end));
   session.print(
       (run.end == NavigationDecision::State::arrived ? session.green(name) : session.red(name)) +
       " after " + std::to_string(run.decisions.size()) +
@@ -227,8 +227,8 @@ void write_results(const NavigateArguments& arguments, const simulation::Mission
   if (arguments.picture) {
     viewer::write_mission_picture(
         *arguments.picture,
-        "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
-        remembered, arguments.mission.planner, goal, run);
+        "to " + goal_file + " in " + place.scene.name + ": " + std::string(to_string(run.end)),
+        place, remembered, arguments.mission.planner, goal, run);
   }
   if (arguments.report) {
     write_navigate_report(
@@ -244,7 +244,7 @@ void print_graph(const RobotNavigator& robot, Session& session) {
                 std::to_string(robot.graph().edges().size()) + " edges from " +
                 (robot.origin() == RobotNavigatorOptions::GraphOrigin::arrangement
                      ? "a new arrangement (panonav arrange can store one)"
-                     : "the memory's " + std::string(name_of(robot.origin()))));
+                     : "the memory's " + std::string(to_string(robot.origin()))));
 }
 
 /// Throws FileError if the goal's position is unknown. --kidnap needs it to find the middle of the
@@ -331,20 +331,23 @@ Run declare_navigate(Arguments& arguments) {
   arguments.required_option("--scene SCENE", values->scene,
                             "Scene of the robot, as in panonav simulate");
   arguments.option("--start X,Y,DEG", values->start,
-                   "Start position and heading in degrees; default: a random free place");
+                   "Start position in metres and heading in degrees; default: a random pose that "
+                   "is free of obstacles");
   arguments.option("--kidnap X,Y,DEG", values->kidnap,
-                   "Carry the robot to this place in the middle of its path");
-  arguments.choice("--edges", values->edges, {"map", "lattice", "links", "arrangement"},
-                   "Source of the connections between views: a stored map, the memory's links, or "
-                   "a new arrangement (default: the first that exists)");
+                   "Move the robot to this pose in the middle of its path, without odometry");
+  arguments.choice(
+      "--edges", values->edges, {"map", "lattice", "links", "arrangement"},
+      "Source of the edges between views: map of the verb map; lattice of the verb arrange; links "
+      "of the memory; or a new arrangement (default: the first that exists)");
   arguments.option("--route NAME", values->route,
-                   "Follow this recorded route on the parts of the path that lie on it; views and "
-                   "route must have poses of the same data set");
-  arguments.option("--log FILE", values->log, "Write the decisions into this file, one per line");
+                   "Follow this recorded route where the planned path lies on it; the poses of the "
+                   "views and of the route must be from the same data set");
+  arguments.option("--log FILE", values->log,
+                   "Write the decisions of the robot into this file, one per line");
   arguments.option("--picture FILE", values->picture,
                    "Draw the directions to the goal, the planned path and the driven path into "
                    "this PNG or SVG file");
-  declare_report(arguments, values->report, "a page that replays the mission");
+  declare_report(arguments, values->report, "a page that replays the drive");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   arguments.hide_from_help({"--record", "--view", "--picture"});
@@ -380,11 +383,11 @@ Run declare_navigate(Arguments& arguments) {
 }  // namespace
 
 Verb navigate_verb() {
-  return {"navigate", "Drive a simulated robot to a stored view with images alone",
+  return {"navigate", "Drive a simulated robot to a stored view with only its images",
           "The simulated robot uses the same camera as the views of the memory. Poses in the "
-          "memory are only used to measure the distance from the goal at the end, and to find the "
-          "views on a --route. The exit code is 1 if the robot does not arrive: its path is "
-          "blocked, it is lost, or there is no path.",
+          "memory are only used to measure the final distance from the goal, and to find the views "
+          "on the route of --route. The exit code is 1 if the robot does not arrive because its "
+          "path is blocked, it is lost, or there is no path.",
           "  panonav navigate office.panonav --goal view_00012.png --scene office --report "
           "mission\n"
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "

@@ -133,7 +133,7 @@ Run declare_prune(Arguments& arguments) {
   auto values = std::make_shared<PruneArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.flag("--dry-run", values->dry_run,
-                 "List the views that would be deleted; do not change the memory");
+                 "List the views that would be deleted, but do not change the memory");
   arguments.options("prune", values->options);
   arguments.show_in_help({"--max-difference", "--reach-m", "--outdated-within-m"});
   return [values, &arguments](Session& session) { return prune(arguments, *values, session); };
@@ -143,9 +143,9 @@ Run declare_prune(Arguments& arguments) {
 
 Verb prune_verb() {
   return {"prune", "Delete redundant views of a memory",
-          "A view is deleted if there is a newer view near it that differs from it by at most "
-          "--max-difference. The verb reports how much smaller the memory becomes, and the "
-          "distance to the nearest view before and after. panonav undo restores deleted views.",
+          "A view is deleted if a newer view near it differs from it by at most --max-difference. "
+          "The verb reports how much smaller the memory becomes, and the distance to the nearest "
+          "view before and after the deletion. panonav undo restores deleted views.",
           "  panonav prune office.panonav --dry-run\n"
           "  panonav prune office.panonav --max-difference 0.02\n"
           "  panonav prune office.panonav --outdated-within-m 0.3",

@@ -61,8 +61,9 @@ Run declare_rename(Arguments& arguments) {
 
 Verb rename_verb() {
   return {"rename", "Rename a view or a route of a memory",
-          "Id, links and position in maps do not change. If you memorise the same image again "
-          "under its old name, it is stored as another view. panonav undo reverts the new name.",
+          "The id, links and positions in maps of the view do not change. If you memorise the same "
+          "image again under its old name, it is stored as another view. panonav undo restores the "
+          "old name.",
           "  panonav rename office.panonav view_00012.png door\n"
           "  panonav rename office.panonav route to_the_lab --route",
           declare_rename};

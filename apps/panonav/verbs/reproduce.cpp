@@ -24,7 +24,7 @@ void print_rows(const lab::Reproduction& reproduction, Session& session) {
 
 ExitCode reproduce(const ReproduceArguments& arguments, Session& session) {
   if (arguments.paper == "all") return reproduce_all(arguments, session);
-  const auto papers = reproduced_papers();
+  const auto papers = list_reproduced_papers();
   const auto paper = std::ranges::find(papers, arguments.paper, &ReproducedPaper::name);
   if (paper == papers.end()) {
     std::string allowed;
@@ -65,7 +65,7 @@ std::string format_meanings(int lab::ReproductionOptions::*option,
   std::string text;
   for (const auto& [papers, meaning] : meanings) {
     const std::string last = papers.substr(papers.find_last_of(' ') + 1);
-    text += (text.empty() ? "" : "; ") + papers + ": " + meaning +
+    text += (text.empty() ? "For " : "; for ") + papers + ": " + meaning +
             " (default: " + std::to_string(lab::default_options(last).*option) + ")";
   }
   return text;
@@ -75,18 +75,20 @@ Run declare_reproduce(Arguments& arguments) {
   auto values = std::make_shared<ReproduceArguments>();
   std::vector<std::string> papers;
   std::string names;
-  for (const auto& paper : reproduced_papers()) {
+  for (const auto& paper : list_reproduced_papers()) {
     papers.emplace_back(paper.name);
     names.append(paper.name).append(", ");
   }
   papers.emplace_back("all");
-  arguments.positional("PAPER", values->paper, names + "or all", std::move(papers));
+  arguments.positional("PAPER", values->paper,
+                       "Key of a paper in README.md or of other experiments: " + names + "or all",
+                       std::move(papers));
   arguments.option("-o,--out FOLDER", values->out,
                    "Folder for the report (default: reproduction/PAPER; for all: reproduction)");
   arguments.flag("--quick", values->quick, "Run a short test with few scenes and few runs");
-  arguments.flag(
-      "--continue", values->continues,
-      "all: continue an interrupted run with the same options; finished papers are not run again");
+  arguments.flag("--continue", values->continues,
+                 "For all: continue an interrupted run that had the same options; finished "
+                 "papers are not run again");
   using Options = lab::ReproductionOptions;
   arguments.option("--seed", values->seed,
                    "First random seed of the scenes" + format_defaults(&Options::seed));
@@ -94,7 +96,8 @@ Run declare_reproduce(Arguments& arguments) {
                    "Variants of the scene" + format_defaults(&Options::scenes));
   arguments.option(
       "--queries", values->queries, 1,
-      format_meanings(&Options::queries, {{"m04", "queries in each"}, {"elsewhere", "the same"}}));
+      format_meanings(&Options::queries, {{"m04", "queries in each variant of the scene"},
+                                          {"elsewhere", "queries in each place"}}));
   arguments.option(
       "--runs", values->runs, 2,
       format_meanings(&Options::runs, {{"elsewhere", "drives home and missions in each place"},
@@ -106,12 +109,12 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.option("--rows", values->rows, 1,
                    format_meanings(&Options::rows, {{"elsewhere, m03, m04", "rows of the views"}}));
   arguments.option("--data FOLDER", values->data,
-                   "elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
+                   "For elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
                    "Gazebo worlds (default: the environment variable PANONAV_DATA; if it is not "
                    "set, these experiments are skipped)");
   const auto parts = lab::tracking_reproduction_parts();
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
-                   "m03: run only this part of the experiments (default: all parts)");
+                   "For m03: run only this part of the experiments (default: all parts)");
   arguments.hide_from_help({"--queries", "--rows", "--only"});
   arguments.declare_outputs({"--out"});
   return [values](Session& session) { return reproduce(*values, session); };
@@ -124,7 +127,7 @@ Verb reproduce_verb() {
           "Run the experiments of a paper and compare the results with the published results",
           "The verb writes images, results.json, results.md and index.html into the folder. The "
           "full run of a paper takes minutes. 'all' runs every paper in a separate folder and "
-          "writes a table with all results. A missed target does not change the exit code.",
+          "writes a table with all results. The exit code is 0 even if a result misses its target.",
           "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke\n"
           "  panonav reproduce y03 -o routes --data DATA\n"
           "  panonav reproduce all -o results --data DATA\n"

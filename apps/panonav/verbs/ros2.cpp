@@ -137,14 +137,15 @@ Run declare_ros2(Arguments& arguments) {
       "REMAPPING", values->remappings,
       "New name of a topic as FROM:=TO, for example image:=/camera/image_raw");
   arguments.flag("--teach", values->teach,
-                 "Make the new file MEMORY from a first drive; the message 'finish' on ~/command "
-                 "ends the drive");
+                 "Make the new memory file MEMORY from a first drive; the message 'finish' on the "
+                 "topic ~/command ends the drive");
   arguments.option("--route NAME", values->route,
                    "With --teach: also record the drive as a route with this name");
   arguments.option("--node-name NAME", setup.participant.node, "Name of the node");
   arguments.option("--namespace NAME", setup.participant.name_space, "Namespace of the node");
-  arguments.option("--domain-id", values->domain, 0,
-                   "DDS domain; default: environment variable ROS_DOMAIN_ID, otherwise 0");
+  arguments.option(
+      "--domain-id", values->domain, 0,
+      "DDS domain; default: the environment variable ROS_DOMAIN_ID, or 0 if it is not set");
   arguments.option("--map-frame NAME", setup.frames.map,
                    "Name of the frame of the memory's positions");
   arguments.option("--odom-frame NAME", setup.frames.odom, "Name of the frame of the odometry");
@@ -171,20 +172,20 @@ Run declare_ros2(Arguments& arguments) {
 }  // namespace
 
 Verb ros2_verb() {
-  return {
-      "ros2",
-      "Run a ROS 2 node that localises a robot",
-      "The node reads the topics image, odom, initialpose and goal_pose. It sends the transform "
-      "map -> odom on /tf, and the pose, particles, references, best match and diagnostics. On a "
-      "path to a goal it also sends cmd_vel. ROS need not be installed; every ROS 2 distribution "
-      "on the network can use the node (docs/ros2.md). Ctrl-C stops the node.",
-      "  panonav ros2 office.panonav image:=/camera/image_raw\n"
-      "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
-      "-25 35\n"
-      "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
-      declare_ros2,
-      {},
-      translate_ros_arguments};
+  return {"ros2",
+          "Run a ROS 2 node that localises a robot",
+          "The node reads the topics image, odom, initialpose and goal_pose. The node publishes "
+          "the transform map -> odom on /tf, and the pose, particles, reference views, best match "
+          "and diagnostics. While the robot drives to a goal, the node also publishes cmd_vel. ROS "
+          "need not be installed on this computer; computers with any ROS 2 distribution on the "
+          "network can use the node (docs/ros2.md). Ctrl-C stops the node.",
+          "  panonav ros2 office.panonav image:=/camera/image_raw\n"
+          "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
+          "-25 35\n"
+          "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
+          declare_ros2,
+          {},
+          translate_ros_arguments};
 }
 
 }  // namespace panonav::command

@@ -49,7 +49,7 @@ ordered_json to_json(const FollowedImage& image, bool headings_known) {
   if (image.fix) {
     const RouteFix& fix = *image.fix;
     json["pose"] = pose_json(fix.pose);
-    json["origin"] = name_of(image.fix->origin);
+    json["origin"] = to_string(image.fix->origin);
     json["along_m"] = image.fix->along_m;
     json["lateral_m"] = image.fix->lateral_m;
     json["correlation"] = fix.correlation;
@@ -74,7 +74,7 @@ ordered_json to_json(const FollowedImage& image, bool headings_known) {
 std::string format_line(const FollowedImage& image, Session& session) {
   if (!image.fix) return image.file + "  " + session.red("not on this route");
   const RouteFix& fix = *image.fix;
-  std::string line = image.file + "  " + session.green(name_of(image.fix->origin)) + "  x " +
+  std::string line = image.file + "  " + session.green(to_string(image.fix->origin)) + "  x " +
                      format_fixed(fix.pose.x_m, 3) + " m  y " + format_fixed(fix.pose.y_m, 3) +
                      " m  heading " + format_fixed(degrees(fix.pose.heading_rad), 1) +
                      " degrees  along " + format_fixed(image.fix->along_m, 3) + " m  lateral " +
@@ -106,7 +106,7 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   print_error("error along the route  ", summary.along_m, 1.0, 4, " m", session);
   print_error("lateral error          ", summary.lateral_m, 1.0, 4, " m", session);
   print_error("error of heading       ", summary.heading_rad, degrees(1.0), 2, " degrees", session);
-  for (const auto& [from_m, to_m] : changed_stretches(images)) {
+  for (const auto& [from_m, to_m] : find_changed_sections(images)) {
     session.print("changed scene from " + format_fixed(from_m, 2) + " to " + format_fixed(to_m, 2) +
                   " m along the route");
   }
@@ -190,11 +190,11 @@ Run declare_route_follow(Arguments& arguments) {
   arguments.option("--name NAME", values->name,
                    "Name of the route; needed if the memory contains several routes");
   arguments.option("--every N", values->every, 1,
-                   "Use only every N-th image, and the odometry between these images");
+                   "Use only every N-th image; the odometry of skipped images is added up");
   arguments.flag("--no-odometry", values->no_odometry,
-                 "Search the whole route for each image, without odometry");
+                 "Do not use odometry, but search the whole route for each image");
   arguments.option("--tum FILE", values->tum,
-                   "Write the poses on the route to this file: as CSV if the name ends in .csv, "
+                   "Write the estimated poses to this file: as CSV if the name ends in .csv, "
                    "otherwise as TUM text");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
@@ -215,11 +215,13 @@ Run declare_route_follow(Arguments& arguments) {
 
 Verb route_follow_verb() {
   return {"route follow", "Find the position of a robot relative to a recorded route",
-          "The verb searches for the pose at which the recorded lines of the route predict the "
-          "image. The robot may also be between the lines or beside the route. If the data set has "
-          "odometry, the search starts at the pose that the odometry predicts. If this fails, the "
-          "surroundings of this pose are searched, then the whole route. Changed parts of the "
-          "scene are ignored and reported. The exit code is 1 if no image is on the route.",
+          "From the recorded lines of the route, the verb predicts the images at other poses, and "
+          "searches for the pose whose predicted image agrees best with the image of the robot. "
+          "The robot may also be between the lines or beside the route. If the data set has "
+          "odometry, the search starts at the pose that the odometry predicts. If this search "
+          "fails, the verb searches near this pose, and then along the whole route. Parts of the "
+          "scene that have changed are ignored and reported. The exit code is 1 if no image can be "
+          "located on the route.",
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"
           "  panonav route follow office.panonav repeat_run --no-odometry --json",

@@ -184,7 +184,7 @@ Run declare_route_record(Arguments& arguments) {
                    "panoramas with unknown elevations (default: all rows)");
   arguments.flag("--odometry", values->odometry,
                  "Use the poses of the odometry, even if the data set has positions");
-  declare_report(arguments, values->report, "a page with the route panorama");
+  declare_report(arguments, values->report, "a page with all lines of the route as one image");
   declare_pictures(arguments, values->pictures);
   arguments.options("line", values->line);
   return [values, &arguments](Session& session) { return record(arguments, *values, session); };
@@ -193,15 +193,15 @@ Run declare_route_record(Arguments& arguments) {
 }  // namespace
 
 Verb route_record_verb() {
-  return {
-      "route record", "Record a route as one line of pixels for each step",
-      "A line is the horizon around the robot at one place of the route: one byte per degree, a "
-      "few megabytes per kilometre. Lines are stored in batches. After an interruption the same "
-      "command continues. A recording that starts at the end of the route makes the route longer.",
-      "  panonav route record teach_run office.panonav\n"
-      "  panonav route record teach_run office.panonav --name corridor --odometry --report "
-      "corridor",
-      declare_route_record};
+  return {"route record", "Record a route as lines of pixels at equal distances",
+          "A line of pixels shows the horizon all around the robot at one place of the route. A "
+          "line has one byte per degree, and one kilometre of route needs a few megabytes. Lines "
+          "are stored in batches. To continue after an interruption, run the same command again. A "
+          "recording that starts at the end of the route extends the route.",
+          "  panonav route record teach_run office.panonav\n"
+          "  panonav route record teach_run office.panonav --name corridor --odometry --report "
+          "corridor",
+          declare_route_record};
 }
 
 }  // namespace panonav::command

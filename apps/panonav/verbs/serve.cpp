@@ -102,19 +102,20 @@ Run declare_serve(Arguments& arguments) {
   auto values = std::make_shared<ServeArguments>();
   arguments.positionals(
       "MEMORY", values->memories,
-      "Memory files, or addresses of memories on a server. The name of a memory for clients is its "
-      "file name without .panonav; NAME=FILE sets another name");
+      "Memory files, or addresses of memories on a PostgreSQL server. Clients use the file name of "
+      "a memory without .panonav; NAME=FILE sets another name");
   arguments.option("--listen PORT", values->listen,
-                   "Port for programs on this computer (0: a free port); with ADDRESS:PORT, other "
-                   "computers in this network can also connect");
+                   "Port for programs on this computer (0: any free port); with ADDRESS:PORT, "
+                   "other computers in this network can also connect");
   arguments.option("--token-file FILE", values->token_file,
-                   "Only answer clients that send the first line of this file as bearer token");
+                   "Answer only clients that send the first line of this file as bearer token");
   arguments.option("--max-waiting", values->max_waiting, 1,
-                   "Largest number of waiting images; further clients are asked to retry");
-  arguments.option(
-      "--max-held-views", values->max_held_views, 0,
-      "Largest number of views of a memory on a server that is loaded completely; larger memories "
-      "need 350 bytes per view instead of 2700, and more time per image (docs/scale.md)");
+                   "Largest number of images that wait for an answer; if more images arrive, their "
+                   "clients are asked to retry");
+  arguments.option("--max-held-views", values->max_held_views, 0,
+                   "Load a memory from a PostgreSQL server completely if it has at most this "
+                   "number of views (2700 bytes per view); larger memories need only 350 bytes per "
+                   "view, but more time per image (docs/scale.md)");
   arguments.options("localiser", values->localiser);
   arguments.show_in_help({"--top"});
   return [values, &arguments](Session& session) { return serve(arguments, *values, session); };
@@ -124,11 +125,12 @@ Run declare_serve(Arguments& arguments) {
 
 Verb serve_verb() {
   return {"serve", "Run an HTTP server that finds the position and heading of a robot from images",
-          "Clients send a PNG or JPEG with POST to /v1/memories/NAME/localise and get the same "
-          "JSON as from panonav localise. GET /v1/memories lists the memories. GET /health reports "
-          "whether the server is ready. GET /metrics is for Prometheus. If the file of a memory "
-          "changes, the server loads it again. The server does not use encryption. If others can "
-          "reach the server, put a proxy with encryption in front of it.",
+          "Clients send a PNG or JPEG image with POST to /v1/memories/NAME/localise and receive "
+          "the same JSON as panonav localise --json prints. GET /v1/memories lists the memories. "
+          "GET /health reports whether the server is ready. GET /metrics returns metrics for "
+          "Prometheus. If the file of a memory changes, the server loads it again. The server does "
+          "not use encryption. If other computers can reach the server, put a proxy with "
+          "encryption in front of it.",
           "  panonav serve office.panonav\n"
           "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
           "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",

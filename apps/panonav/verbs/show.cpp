@@ -190,8 +190,8 @@ Run declare_show(Arguments& arguments) {
 
 Verb show_verb() {
   return {"show", "Show all data that a memory stores about a view",
-          "The output contains the pose, links, position in maps and size of the view. It also "
-          "lists the five most similar and the five nearest views.",
+          "The output contains the pose, links, positions in maps and stored size of the view. The "
+          "output also lists the five most similar and the five nearest views.",
           "  panonav show office.panonav view_00012.png\n"
           "  panonav show office.panonav 13 -o view_13.png",
           declare_show};

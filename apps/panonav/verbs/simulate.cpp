@@ -139,11 +139,11 @@ Run declare_simulate_verb(Arguments& arguments) {
       {scenes.begin(), scenes.end()});
   arguments.optional_positionals("OUT", values->out, "New or empty folder for the data set");
   arguments.flag("--ros2", values->ros2,
-                 "Simulate a robot for ROS 2 instead of making a data set; ROS 2 reads its images "
-                 "and drives it");
-  arguments.option(
-      "--grid METRES", values->grid_m,
-      "Take images at all free places of a grid; same as --path grid --spacing-m METRES");
+                 "Instead of making a data set, simulate a ROS 2 robot that publishes images and "
+                 "obeys velocity commands");
+  arguments.option("--grid METRES", values->grid_m,
+                   "Take images at all points of a grid that are free of obstacles; same as --path "
+                   "grid --spacing-m METRES");
   arguments.option("--random N", values->random,
                    "Take images at N random poses; same as --path random --poses N");
   arguments.option("--trajectory FILE", values->trajectory,
@@ -191,8 +191,8 @@ Run declare_simulate_verb(Arguments& arguments) {
 
 Verb simulate_verb() {
   return {"simulate", "Make a data set with the images of a simulated robot",
-          "The images have stamps and noisy odometry, except at random places. The same options "
-          "and seeds give the same images on the same type of processor.",
+          "Each image has a time stamp and noisy odometry, unless the poses are random. The same "
+          "options and seeds give the same images on the same type of processor.",
           "  panonav simulate office memory_run --grid 0.25\n"
           "  panonav simulate office query_run --random 20 --seed 7\n"
           "  panonav simulate house.world house_run --grid 0.5 --kind panorama\n"

@@ -110,12 +110,12 @@ Run declare_synchronise(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file of the robot, new or existing");
   arguments.positional("ADDRESS", values->server,
                        "Address of a memory on a server, new or existing");
+  arguments.option("--around", "X_M Y_M", values->around,
+                   "Keep in the file only views that have no position or are in areas (squares of "
+                   "10 m) near this position");
   arguments.option(
-      "--around", "X_M Y_M", values->around,
-      "Keep in the file only the views in areas (squares of 10 m) near this position, and "
-      "views without a position");
-  arguments.option("--within-m", values->within_m,
-                   "Largest distance of these areas from the position of --around in metres");
+      "--within-m", values->within_m,
+      "Largest distance in metres from the position of --around to an area that is kept");
   return [values](Session& session) { return synchronise(*values, session); };
 }
 
@@ -124,11 +124,12 @@ Run declare_synchronise(Arguments& arguments) {
 Verb synchronise_verb() {
   return {
       "synchronise", "Synchronise a memory file with a memory on a server",
-      "The verb uploads new views and changes of the file, and downloads changes that others made: "
-      "views with images and features, poses, names, removals and links. If two robots change a "
-      "view, the change that the server received first is used; a removal is always used. If two "
-      "robots replace the same view, both new views are stored. If two views have the same name, "
-      "one becomes ROBOT/NAME. Maps, routes and models stay in the file. If the connection breaks, "
+      "The verb uploads new views and changes from the file, and downloads the changes that other "
+      "robots uploaded. Changes concern views with their images and features, poses, names, "
+      "deletions and links. If two robots change the same view, the change that the server "
+      "received first is used, but a deletion is always used. If two robots replace the same view, "
+      "both new views are stored. If two different views have the same name, one of them is "
+      "renamed ROBOT/NAME. Maps, routes and models are not synchronised. If the connection breaks, "
       "run the same command again to continue (docs/scale.md).",
       "  panonav synchronise robot.panonav 'postgresql://robots.example/panonav?memory=office'\n"
       "  panonav synchronise robot.panonav ADDRESS --around 12.5 40 --within-m 60 --json",

@@ -103,9 +103,9 @@ ordered_json to_json(const TrackedImage& image) {
   for (const PoseMode& mode : estimate.modes) modes.push_back(to_json(mode));
   return {{"file", image.file},
           {"stamp_s", to_json_or_null(image.stamp_s)},
-          {"state", name_of(estimate.state)},
+          {"state", to_string(estimate.state)},
           {"pose", pose_json(estimate.pose)},
-          {"inside", estimate.inside},
+          {"inside", estimate.p_inside},
           {"probability", estimate.probability},
           {"modes", std::move(modes)},
           {"spread_m", estimate.spread_m},
@@ -125,7 +125,7 @@ std::string format_position(const Pose2& pose) {
 std::string format_line(const TrackedImage& image, Session& session) {
   const MonteCarloEstimate& estimate = image.estimate;
   std::string line = image.file + "  ";
-  const std::string state(name_of(estimate.state));
+  const std::string state(to_string(estimate.state));
   if (estimate.state == LocalisationState::lost || estimate.modes.empty()) {
     return line + session.red(state);
   }
@@ -257,7 +257,7 @@ class LiveTrack {
     TrackedImage image = track_image(tracker_, pack(view, encoder.header().full_scale), settings_,
                                      std::move(moment_));
     moment_ = std::move(image.moment);
-    if (moment_ && is_set_by_viewer) note_viewer_pose(*moment_);
+    if (moment_ && is_set_by_viewer) record_viewer_pose(*moment_);
     image.index = number;
     image.file = observation.name;
     image.stamp_s = observation.stamp_s;
@@ -392,20 +392,20 @@ Run declare_track(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.positional("DATASET", values->dataset,
                        "Data set, folder of images, video or recording with images in the order of "
-                       "the run, or a live source (-, /dev/video0, rtsp://). Without odometry, "
-                       "motion is computed from the images");
+                       "the run, or a live source (-, /dev/video0, rtsp://). If there is no "
+                       "odometry, motion is computed from the images");
   declare_topics(arguments, values->topics);
   declare_part(arguments, values->part, false);
   arguments.option("--every N", values->every, 1,
-                   "Use only every N-th image, and the odometry between these images");
+                   "Use only every N-th image; the odometry of skipped images is added up");
   arguments.option("--start-x-m", values->start_x_m,
-                   "x of the start position; by default the start is unknown");
-  arguments.option("--start-y-m", values->start_y_m, "y of the start position");
+                   "x coordinate of the start position; by default, the start position is unknown");
+  arguments.option("--start-y-m", values->start_y_m, "y coordinate of the start position");
   arguments.option("--start-heading-deg", values->start_heading_deg,
                    "Heading at the start; can be used without a position");
   arguments.option("--tum FILE", values->tum,
-                   "Write the trajectory of localised images to this file: as CSV if the name ends "
-                   "in .csv, otherwise as TUM text");
+                   "Write the estimated poses of all localised images to this file: as CSV if the "
+                   "name ends in .csv, otherwise as TUM text");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   declare_live(arguments, values->live);
@@ -422,10 +422,11 @@ Run declare_track(Arguments& arguments) {
 
 Verb track_verb() {
   return {"track", "Track the position of a moving robot from images and odometry",
-          "The verb uses Monte-Carlo localisation. The start may be unknown. If several places are "
-          "similar, all of them are tracked until an image shows the correct one. A robot that was "
-          "moved without odometry (kidnapped) is localised again. For a live source, tracking "
-          "continues until Ctrl-C. The exit code is 1 if the robot was never localised.",
+          "The verb uses Monte-Carlo localisation. The start pose may be unknown. If several "
+          "places look similar, all of them are tracked until an image shows which one is correct. "
+          "A robot that was moved without odometry (kidnapped) is localised again. With a live "
+          "source, tracking continues until you press Ctrl-C. The exit code is 1 if the robot was "
+          "never localised.",
           "  panonav track office.panonav run\n"
           "  panonav track office.panonav run --every 10 --report report\n"
           "  panonav track office.panonav run --tum estimate.tum --json\n"

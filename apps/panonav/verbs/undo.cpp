@@ -37,7 +37,7 @@ Run declare_undo(Arguments& arguments) {
   auto values = std::make_shared<UndoArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.flag("--dry-run", values->dry_run,
-                 "Print the change that would be reverted; do not change the memory");
+                 "Print the change that would be reverted, but do not change the memory");
   return [values](Session& session) { return undo(*values, session); };
 }
 
@@ -45,10 +45,11 @@ Run declare_undo(Arguments& arguments) {
 
 Verb undo_verb() {
   return {"undo", "Revert the last forget, prune, rename or localise --update",
-          "Use undo again to revert earlier changes; panonav history lists them. Views are "
-          "restored with their thumbnails, links, positions in maps and former names. Views that "
-          "were added later stay in the memory. undo is refused if such a view has the name of a "
-          "view that would be restored, or if a map was made again.",
+          "Run panonav undo again to revert earlier changes; panonav history lists all changes. "
+          "Views are restored with their thumbnails, links, positions in maps and former names. "
+          "Views that were added after the reverted change stay in the memory. The verb refuses to "
+          "revert a change if a view that was added later has the name of a view that would be "
+          "restored, or if a map was made again.",
           "  panonav undo office.panonav --dry-run\n"
           "  panonav undo office.panonav",
           declare_undo};

@@ -126,7 +126,7 @@ Run declare_unwrap(Arguments& arguments) {
   arguments.positional(
       "INPUT", values->input,
       "Raw mirror image, 360 degree image or panorama. A data set, folder, video or recording of "
-      "such images is also allowed; - reads JPEG images from standard input");
+      "such images is also allowed; with -, JPEG images are read from standard input");
   arguments.required_option("-o,--out", values->out,
                             "Name of the new PNG image; for several images: a new folder");
   declare_pictures(arguments, values->pictures);
@@ -140,7 +140,8 @@ Run declare_unwrap(Arguments& arguments) {
 
 Verb unwrap_verb() {
   return {"unwrap", "Convert images to panoramas",
-          "The columns of the result run clockwise, with the forward direction in the middle.",
+          "From the left to the right edge of the panorama, the view turns clockwise. The forward "
+          "direction is in the middle.",
           "  panonav unwrap mirror.jpg --camera camera.toml -o panorama.png\n"
           "  panonav unwrap photo360.jpg --kind equirectangular --elevation-deg -30 40 -o "
           "panorama.png\n"

@@ -7,7 +7,7 @@ namespace panonav::command {
 namespace {
 
 ExitCode verify(const std::string& path, Session& session) {
-  set_left_out_handler({});  // `verify` lists these rows itself
+  set_skipped_row_handler({});  // `verify` lists these rows itself
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto faults = memory.verify();
   if (session.json()) {

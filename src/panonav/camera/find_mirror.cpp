@@ -240,15 +240,15 @@ std::vector<FieldCircle> find_best_circles(const SearchFields& search_fields,
   return result;
 }
 
-struct SearchResult {
+struct MirrorSearchResult {
   MirrorCircle::Circle rim;
   std::optional<double> inner_radius_px;
 };
 
-std::optional<SearchResult> search_mirror(const SearchFields& search_fields,
-                                          std::span<const SmoothPlanes> planes,
-                                          const ImageSize& size,
-                                          const MirrorCircle::SearchOptions& options) {
+std::optional<MirrorSearchResult> search_mirror(const SearchFields& search_fields,
+                                                std::span<const SmoothPlanes> planes,
+                                                const ImageSize& size,
+                                                const MirrorCircle::SearchOptions& options) {
   CircleRange range;
   range.min_radius =
       options.min_rim * std::min(size.width, size.height) / search_fields.middle_reduction;
@@ -293,7 +293,7 @@ std::optional<SearchResult> search_mirror(const SearchFields& search_fields,
             [](const MirrorCircle::Circle& a, const MirrorCircle::Circle& b) {
               return a.radius_px < b.radius_px;
             });
-  SearchResult result;
+  MirrorSearchResult result;
   result.rim = circles[choose_rim(circles, planes)];
 
   result.inner_radius_px = find_disc_radius(search_fields, planes, result.rim);
@@ -310,7 +310,8 @@ void visit_options(MirrorCircle::SearchOptions& options, OptionVisitor& visitor)
           2),
       option<&T::max_rim>(
           "largest radius of the mirror's rim, as a share of the image's longer side", above(0), 2),
-      option<&T::visible_fraction>("smallest share of the rim inside the image", 0.25, 1),
+      option<&T::visible_fraction>("smallest share of the rim that must be inside the image", 0.25,
+                                   1),
       option<&T::min_quality>(
           "lowest quality of the rim, from 0 (any circle) to 1 (a sharp edge on the whole circle)",
           above(0), 1),

@@ -112,8 +112,9 @@ int Executor::threads() const noexcept {
   return static_cast<int>(pool_->workers.size()) + 1;
 }
 
-void Executor::for_chunks(std::size_t count, std::size_t chunk,
-                          const std::function<void(std::size_t, std::size_t, std::size_t)>& body) {
+void Executor::for_each_chunk(
+    std::size_t count, std::size_t chunk,
+    const std::function<void(std::size_t, std::size_t, std::size_t)>& body) {
   require(chunk >= 1, "chunk", static_cast<double>(chunk), ">= 1");
   if (count == 0) return;
   std::unique_lock lock(pool_->mutex);

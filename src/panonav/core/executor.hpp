@@ -14,8 +14,9 @@ class Executor {
  public:
   /// Starts the threads: 1 runs everything in the calling thread, 0 uses one thread per core. If
   /// the system cannot start all of them, the executor uses fewer. `before_chunk` is called in the
-  /// thread that calls `for_chunks`, before each chunk that this thread runs; an exception from it
-  /// ends the loop, for example when the user interrupts. Throws ContractError outside 0 .. 1024.
+  /// thread that calls `for_each_chunk`, before each chunk that this thread runs; an exception from
+  /// it ends the loop, for example when the user interrupts. Throws ContractError outside 0 ..
+  /// 1024.
   explicit Executor(int threads = 1, std::function<void()> before_chunk = {});
   ~Executor();
   Executor(const Executor&) = delete;
@@ -28,8 +29,8 @@ class Executor {
   /// Rethrows in the calling thread the exception of the body with the lowest chunk number. An
   /// exception of `before_chunk` has precedence and cancels the chunks that have not begun. Not
   /// re-entrant.
-  void for_chunks(std::size_t count, std::size_t chunk,
-                  const std::function<void(std::size_t, std::size_t, std::size_t)>& body);
+  void for_each_chunk(std::size_t count, std::size_t chunk,
+                      const std::function<void(std::size_t, std::size_t, std::size_t)>& body);
 
  private:
   struct Pool;

@@ -180,7 +180,7 @@ class OptionTable {
   }
 
  private:
-  static consteval bool are_names_unique() {
+  static consteval bool has_unique_names() {
     const std::array<std::string_view, sizeof...(Entries)> names{Entries::name...};
     for (std::size_t i = 0; i < names.size(); ++i) {
       for (std::size_t j = 0; j < i; ++j) {
@@ -192,7 +192,7 @@ class OptionTable {
   static_assert(
       detail::member_count<Options>() == sizeof...(Entries),
       "each member has one entry: option, choice, options_of, or no_option with a reason");
-  static_assert(are_names_unique(), "no member has two entries");
+  static_assert(has_unique_names(), "no member has two entries");
   std::tuple<Entries...> entries_;
 };
 

@@ -25,20 +25,24 @@ constexpr double agreeing_factor = 1.25;
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
   using T = HomingPursuitOptions;
   constexpr OptionTable table{
-      choice<&T::strategy>("choice of the frequencies of each stage", "steady", "coarse_to_fine",
-                           "recovering"),
+      choice<&T::strategy>("method that chooses the frequencies for each stage of homing", "steady",
+                           "coarse_to_fine", "recovering"),
       option<&T::coarse>("highest frequency of the first stage", 1, 62),
       option<&T::middle>("highest frequency of the second stage", 1, 62),
       option<&T::fine>("highest frequency of the third stage", 1, 62),
-      option<&T::typical_distance_m>("typical distance of the objects around", 0.001, 1000),
+      option<&T::typical_distance_m>("typical distance of the objects around the robot", 0.001,
+                                     1000),
       option<&T::max_step_m>("longest step between two views", 0.001, 100),
-      option<&T::stop_length>("homing stops if the home vector is shorter than this, in units of R",
+      option<&T::stop_length>("homing stops if the home vector is shorter than this, in units of R "
+                              "(the typical distance of objects)",
                               0, 1),
       option<&T::min_step_m>("homing stops if a step is shorter than this", above(0), 100),
       option<&T::patience>(
           "homing stops if the views do not become more similar for this number of steps", 1, 1e6),
-      option<&T::max_steps>("largest number of steps of a run", 1, 1e6),
-      option<&T::arrived_difference>("largest difference of the two views at home", 0, 2),
+      option<&T::max_steps>("largest number of steps of one homing run", 1, 1e6),
+      option<&T::arrived_difference>("largest difference between the current view and the goal "
+                                     "view at which the robot has arrived",
+                                     0, 2),
   };
   table.visit(options, visitor);
 }

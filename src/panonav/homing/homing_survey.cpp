@@ -67,8 +67,8 @@ void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor) {
           "typical distance of objects: the length in metres of a home vector of length 1", 1e-3,
           1e3),
       option<&T::max_step_m>("longest step between two views", 1e-3, 1e3),
-      option<&T::obstacle_m>("largest distance of a step's end from the nearest place; a larger "
-                             "distance stops the run",
+      option<&T::obstacle_m>("largest distance from the end of a step to the nearest place with a "
+                             "view; a larger distance stops the run",
                              1e-3, 1e3),
       option<&T::max_steps>("largest number of steps of a run", 1, 1e6),
   };
@@ -87,7 +87,7 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
   const PlaceFinder finder(places, options.obstacle_m);
   std::mutex mutex;
   std::size_t done = 0;
-  executor.for_chunks(goals.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+  executor.for_each_chunk(goals.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t g = begin; g < end; ++g) {
       for (std::size_t p = 0; p < places.size(); ++p) {
         const Pose2& here = places[p];
@@ -203,15 +203,16 @@ std::vector<float> final_distances(std::span<const HomingSurvey* const> stages,
   require(!stages.empty(), "stages", 0, ">= 1");
   const HomingSurvey& first = *stages[0];
   std::vector<float> distances(first.goals.size() * first.places.size());
-  executor.for_chunks(first.goals.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t g = begin; g < end; ++g) {
-      const auto ends = final_places(stages, g, options);
-      for (std::size_t p = 0; p < ends.size(); ++p) {
-        distances[g * ends.size() + p] = static_cast<float>(
-            distance(first.goals[g].position(), first.places[ends[p]].position()));
-      }
-    }
-  });
+  executor.for_each_chunk(
+      first.goals.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t g = begin; g < end; ++g) {
+          const auto ends = final_places(stages, g, options);
+          for (std::size_t p = 0; p < ends.size(); ++p) {
+            distances[g * ends.size() + p] = static_cast<float>(
+                distance(first.goals[g].position(), first.places[ends[p]].position()));
+          }
+        }
+      });
   return distances;
 }
 

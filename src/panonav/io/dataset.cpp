@@ -366,8 +366,8 @@ Dataset read_picture_tree(const fs::path& folder, PictureSource source) {
   return find_pictures(folder, std::move(source), true);
 }
 
-std::vector<std::size_t> choose_pictures(const std::vector<double>& stamps_s,
-                                         const Dataset::Selection& selection) {
+std::vector<std::size_t> select_picture_indices(const std::vector<double>& stamps_s,
+                                                const Dataset::Selection& selection) {
   constexpr double rounding_s = 1e-4;
   std::vector<std::size_t> selected;
   std::size_t passed = 0;
@@ -384,10 +384,10 @@ std::vector<std::size_t> choose_pictures(const std::vector<double>& stamps_s,
 }
 
 void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
-  if (!selection.by_time() && selection.every <= 1) return;
+  if (!selection.selects_by_time() && selection.every <= 1) return;
   const std::string name = dataset.folder.string();
   std::vector<double> stamps_s(dataset.entries.size(), 0.0);
-  if (selection.by_time()) {
+  if (selection.selects_by_time()) {
     for (std::size_t i = 0; i < stamps_s.size(); ++i) {
       const DatasetEntry& entry = dataset.entries[i];
       if (!entry.stamp_s) {
@@ -404,7 +404,7 @@ void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
     }
   }
   std::vector<DatasetEntry> kept;
-  for (const std::size_t i : choose_pictures(stamps_s, selection)) {
+  for (const std::size_t i : select_picture_indices(stamps_s, selection)) {
     kept.push_back(std::move(dataset.entries[i]));
   }
   if (kept.empty()) {

@@ -63,7 +63,7 @@ struct Dataset {
     std::optional<double> to_s;     ///< this moment included
 
     /// True if pictures need stamps to be selected.
-    [[nodiscard]] bool by_time() const noexcept { return every_s || from_s || to_s; }
+    [[nodiscard]] bool selects_by_time() const noexcept { return every_s || from_s || to_s; }
   };
 
   /// Fields that all pictures of a data set have.
@@ -92,8 +92,8 @@ struct Dataset {
 
 /// Returns the indices of the selected pictures, given the ascending stamps of all. Differences of
 /// up to 0.1 ms are ignored.
-[[nodiscard]] std::vector<std::size_t> choose_pictures(const std::vector<double>& stamps_s,
-                                                       const Dataset::Selection& selection);
+[[nodiscard]] std::vector<std::size_t> select_picture_indices(const std::vector<double>& stamps_s,
+                                                              const Dataset::Selection& selection);
 
 /// Keeps the selected entries. Throws FileError if times are selected and an entry has no stamp or
 /// a smaller one than the entry before, or if no entry is left.

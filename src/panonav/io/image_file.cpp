@@ -80,7 +80,7 @@ void check_image_size(ImageSize size, std::string_view name, const ImageLimits& 
                             std::to_string(limits.area_px) + " px in all");
 }
 
-int exif_orientation(Bytes exif) {
+int read_exif_orientation(Bytes exif) {
   const bool little = exif.size() >= 8 && exif[0] == 'I' && exif[1] == 'I';
   const bool big = exif.size() >= 8 && exif[0] == 'M' && exif[1] == 'M';
   if (!little && !big) return 1;
@@ -111,7 +111,7 @@ ImageSize upright_size(ImageSize stored, int orientation) {
   return orientation >= 5 ? ImageSize{stored.height, stored.width} : stored;
 }
 
-Image upright(Image stored, int orientation) {
+Image apply_exif_orientation(Image stored, int orientation) {
   if (orientation == 1) return stored;
   // Copies from the stored pixel that belongs to (u, v) of the upright picture [EXIF 2.32, tag
   // 0x0112].

@@ -16,24 +16,25 @@ double RankedMatch::score_with(double difference) const {
          std::pow(match.dissimilarity + min_factor, dissimilarity_exponent);
 }
 
-ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int max_kept)
+ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int max_cached_views)
     : memory_(&memory), components_(components) {
   require(components >= 0 && components <= memory.shape().components, "components", components,
           "0 (all) or 1 .. " + to_text(memory.shape().components));
-  if (memory.size() > static_cast<std::size_t>(max_kept)) return;
-  kept_views_.assign(memory.views().begin(), memory.views().end());
-  kept_.reserve(kept_views_.size());
-  for (const ViewId view : kept_views_) kept_.emplace_back(memory.packed(view), components);
+  if (memory.size() > static_cast<std::size_t>(max_cached_views)) return;
+  cached_views_.assign(memory.views().begin(), memory.views().end());
+  cached_profiles_.reserve(cached_views_.size());
+  for (const ViewId view : cached_views_)
+    cached_profiles_.emplace_back(memory.packed(view), components);
 }
 
-const ColumnProfiles* ColumnRanking::find_kept(ViewId view) const {
-  const auto at = std::ranges::lower_bound(kept_views_, view);
-  if (at == kept_views_.end() || *at != view) return nullptr;
-  return &kept_[static_cast<std::size_t>(at - kept_views_.begin())];
+const ColumnProfiles* ColumnRanking::find_cached(ViewId view) const {
+  const auto at = std::ranges::lower_bound(cached_views_, view);
+  if (at == cached_views_.end() || *at != view) return nullptr;
+  return &cached_profiles_[static_cast<std::size_t>(at - cached_views_.begin())];
 }
 
 ColumnProfiles ColumnRanking::profiles(ViewId view) const {
-  if (const ColumnProfiles* const found = find_kept(view)) return *found;
+  if (const ColumnProfiles* const found = find_cached(view)) return *found;
   return ColumnProfiles(memory_->packed(view), components_);
 }
 
@@ -45,7 +46,7 @@ std::vector<RankedMatch> ColumnRanking::rank(const PackedSignature& query,
   ranked.reserve(matches.size());
   for (const Match& match : matches) {
     // Cached profiles cover all rows.
-    const ColumnProfiles* const found = allowed_rows.empty() ? find_kept(match.view) : nullptr;
+    const ColumnProfiles* const found = allowed_rows.empty() ? find_cached(match.view) : nullptr;
     const ColumnMatch columns =
         found != nullptr ? match_columns(query_profiles, *found)
                          : match_columns(query_profiles, ColumnProfiles(memory_->packed(match.view),

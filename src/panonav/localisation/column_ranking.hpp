@@ -32,10 +32,11 @@ struct RankedMatch {
 class ColumnRanking {
  public:
   /// Caches the column profiles of all views (2.5 kB each) if the memory has at most
-  /// `max_kept` views; otherwise computes profiles for each query. `components`: number of
+  /// `max_cached_views` views; otherwise computes profiles for each query. `components`: number of
   /// Fourier components compared; 0: all. The memory must outlive *this. Throws ContractError if
   /// the memory has fewer components.
-  explicit ColumnRanking(const VisualMemory& memory, int components = 0, int max_kept = 1000);
+  explicit ColumnRanking(const VisualMemory& memory, int components = 0,
+                         int max_cached_views = 1000);
 
   /// Returns the matches, ascending by score, then by view. `allowed_rows`: see SearchMask. Cost: 1
   /// microsecond for a match with cached profiles, about 10 microseconds for others.
@@ -52,12 +53,12 @@ class ColumnRanking {
 
  private:
   /// Returns the cached profiles of a view; null if they are not cached.
-  [[nodiscard]] const ColumnProfiles* find_kept(ViewId view) const;
+  [[nodiscard]] const ColumnProfiles* find_cached(ViewId view) const;
 
   const VisualMemory* memory_;
   int components_;
-  std::vector<ViewId> kept_views_;  // ascending, as `kept_`
-  std::vector<ColumnProfiles> kept_;
+  std::vector<ViewId> cached_views_;  // ascending, as `cached_profiles_`
+  std::vector<ColumnProfiles> cached_profiles_;
 };
 
 }  // namespace panonav

@@ -15,8 +15,8 @@ using FeatureSource = std::function<std::optional<LocalFeatures>(ViewId)>;
 
 /// The image of a query from which local features are extracted.
 enum class Handedness {
-  as_seen,  ///< the view as it was taken
-  mirrored  ///< the mirror image, which shows no existing place
+  original,  ///< the view as it was taken
+  mirrored   ///< the mirror image, which shows no existing place
 };
 /// Extracts the local features of a query on demand; nullopt if elevations are unknown.
 using QueryFeatures = std::function<std::optional<LocalFeatures>(Handedness)>;

@@ -64,10 +64,10 @@ std::optional<Circle> ReferenceAreas::enclosing_circle(std::span<const Match> vi
 void visit_options(LocalisationAccuracy& accuracy, OptionVisitor& visitor) {
   using T = LocalisationAccuracy;
   constexpr OptionTable table{
-      option<&T::components>("largest number of compared Fourier components; 0: all", 0),
+      option<&T::components>("largest number of Fourier components to compare; 0: all", 0),
       option<&T::radius_m>("stop when the position is known within this radius; 0: never", 0),
-      option<&T::tolerance>("candidates are kept if their dissimilarity is at most (1 + tolerance) "
-                            "times the best one",
+      option<&T::tolerance>("keep candidates whose dissimilarity is at most (1 + tolerance) times "
+                            "the smallest dissimilarity",
                             0),
   };
   table.visit(accuracy, visitor);

@@ -19,7 +19,7 @@ namespace {
 
 // Returns the signature with the magnitudes of disallowed rows set to 0; unchanged without
 // `allowed_rows`.
-PackedSignature keep_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
+PackedSignature mask_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
   if (allowed_rows.empty()) return signature;
   for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
     if (allowed_rows[i % allowed_rows.size()] == 0) signature.magnitudes[i] = 0;
@@ -28,7 +28,7 @@ PackedSignature keep_rows(PackedSignature signature, std::span<const std::uint8_
 }
 
 // Returns the features in allowed rows.
-std::optional<LocalFeatures> keep_rows(std::optional<LocalFeatures> features,
+std::optional<LocalFeatures> mask_rows(std::optional<LocalFeatures> features,
                                        std::span<const std::uint8_t> allowed_rows) {
   if (features && !allowed_rows.empty()) {
     std::erase_if(features->features, [&](const LocalFeatures::Feature& feature) {
@@ -40,7 +40,7 @@ std::optional<LocalFeatures> keep_rows(std::optional<LocalFeatures> features,
 
 /// Number of best matches whose headings are averaged, and of which the nearest is listed first: a
 /// grid square has four corners.
-constexpr std::size_t nearest_references = 4;
+constexpr std::size_t nearest_reference_count = 4;
 
 /// Half width of the compass's search window: the rotation by columns is exact to one column.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
@@ -56,7 +56,7 @@ std::optional<double> estimate_heading(const VisualMemory& memory,
   std::optional<double> centre_rad;
   double sum = 0.0;
   double weights = 0.0;
-  for (const PlaceMatch& match : matches.first(std::min(nearest_references, matches.size()))) {
+  for (const PlaceMatch& match : matches.first(std::min(nearest_reference_count, matches.size()))) {
     const auto& pose = memory.info(match.view).pose;
     if (!pose || !pose->heading_rad || !match.heading_rad) continue;
     const double heading_rad = *pose->heading_rad + *match.heading_rad;
@@ -76,8 +76,8 @@ std::optional<double> estimate_heading(const VisualMemory& memory,
 // neighbours.
 void move_nearest_first(const VisualMemory& memory, Point2 position,
                         std::vector<PlaceMatch>& matches) {
-  const auto end =
-      matches.begin() + static_cast<std::ptrdiff_t>(std::min(nearest_references, matches.size()));
+  const auto end = matches.begin() +
+                   static_cast<std::ptrdiff_t>(std::min(nearest_reference_count, matches.size()));
   const auto distance_m = [&](const PlaceMatch& match) {
     const auto& pose = memory.info(match.view).pose;
     return pose ? distance(pose->position(), position) : std::numeric_limits<double>::infinity();
@@ -133,12 +133,12 @@ std::vector<PositionBounds> bound_supporters(const VisualMemory& memory,
   return join_overlapping(std::move(boxes));
 }
 
-VisualMemory join_memories(const VisualMemory& part, const VisualMemory& drawn) {
+VisualMemory join_memories(const VisualMemory& part, const VisualMemory& sampled) {
   VisualMemory all(part.shape(), part.full_scale(), part.elevations());
   std::vector<ViewId> views;
-  std::ranges::set_union(part.views(), drawn.views(), std::back_inserter(views));
+  std::ranges::set_union(part.views(), sampled.views(), std::back_inserter(views));
   for (const ViewId view : views) {
-    const VisualMemory& from = part.contains(view) ? part : drawn;
+    const VisualMemory& from = part.contains(view) ? part : sampled;
     // Meanwhile, another user may have reused the name for another view.
     if (all.find(from.info(view).name)) continue;
     all.append_with_id(view, from.packed(view), from.info(view));
@@ -151,10 +151,10 @@ VisualMemory join_memories(const VisualMemory& part, const VisualMemory& drawn) 
 void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   using T = LocaliserOptions;
   constexpr OptionTable table{
-      option<&T::top>("number of listed matches", 1, 1e6),
-      option<&T::components>("number of compared Fourier components; 0: all", 0),
-      option<&T::reranked_views>("number of views compared column by column if the most similar "
-                                 "views do not match the image; 0: keep the order of dissimilarity",
+      option<&T::top>("number of matches to list", 1, 1e6),
+      option<&T::components>("number of Fourier components to compare; 0: all", 0),
+      option<&T::reranked_views>("if the most similar views do not match the image, compare this "
+                                 "number of views column by column; 0: do not compare columns",
                                  0, 1e6),
   };
   table.visit(options, visitor);
@@ -182,29 +182,29 @@ class Localiser::Query {
  public:
   Query(const Localiser& localiser, ViewIndex& index, const PackedSignature& view,
         const SearchMask& mask, const QueryFeatures& features)
-      : own_(localiser),
+      : localiser_(localiser),
         options_(localiser.options_),
         index_(index),
         view_(view),
         mask_(mask),
         make_features_(features),
         compared_(localiser.held_.get()) {
-    const VisualMemory& memory = compared_ != nullptr ? *compared_->memory : *own_.drawn_;
+    const VisualMemory& memory = compared_ != nullptr ? *compared_->memory : *localiser_.sampled_;
     place_.components = options_.components == 0 ? memory.shape().components : options_.components;
-    if (features && own_.ranks_by_features() && options_.reranked_views > 0) {
-      features_ = features_of(Handedness::as_seen);
+    if (features && localiser_.is_ranked_by_features() && options_.reranked_views > 0) {
+      features_ = compute_features(Handedness::original);
     }
-    ranks_by_features_ = features_.has_value();
+    is_ranked_by_features_ = features_.has_value();
   }
 
   Place answer() {
     find_candidates();  // [M04 section 2.2]
     if (ranked_.empty()) return std::move(place_);
     load_compared_views();
-    weigh_columns();                    // evidence of whether the place is known
+    collect_column_evidence();          // evidence of whether the place is known
     rank_by_support();                  // places that look similar
     rank_by_features();                 // memories with far references
-    weigh_features();                   // evidence where columns are inconclusive
+    estimate_known_probability();       // evidence where columns are inconclusive
     list_matches();                     // headings by the visual compass
     if (place_.known) estimate_pose();  // [M04 footnote 1]
     return std::move(place_);
@@ -214,11 +214,11 @@ class Localiser::Query {
   /// Searches the views of smallest dissimilarity [M04 section 2.2] and ranks them by columns. If
   /// no match explains the query, searches `reranked_views` instead.
   void find_candidates() {
-    const int first = std::max(
-        {options_.top, PositionModel::candidates, ranks_by_features_ ? verified_candidates : 0});
+    const int first = std::max({options_.top, PositionModel::max_candidates,
+                                is_ranked_by_features_ ? verified_candidates : 0});
     search_and_rank(first);
     const bool is_explained = std::ranges::any_of(ranked_, [&](const RankedMatch& match) {
-      return match.columns.difference <= own_.place_model_.neighbouring;
+      return match.columns.difference <= localiser_.place_model_.neighbouring_difference;
     });
     if (!ranked_.empty() && !is_explained && options_.reranked_views > first) {
       search_and_rank(options_.reranked_views);
@@ -249,15 +249,18 @@ class Localiser::Query {
     std::vector<ViewId> views = to_ids(ranked_);
     views.insert(views.end(), mask_.excluded_views.begin(), mask_.excluded_views.end());
     if (options_.reranked_views > 0) {
-      const auto around = index_.views_within(bound_supporters(*loaded_, ranked_, own_.spacing_m_));
+      const auto around =
+          index_.views_within(bound_supporters(*loaded_, ranked_, localiser_.spacing_m_));
       views.insert(views.end(), around.begin(), around.end());
     }
-    loaded_.emplace(join_memories(index_.load(views), *own_.drawn_));
-    compared_ =
-        &loaded_views_.emplace(*loaded_, options_, std::optional(own_.spacing_m_), index_.size());
+    loaded_.emplace(join_memories(index_.load(views), *localiser_.sampled_));
+    compared_ = &loaded_views_.emplace(*loaded_, options_, std::optional(localiser_.spacing_m_),
+                                       index_.size());
   }
 
-  void weigh_columns() { place_.evidence = compared_->criterion.evidence(view_, ranked_, mask_); }
+  void collect_column_evidence() {
+    place_.evidence = compared_->criterion.evidence(view_, ranked_, mask_);
+  }
 
   void rank_by_support() {
     // The references' profiles cover all rows, so they cannot be compared with a masked query.
@@ -267,18 +270,19 @@ class Localiser::Query {
   }
 
   void rank_by_features() {
-    if (ranks_by_features_) rank_by_verified_features(*features_, own_.features_, ranked_);
+    if (is_ranked_by_features_)
+      rank_by_verified_features(*features_, localiser_.features_, ranked_);
   }
 
   /// Adds evidence of features only where columns are inconclusive (a sequential test).
-  void weigh_features() {
+  void estimate_known_probability() {
     is_known_by_columns_ = is_known();
-    if (make_features_ && own_.features_ && is_inconclusive(place_.evidence)) {
-      if (!features_) features_ = features_of(Handedness::as_seen);
-      const auto mirrored = features_of(Handedness::mirrored);
+    if (make_features_ && localiser_.features_ && is_inconclusive(place_.evidence)) {
+      if (!features_) features_ = compute_features(Handedness::original);
+      const auto mirrored = compute_features(Handedness::mirrored);
       if (features_ && mirrored) {
         place_.evidence.features = compared_->criterion.feature_evidence(
-            *features_, *mirrored, own_.features_, ranked_, mask_);
+            *features_, *mirrored, localiser_.features_, ranked_, mask_);
       }
     }
     place_.known_probability = place_probability(place_.evidence);
@@ -293,13 +297,13 @@ class Localiser::Query {
         return std::pair(r.match.dissimilarity, r.match.view);
       });
     }
-    const PackedSignature query = keep_rows(view_, mask_.allowed_rows);
+    const PackedSignature query = mask_rows(view_, mask_.allowed_rows);
     const VisualMemory& memory = *compared_->memory;
     for (const RankedMatch& r : ranked_) {
       if (static_cast<int>(place_.matches.size()) == options_.top) break;
       std::optional<CompassReading> reading;
       if (place_.components >= 2) {
-        reading = compass_near(query, keep_rows(memory.packed(r.match.view), mask_.allowed_rows),
+        reading = compass_near(query, mask_rows(memory.packed(r.match.view), mask_.allowed_rows),
                                r.columns.heading_rad, compass_window_rad, options_.components);
       }
       place_.matches.push_back({memory.info(r.match.view).name, r.match.view, r.match.dissimilarity,
@@ -310,7 +314,7 @@ class Localiser::Query {
 
   /// Interpolates between references [M04 footnote 1].
   void estimate_pose() {
-    const PositionModel& model = own_.position_model_;
+    const PositionModel& model = localiser_.position_model_;
     place_.position = interpolate_position(compared_->ranking, model, ranked_);
     // If only local features recognise the place, the position is no more precise than the
     // neighbourhood.
@@ -318,16 +322,16 @@ class Localiser::Query {
       place_.position->radius_m = std::max(*place_.position->radius_m, model.neighbourhood_m);
     }
     place_.heading_rad = estimate_heading(*compared_->memory, place_.matches);
-    if (place_.position && options_.reranked_views > 0 && !ranks_by_features_) {
+    if (place_.position && options_.reranked_views > 0 && !is_ranked_by_features_) {
       move_nearest_first(*compared_->memory, place_.position->position(), place_.matches);
     }
   }
 
-  [[nodiscard]] std::optional<LocalFeatures> features_of(Handedness handedness) const {
-    return keep_rows(make_features_(handedness), mask_.allowed_rows);
+  [[nodiscard]] std::optional<LocalFeatures> compute_features(Handedness handedness) const {
+    return mask_rows(make_features_(handedness), mask_.allowed_rows);
   }
 
-  const Localiser& own_;
+  const Localiser& localiser_;
   const LocaliserOptions& options_;
   ViewIndex& index_;
   const PackedSignature& view_;
@@ -338,7 +342,7 @@ class Localiser::Query {
   std::optional<ComparedViews> loaded_views_;
   std::vector<RankedMatch> ranked_;
   std::optional<LocalFeatures> features_;  // of the query, not mirrored
-  bool ranks_by_features_ = false;
+  bool is_ranked_by_features_ = false;
   bool is_known_by_columns_ = false;
   Place place_;
 };
@@ -361,11 +365,11 @@ Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
           position_model_.components, to_text(options_.components) + ", as requested");
 }
 
-Localiser::Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
+Localiser::Localiser(std::shared_ptr<const VisualMemory> sampled, const PlaceModel& place_model,
                      const PositionModel& position_model, const LocaliserOptions& options,
                      double spacing_m)
     : options_(options),
-      drawn_(std::move(drawn)),
+      sampled_(std::move(sampled)),
       spacing_m_(spacing_m),
       place_model_(place_model),
       position_model_(position_model) {

@@ -30,7 +30,7 @@ class Localiser {
             std::optional<double> spacing_m = std::nullopt);
   /// Uses a memory that is not held in RAM, with models learnt before. `sampled`: the views that
   /// `sample_reference_views` returns for it. Throws like the constructor above.
-  Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
+  Localiser(std::shared_ptr<const VisualMemory> sampled, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options, double spacing_m);
 
   /// Uses local features as further evidence of whether a place is known if columns are
@@ -41,7 +41,9 @@ class Localiser {
     rank_by_features_ = rank;
   }
   /// True if features sort the best matches.
-  [[nodiscard]] bool ranks_by_features() const noexcept { return features_ && rank_by_features_; }
+  [[nodiscard]] bool is_ranked_by_features() const noexcept {
+    return features_ && rank_by_features_;
+  }
 
   /// Learnt at construction, or as passed to the constructor.
   [[nodiscard]] const PlaceModel& place_model() const noexcept { return place_model_; }
@@ -75,8 +77,8 @@ class Localiser {
   // Shared by copies of the localiser. Null if the memory is not held in RAM; each query then loads
   // its own views.
   std::shared_ptr<const ComparedViews> held_;
-  std::shared_ptr<const VisualMemory> drawn_;  // null: the memory is held in RAM
-  double spacing_m_ = 0.0;                     // of the references; only if not held
+  std::shared_ptr<const VisualMemory> sampled_;  // null: the memory is held in RAM
+  double spacing_m_ = 0.0;                       // of the references; only if not held
   PlaceModel place_model_;
   PositionModel position_model_;
   FeatureSource features_;  // empty if features are not used

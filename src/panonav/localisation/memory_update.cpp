@@ -15,35 +15,35 @@ namespace {
 
 /// Smallest `known_probability` of a sure localisation; 99 % of sure ones are right
 /// (docs/decisions.md).
-constexpr double sure_probability = 0.9;
+constexpr double min_sure_probability = 0.9;
 /// Longest travel between an image and its witness, in spacings; over this length odometry errs by
 /// 0.4 spacings.
-constexpr double witness_reach_spacings = 8.0;
+constexpr double max_witness_travel_spacings = 8.0;
 /// Largest number of witnesses before an image, and after it.
 constexpr std::size_t max_witnesses = 64;
 /// A reference explains a view if their similarity is at least this share of the expected one.
-constexpr double explained_share = 0.5;
+constexpr double min_explained_share = 0.5;
 /// Shortest travel between two images, in spacings; nearer images show the same.
-constexpr double new_image_spacings = 0.25;
+constexpr double min_step_spacings = 0.25;
 
 }  // namespace
 
 void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor) {
   using T = MemoryUpdateOptions;
   constexpr OptionTable table{
-      option<&T::appearances>("largest number of views of the same place with different appearance",
-                              1, 100),
+      option<&T::appearances>(
+          "largest number of views that show the same place with different appearances", 1, 100),
       option<&T::failures>(
           "number of consecutive runs without a match after which a view is deleted", 1, 1e6),
-      option<&T::max_views>(
-          "largest number of views in the memory; 0: 'appearances' times the number of places", 0,
-          4e9),
+      option<&T::max_views>("largest number of views in the memory; 0: the option 'appearances' "
+                            "times the number of places",
+                            0, 4e9),
   };
   table.visit(options, visitor);
 }
 
 MemoryUpdate::MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model,
-                           MemoryUpdate::Use use, const MemoryUpdateOptions& options)
+                           MemoryUpdate::UseStatistics use, const MemoryUpdateOptions& options)
     : ranking_(&ranking), use_(std::move(use)), options_(options) {
   validate(options);
   if (!(use_.spacing_m > 0.0)) {
@@ -61,17 +61,17 @@ MemoryUpdate::MemoryUpdate(const ColumnRanking& ranking, const ObservationModel&
 }
 
 std::optional<PoseWitness> MemoryUpdate::Image::witness() const {
-  if (!view.pose || view.known_probability < sure_probability) return std::nullopt;
+  if (!view.pose || view.known_probability < min_sure_probability) return std::nullopt;
   return PoseWitness{view.odometry, *view.pose, view.radius_m.value_or(0.0), 0.0};
 }
 
-void MemoryUpdate::add(MemoryUpdate::AnsweredView view) {
-  const std::size_t number = count_++;
+void MemoryUpdate::add(MemoryUpdate::LocalisedView view) {
+  const std::size_t number = image_count_++;
   double travelled_m = 0.0;
   if (!images_.empty()) {
     const Image& last = images_.back();
     const double step_m = distance(last.view.odometry.position(), view.odometry.position());
-    if (step_m < new_image_spacings * use_.spacing_m) return;
+    if (step_m < min_step_spacings * use_.spacing_m) return;
     travelled_m = last.travelled_m + step_m;
   }
   images_.push_back({number, travelled_m, std::move(view)});
@@ -79,12 +79,12 @@ void MemoryUpdate::add(MemoryUpdate::AnsweredView view) {
 }
 
 void MemoryUpdate::decide_ready_images(bool all) {
-  const double reach_m = witness_reach_spacings * use_.spacing_m;
+  const double reach_m = max_witness_travel_spacings * use_.spacing_m;
   while (undecided_ < images_.size()) {
     const bool is_ready = images_.back().travelled_m > images_[undecided_].travelled_m + reach_m ||
                           images_.size() - undecided_ > max_witnesses;
     if (!all && !is_ready) return;
-    decide(undecided_);
+    decide_image(undecided_);
     ++undecided_;
     if (undecided_ > max_witnesses) {
       images_.pop_front();
@@ -93,7 +93,7 @@ void MemoryUpdate::decide_ready_images(bool all) {
   }
 }
 
-std::vector<ViewId> MemoryUpdate::views_around(Point2 position, double radius_m) const {
+std::vector<ViewId> MemoryUpdate::find_views_around(Point2 position, double radius_m) const {
   std::vector<ViewId> found;
   const VisualMemory& memory = ranking_->memory();
   for (const ViewId view : memory.views()) {
@@ -110,7 +110,7 @@ std::optional<Pose2> MemoryUpdate::find_certain_pose(std::size_t index) const {
   std::vector<PoseWitness> witnesses;
   for (std::size_t i = 0; i < images_.size(); ++i) {
     const double travelled_m = std::abs(images_[i].travelled_m - image.travelled_m);
-    if (i == index || travelled_m > witness_reach_spacings * use_.spacing_m) continue;
+    if (i == index || travelled_m > max_witness_travel_spacings * use_.spacing_m) continue;
     if (auto witness = images_[i].witness()) {
       witness->travelled_m = travelled_m;
       witnesses.push_back(*witness);
@@ -119,26 +119,26 @@ std::optional<Pose2> MemoryUpdate::find_certain_pose(std::size_t index) const {
   return find_witnessed_pose(image.view.odometry, witnesses, image.witness(), use_.spacing_m);
 }
 
-void MemoryUpdate::decide(std::size_t index) {
+void MemoryUpdate::decide_image(std::size_t index) {
   const Image& image = images_[index];
   const auto pose = find_certain_pose(index);
   if (!pose) return;
-  ++certain_;
+  ++certain_count_;
   const double half_spacing_m = 0.5 * use_.spacing_m;
   const ColumnProfiles profiles(image.view.signature, ranking_->components());
   const double max_similarity = use_.far_difference * use_.far_difference;
   bool is_explained = false;
   std::vector<ViewId> unlike;
-  for (const ViewId view : views_around(pose->position(), use_.spacing_m)) {
+  for (const ViewId view : find_views_around(pose->position(), use_.spacing_m)) {
     const ReferencePose& reference = *ranking_->memory().info(view).pose;
     const double off_m = distance(reference.position(), pose->position());
     const ColumnMatch match = match_columns(profiles, ranking_->profiles(view));
     const double turn_rad =
         angle_difference(*reference.heading_rad + match.heading_rad, pose->heading_rad);
-    const double similarity = std::abs(turn_rad) <= agreeing_heading_rad
+    const double similarity = std::abs(turn_rad) <= agreeing_heading_tolerance_rad
                                   ? max_similarity - match.difference * match.difference
                                   : 0.0;
-    if (similarity >= explained_share * max_similarity * std::exp(-off_m / use_.range_m)) {
+    if (similarity >= min_explained_share * max_similarity * std::exp(-off_m / use_.range_m)) {
       is_explained = true;
       matched_.insert(view);
     } else if (off_m <= half_spacing_m) {
@@ -167,7 +167,7 @@ bool MemoryUpdate::can_become_view(std::size_t number) const {
 
 bool MemoryUpdate::is_near_known_place() const {
   if (images_.empty()) return false;
-  const double from_m = images_.back().travelled_m - witness_reach_spacings * use_.spacing_m;
+  const double from_m = images_.back().travelled_m - max_witness_travel_spacings * use_.spacing_m;
   return std::ranges::any_of(
       images_, [&](const Image& image) { return image.travelled_m >= from_m && image.witness(); });
 }
@@ -175,8 +175,8 @@ bool MemoryUpdate::is_near_known_place() const {
 bool MemoryUpdate::is_less_useful(ViewId a, ViewId b) const {
   const auto rank = [&](ViewId view) {
     const auto found = use_.views.find(view);
-    const MemoryUpdate::Use::View use =
-        found == use_.views.end() ? MemoryUpdate::Use::View{} : found->second;
+    const MemoryUpdate::UseStatistics::View use =
+        found == use_.views.end() ? MemoryUpdate::UseStatistics::View{} : found->second;
     return std::tuple(!(use.learnt && use.matched == 0), -use.failed, use.last_run, use.matched,
                       view);
   };
@@ -186,10 +186,10 @@ bool MemoryUpdate::is_less_useful(ViewId a, ViewId b) const {
 MemoryUpdate::Changes MemoryUpdate::finish() {
   decide_ready_images(true);
   MemoryUpdate::Changes changes;
-  changes.certain = certain_;
+  changes.certain = certain_count_;
   changes.matched.assign(matched_.begin(), matched_.end());
   for (const ViewId view : matched_) {
-    MemoryUpdate::Use::View& use = use_.views[view];
+    MemoryUpdate::UseStatistics::View& use = use_.views[view];
     ++use.matched;
     use.failed = 0;
     use.last_run = use_.runs;
@@ -200,7 +200,7 @@ MemoryUpdate::Changes MemoryUpdate::finish() {
   }
   const double half_m = 0.5 * use_.spacing_m;
   const auto appearances_at = [&](Point2 position) {
-    std::vector<ViewId> views = views_around(position, half_m);
+    std::vector<ViewId> views = find_views_around(position, half_m);
     std::erase_if(views, [&](ViewId view) { return dropped.contains(view); });
     return views;
   };

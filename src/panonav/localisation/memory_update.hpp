@@ -38,7 +38,7 @@ void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor);
 class MemoryUpdate {
  public:
   /// Statistics of earlier runs, to be stored with the memory and passed to its next update.
-  struct Use {
+  struct UseStatistics {
     /// Statistics of one view.
     struct View {
       int matched = 0;      ///< runs in which the view explained the robot's view at its place
@@ -57,11 +57,11 @@ class MemoryUpdate {
     int places = 0;                ///< number of places of that memory and of those added later
     int size = 0;                  ///< number of views of the memory after the last update
     std::map<ViewId, View> views;  ///< views that have matched or failed
-    friend bool operator==(const Use&, const Use&) = default;
+    friend bool operator==(const UseStatistics&, const UseStatistics&) = default;
   };
 
   /// One image of a run, localised in the memory as it was at the beginning of the run.
-  struct AnsweredView {
+  struct LocalisedView {
     Pose2 odometry;                  ///< absolute, in its own frame
     PackedSignature signature;       ///< of the image, in the memory's shape
     double known_probability = 0.0;  ///< probability that the place is known, by the localiser
@@ -81,16 +81,16 @@ class MemoryUpdate {
     std::vector<ViewId> forgotten;  ///< removed after too many failures; ascending
     std::vector<ViewId> matched;    ///< ascending
     std::size_t certain = 0;        ///< number of images whose pose was certain
-    Use use;                        ///< to be stored; without the added views and their number
+    UseStatistics use;              ///< to be stored; without the added views and their number
   };
 
   /// `ranking` and its memory must outlive *this and not change. Throws OptionError.
-  MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model, Use use,
+  MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model, UseStatistics use,
                const MemoryUpdateOptions& options = {});
 
   /// Adds the next image; images are numbered from 0 in the order of these calls. Ignores an image
   /// taken less than a quarter of a spacing from the previous one, since it shows nothing new.
-  void add(AnsweredView view);
+  void add(LocalisedView view);
   /// True if the image may still become a view of the memory: it was chosen or is not decided yet.
   [[nodiscard]] bool can_become_view(std::size_t number) const;
   /// True if the robot was localised with certainty shortly before the last image, so that this
@@ -103,7 +103,7 @@ class MemoryUpdate {
   struct Image {
     std::size_t number = 0;
     double travelled_m = 0.0;
-    AnsweredView view;
+    LocalisedView view;
     [[nodiscard]] std::optional<PoseWitness> witness() const;
   };
   struct Chosen {
@@ -111,19 +111,19 @@ class MemoryUpdate {
     Pose2 pose;
     bool is_explained = false;
   };
-  void decide(std::size_t index);
+  void decide_image(std::size_t index);
   void decide_ready_images(bool all);
   [[nodiscard]] std::optional<Pose2> find_certain_pose(std::size_t index) const;
-  [[nodiscard]] std::vector<ViewId> views_around(Point2 position, double radius_m) const;
+  [[nodiscard]] std::vector<ViewId> find_views_around(Point2 position, double radius_m) const;
   [[nodiscard]] bool is_less_useful(ViewId a, ViewId b) const;
 
   const ColumnRanking* ranking_;
-  Use use_;
+  UseStatistics use_;
   MemoryUpdateOptions options_;
   std::deque<Image> images_;  // images before `undecided_` only serve as witnesses
   std::size_t undecided_ = 0;
-  std::size_t count_ = 0;
-  std::size_t certain_ = 0;
+  std::size_t image_count_ = 0;
+  std::size_t certain_count_ = 0;
   std::set<ViewId> matched_;
   std::set<ViewId> failed_;
   std::vector<Chosen> chosen_;

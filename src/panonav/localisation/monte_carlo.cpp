@@ -63,9 +63,9 @@ constexpr double min_margin_unit = 0.05;
 constexpr double min_view_exponent = 0.05;
 
 // When the robot is localised (docs/decisions.md, "Localised means").
-constexpr double min_localised_weight = 0.9;  ///< of the heaviest mode
-constexpr double memorised_reach = 2.0;       ///< largest distance from a reference, in spacings
-constexpr double min_inside = 0.5;            ///< probability of being in the memorised area
+constexpr double min_localised_weight = 0.9;    ///< of the heaviest mode
+constexpr double memorised_reach_factor = 2.0;  ///< largest distance from a reference, in spacings
+constexpr double min_p_inside = 0.5;            ///< probability of being in the memorised area
 
 double position_variance_m2(const ParticleModes& modes) {
   return modes.modes.front().covariance[0] + modes.modes.front().covariance[4];
@@ -85,8 +85,8 @@ struct MonteCarloLocaliser::Implementation {
   Particles particles;
   double travelled_m = 0.0;  // since the last image
   PositionError error;
-  bool knows_nothing = true;          // no image since a start without a known pose
-  double inside = p_inside_at_start;  // probability that the robot is in the memorised area
+  bool is_uninformed = true;            // no image since a start without a known pose
+  double p_inside = p_inside_at_start;  // probability that the robot is in the memorised area
   MonteCarloEstimate latest;
 
   Implementation(std::unique_ptr<ComparedViews> views, const ObservationModel& model_,
@@ -112,8 +112,8 @@ struct MonteCarloLocaliser::Implementation {
 
   void restart(bool is_known) {
     error = {};
-    inside = is_known ? 1.0 - p_leave : p_inside_at_start;
-    knows_nothing = !is_known;
+    p_inside = is_known ? 1.0 - p_leave : p_inside_at_start;
+    is_uninformed = !is_known;
     latest = {};
   }
 
@@ -121,16 +121,17 @@ struct MonteCarloLocaliser::Implementation {
   MonteCarloEstimate observe(const PackedSignature& view) {
     const bool was_localised = latest.state == LocalisationState::localised;
     latest = {};
-    likelihood.arrange(particles);
+    likelihood.reorder_by_cell(particles);
     compare_views(view, was_localised);  // [M03 section 4]: similarities at the references
     inject_by_rule(view);                // [M03 section 4.1]
     const double correlation = correlation_with_last_view();
-    const double exponent = knows_nothing ? 1.0 : std::max(min_view_exponent, 1.0 - correlation);
-    const ParticleModes before = knows_nothing ? ParticleModes{} : modes();
-    latest.log_here = weighing.weigh(particles, likelihood, exponent, bins(), random);
+    const double exponent = is_uninformed ? 1.0 : std::max(min_view_exponent, 1.0 - correlation);
+    const ParticleModes before = is_uninformed ? ParticleModes{} : modes();
+    latest.log_ratio_here =
+        weighing.update_weights(particles, likelihood, exponent, bins(), random);
     inject_explained();  // Bayes' rule for a kidnapped robot
     update_inside();     // Bayes' rule for the memorised area
-    knows_nothing = false;
+    is_uninformed = false;
     travelled_m = 0.0;
     const ParticleModes after = modes();
     latest.particles = static_cast<int>(particles.size());
@@ -164,7 +165,7 @@ struct MonteCarloLocaliser::Implementation {
     const bool is_followed = was_localised && here && anywhere && *here <= *anywhere;
     const bool is_unexplained =
         !is_followed && anywhere && *anywhere > model.neighbouring_difference;
-    if (knows_nothing || is_unexplained) {
+    if (is_uninformed || is_unexplained) {
       if (likelihood.sites().size() <= static_cast<std::size_t>(options.reranked_views)) {
         std::vector<std::uint32_t> all(likelihood.sites().size());
         std::iota(all.begin(), all.end(), 0U);
@@ -220,21 +221,22 @@ struct MonteCarloLocaliser::Implementation {
   void inject_explained() {
     if (options.injection != MonteCarloOptions::Injection::explained) return;
     ExplainedInjection injection(likelihood, sampler, model, options.compass);
-    if (!injection.find_places(particles, random)) return;
-    latest.log_there = injection.log_evidence();
+    if (!injection.collect_candidates(particles, random)) return;
+    latest.log_ratio_anywhere = injection.log_evidence();
     // A robot that was outside the memorised area may return anywhere.
     const double prior =
-        knows_nothing ? p_elsewhere_at_start : p_kidnap + (1.0 - inside) * p_return;
-    const double elsewhere = kidnap_probability(prior, latest.log_there, latest.log_here);
+        is_uninformed ? p_elsewhere_at_start : p_kidnap + (1.0 - p_inside) * p_return;
+    const double elsewhere =
+        kidnap_probability(prior, latest.log_ratio_anywhere, latest.log_ratio_here);
     latest.injected = injection.inject(particles, elsewhere, random);
   }
 
   /// Updates the probability of being inside the memorised area, by Bayes' rule: evidence is how
   /// much better than chance the view is explained.
   void update_inside() {
-    double evidence = latest.log_here;
+    double evidence = latest.log_ratio_here;
     if (options.injection == MonteCarloOptions::Injection::explained) {
-      evidence = std::max(evidence, latest.log_there + std::log(p_kidnap));
+      evidence = std::max(evidence, latest.log_ratio_anywhere + std::log(p_kidnap));
     }
     // If the particles are still spread over all places, a view similar to one of the memory is
     // evidence for being inside.
@@ -246,10 +248,10 @@ struct MonteCarloLocaliser::Implementation {
           std::max(evidence, std::min(max_log_ratio_of_difference, log_ratio_per_margin * margin) +
                                  chance_log_ratio);
     }
-    inside = inside * (1.0 - p_leave) + (1.0 - inside) * p_return;
+    p_inside = p_inside * (1.0 - p_leave) + (1.0 - p_inside) * p_return;
     const double ratio =
         std::exp(std::clamp(evidence - chance_log_ratio, -chance_log_ratio, max_log_ratio));
-    inside = inside * ratio / (inside * ratio + 1.0 - inside);
+    p_inside = p_inside * ratio / (p_inside * ratio + 1.0 - p_inside);
   }
 
   void update_error(const ParticleModes& before, const ParticleModes& after, double exponent,
@@ -271,10 +273,10 @@ struct MonteCarloLocaliser::Implementation {
       mode.spread_m = std::sqrt(mode.covariance[0] + mode.covariance[4]);
     }
     estimate.spread_m = position_spread_m(particles);
-    estimate.inside = inside;
-    estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
+    estimate.p_inside = p_inside;
+    estimate.probability = found.modes.empty() ? 0.0 : p_inside * found.modes.front().weight;
     estimate.state = LocalisationState::lost;
-    if (inside < min_inside) return;
+    if (p_inside < min_p_inside) return;
     if (!found.modes.empty() && !is_in_memorised_area(found.modes.front().mean.position())) return;
     estimate.state = LocalisationState::ambiguous;
     if (found.modes.empty()) return;
@@ -297,11 +299,11 @@ struct MonteCarloLocaliser::Implementation {
   }
 
   /// True if a reference is near enough to be compared at this position.
-  [[nodiscard]] bool is_in_memorised_area(Point2 place) const {
-    if (!likelihood.sites_near(place).empty()) return true;
-    const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
+  [[nodiscard]] bool is_in_memorised_area(Point2 position) const {
+    if (!likelihood.sites_near(position).empty()) return true;
+    const double reach_m = memorised_reach_factor * std::max(model.spacing_m, model.range_m);
     return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
-      return distance(site.position, place) <= reach_m;
+      return distance(site.position, position) <= reach_m;
     });
   }
 };
@@ -314,19 +316,23 @@ void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
       option<&T::kld_error>(
           "allowed error of the particles' distribution; a smaller error needs more particles",
           1e-4, 1),
-      option<&T::resample_below>(
-          "effective sample size below which particles are resampled, as a share of their number",
-          0, 1),
-      option<&T::compass>("weight the headings of particles with the visual compass"),
-      choice<&T::injection>("positions of new particles", "none", "explained"),
+      option<&T::resample_below>("effective sample size below which particles are resampled, as a "
+                                 "share of the number of particles",
+                                 0, 1),
+      option<&T::compass>(
+          "weight particles also by the agreement of their heading with the visual compass"),
+      choice<&T::injection>("positions at which new particles are added; explained: where the "
+                            "image fits; none: no new particles",
+                            "none", "explained"),
       option<&T::reranked_views>(
-          "number of views compared column by column if no near view matches the image", 0, 1e6),
+          "if no near view matches the image, compare this number of views column by column", 0,
+          1e6),
       option<&T::seed>("seed of all random choices", 0),
   };
   table.visit(options, visitor);
 }
 
-std::string_view name_of(LocalisationState state) {
+std::string_view to_string(LocalisationState state) {
   switch (state) {
     case LocalisationState::localised:
       return "localised";

@@ -44,7 +44,7 @@ enum class LocalisationState {
   lost,       ///< the views do not fit the memory, or odometry has left its area
 };
 /// Returns "localised", "ambiguous" or "lost".
-[[nodiscard]] std::string_view name_of(LocalisationState state);
+[[nodiscard]] std::string_view to_string(LocalisationState state);
 
 /// Estimate of the filter after an image.
 struct MonteCarloEstimate {
@@ -64,10 +64,10 @@ struct MonteCarloEstimate {
   std::optional<double> difference_here;
   std::optional<double> difference_anywhere;  ///< smallest difference to any reference
   /// Logarithm of the view's mean likelihood over the particles, relative to an unexplained view.
-  double log_here = 0.0;
-  double log_there = 0.0;  ///< the same over all places (only `Injection::explained`)
-  double inside = 0.0;     ///< probability of being in the memorised area; lost if < 0.5
-  /// Probability that the robot is at the heaviest mode: `inside` times the mode's weight. Of
+  double log_ratio_here = 0.0;
+  double log_ratio_anywhere = 0.0;  ///< the same over all places (only `Injection::explained`)
+  double p_inside = 0.0;            ///< probability of being in the memorised area; lost if < 0.5
+  /// Probability that the robot is at the heaviest mode: `p_inside` times the mode's weight. Of
   /// estimates with at least 0.9 inside the memorised area, more than 90 % are right
   /// (docs/decisions.md).
   double probability = 0.0;

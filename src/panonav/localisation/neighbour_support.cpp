@@ -17,7 +17,7 @@ namespace {
 /// Largest number of neighbours of a reference: those on a grid.
 constexpr std::size_t max_neighbours = 8;
 /// Number of views that jointly explain a query: a grid square has four corners.
-constexpr std::size_t counted_views = 4;
+constexpr std::size_t supporting_view_count = 4;
 /// Radius of the neighbourhood in spacings: more than the diagonal of a grid's square.
 constexpr double radius_spacings = 1.5;
 /// Largest ratio of an examined match's score to the best score; places that look similar differ by
@@ -98,7 +98,7 @@ std::optional<double> NeighbourSupport::supported_difference(
     fits.push_back(fit);
   }
   std::ranges::stable_sort(fits, {}, &Fit::difference);
-  if (fits.size() > counted_views) fits.resize(counted_views);
+  if (fits.size() > supporting_view_count) fits.resize(supporting_view_count);
   double sum = 0.0;
   for (std::size_t c = 0; c < ColumnProfiles::compared_columns; ++c) {
     double best = fits.front().columns[c];

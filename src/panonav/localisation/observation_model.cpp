@@ -25,13 +25,13 @@ namespace {
 
 /// Number of references compared around a position, as in the likelihood
 /// (`ViewLikelihood::sites_near`).
-constexpr std::size_t near_sites = 12;
+constexpr std::size_t near_site_count = 12;
 /// Distance in spacings beyond which views are unrelated: more than most similarity ranges.
-constexpr double far_spacings = 6.0;
+constexpr double min_far_spacings = 6.0;
 /// Number of references to which the decay of similarity is fitted: on a grid, those within four
 /// spacings.
-constexpr std::size_t fitted_sites = 48;
-constexpr double fitted_spacings = 4.0;
+constexpr std::size_t max_fitted_sites = 48;
+constexpr double max_fitted_spacings = 4.0;
 /// Largest distance of neighbours on a grid in spacings, diagonal ones included.
 constexpr double adjacent_site_spacings = 1.5;
 /// Limits of the similarity range in spacings. With a shorter range, neighbours would have nothing
@@ -45,7 +45,7 @@ constexpr double max_log_likelihood = 50.0;
 constexpr double min_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
 /// Heading width as a multiple of the median absolute error; a Gaussian error exceeds it in 1 of 23
 /// cases.
-constexpr double median_heading_errors = 3.0;
+constexpr double heading_width_per_median_error = 3.0;
 /// Largest heading error used in learning; larger ones come from chance matches or symmetric
 /// scenes.
 constexpr double max_heading_error_rad = std::numbers::pi / 4.0;
@@ -100,7 +100,7 @@ double to_similarity(const ColumnMatch& match, double far) {
 // distance bins whose mean is below far^2 / 20, which is noise.
 double fit_range(std::span<const std::pair<double, double>> distance_and_similarity,
                  double spacing_m, double far) {
-  constexpr auto bins = static_cast<std::size_t>(2.0 * fitted_spacings);
+  constexpr auto bins = static_cast<std::size_t>(2.0 * max_fitted_spacings);
   std::array<double, bins> distances{}, similarities{}, counts{};
   for (const auto& [distance_m, similarity] : distance_and_similarity) {
     const auto bin = static_cast<std::size_t>(2.0 * distance_m / spacing_m);
@@ -188,7 +188,7 @@ class LearningSample {
     // each candidate are compared too.
     const int count = static_cast<int>(sites_.size()) <= options.compared_views
                           ? static_cast<int>(sites_.size())
-                          : std::max(8, options.compared_views / static_cast<int>(near_sites));
+                          : std::max(8, options.compared_views / static_cast<int>(near_site_count));
     for (const ViewId view : sample_views(views, count, seed + 1)) {
       candidates_.push_back(number_of(view));
     }
@@ -205,7 +205,7 @@ class LearningSample {
     for (std::size_t i = 0; i < own_.size(); ++i) {
       for (const std::uint32_t c : candidates_) {
         if (distance(sites_[c].pose.position(), sites_[own_[i]].pose.position()) <
-            far_spacings * spacing_m_) {
+            min_far_spacings * spacing_m_) {
           continue;
         }
         far.push_back(left_out_[i].match(c).difference);
@@ -221,9 +221,9 @@ class LearningSample {
     std::vector<double> heading_errors;
     for (std::size_t i = 0; i < own_.size(); ++i) {
       const PosedView& here = sites_[own_[i]];
-      for (const std::uint32_t s : find_nearest_sites(sites_, own_[i], fitted_sites)) {
+      for (const std::uint32_t s : find_nearest_sites(sites_, own_[i], max_fitted_sites)) {
         const double distance_m = distance(sites_[s].pose.position(), here.pose.position());
-        if (distance_m > fitted_spacings * spacing_m_) break;
+        if (distance_m > max_fitted_spacings * spacing_m_) break;
         const ColumnMatch& match = left_out_[i].match(s);
         curve.emplace_back(distance_m, to_similarity(match, model.far_difference));
         if (distance_m <= adjacent_site_spacings * spacing_m_ && here.pose.heading_rad &&
@@ -237,16 +237,17 @@ class LearningSample {
     model.neighbouring_difference =
         model.far_difference * std::sqrt(1.0 - std::exp(-spacing_m_ / model.range_m));
     std::erase_if(heading_errors, [](double error) { return error > max_heading_error_rad; });
-    model.heading_width_rad = heading_errors.empty()
-                                  ? min_heading_width_rad
-                                  : std::max(median_heading_errors * quantile(heading_errors, 0.5),
-                                             min_heading_width_rad);
+    model.heading_width_rad =
+        heading_errors.empty()
+            ? min_heading_width_rad
+            : std::max(heading_width_per_median_error * quantile(heading_errors, 0.5),
+                       min_heading_width_rad);
   }
 
   /// Returns the squared similarity that each left-out view explains at its own place and at the
   /// candidates.
   std::vector<Explained> explain(const ObservationModel& model) {
-    near_.resize(sites_.size());
+    near_sites_.resize(sites_.size());
     std::vector<Explained> explained;
     for (std::size_t i = 0; i < own_.size(); ++i) {
       Explained view{explained_at(i, own_[i], model)};
@@ -260,13 +261,13 @@ class LearningSample {
 
  private:
   double explained_at(std::size_t i, std::uint32_t where, const ObservationModel& model) {
-    if (near_[where].empty()) {
-      near_[where] = find_nearest_sites(sites_, where, near_sites);
-      near_[where].insert(near_[where].begin(), where);
+    if (near_sites_[where].empty()) {
+      near_sites_[where] = find_nearest_sites(sites_, where, near_site_count);
+      near_sites_[where].insert(near_sites_[where].begin(), where);
     }
     double product = 0.0;
     double square = 0.0;
-    for (const std::uint32_t s : near_[where]) {
+    for (const std::uint32_t s : near_sites_[where]) {
       if (s == own_[i]) continue;
       const double expected = std::exp(
           -distance(sites_[s].pose.position(), sites_[where].pose.position()) / model.range_m);
@@ -279,10 +280,11 @@ class LearningSample {
 
   std::vector<PosedView> sites_;
   double spacing_m_ = 0.0;
-  std::vector<std::uint32_t> own_;                // sites of the left-out views
-  std::vector<LeftOutView> left_out_;             // these views
-  std::vector<std::uint32_t> candidates_;         // sites
-  std::vector<std::vector<std::uint32_t>> near_;  // each site and those around it, filled on demand
+  std::vector<std::uint32_t> own_;         // sites of the left-out views
+  std::vector<LeftOutView> left_out_;      // these views
+  std::vector<std::uint32_t> candidates_;  // sites
+  std::vector<std::vector<std::uint32_t>>
+      near_sites_;  // each site and those around it, filled on demand
 };
 
 }  // namespace

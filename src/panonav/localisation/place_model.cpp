@@ -44,14 +44,14 @@ std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId v
 
 /// Number of sampled views compared with the mirrored query: enough to estimate the standard
 /// deviation of the differences to 9 %.
-constexpr std::size_t chance_views = 64;
+constexpr std::size_t chance_view_count = 64;
 /// Number of spare sampled views, which replace excluded ones. All 80 column profiles take 0.2 MB.
-constexpr std::size_t spare_views = 16;
+constexpr std::size_t spare_view_count = 16;
 /// Number of views whose local features are compared for chance and for neighbours, 0.1 ms each.
-constexpr std::size_t feature_views = 12;
+constexpr std::size_t feature_view_count = 12;
 /// Number of best matches that are compared by the better half of their columns to find the best
 /// and the tenth best.
-constexpr std::size_t examined_matches = 16;
+constexpr std::size_t examined_match_count = 16;
 /// Distance of a Gaussian's 10 % quantile from its mean, in standard deviations.
 constexpr double decile_deviations = 1.2816;
 
@@ -90,7 +90,7 @@ std::vector<ViewId> sample_reference_views(std::span<const ViewId> views) {
   std::vector<std::pair<std::uint64_t, ViewId>> drawn;  // a heap, largest random number first
   for (const ViewId view : views) {
     const std::pair number(Random(1, view.value).next(), view);
-    if (drawn.size() == chance_views + spare_views) {
+    if (drawn.size() == chance_view_count + spare_view_count) {
       if (!(number < drawn.front())) continue;
       std::ranges::pop_heap(drawn);
       drawn.pop_back();
@@ -122,7 +122,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
   std::vector<double> between;
   std::vector<double> nearest;
   std::vector<double> nearest_of_mirrored;
-  std::vector<double> beside;
+  std::vector<double> nearest_view_difference;
   for (const ViewId view : sample) {
     const ColumnProfiles own = ranking.profiles(view);
     const ColumnProfiles reversed(mirror(memory.packed(view)), ranking.components());
@@ -137,20 +137,22 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
     }
     nearest.push_back(best);
     if (const auto neighbour = find_nearest_in_space(memory, view)) {
-      beside.push_back(match_columns(own, ranking.profiles(*neighbour)).difference);
+      nearest_view_difference.push_back(
+          match_columns(own, ranking.profiles(*neighbour)).difference);
     }
     nearest_of_mirrored.push_back(best_of_mirrored);
   }
-  model.neighbouring = quantile(nearest, 0.5);
-  model.arbitrary = quantile(between, 0.5);
-  model.mirrored = quantile(nearest_of_mirrored, 0.5);
-  double min_threshold =
-      std::min(PlaceModel::related_share * model.arbitrary, PlaceModel::unrelated_difference);
-  if (beside.size() >= static_cast<std::size_t>(PlaceModel::min_views)) {
-    model.nearest_view_difference = quantile(beside, 0.9);
+  model.neighbouring_difference = quantile(nearest, 0.5);
+  model.arbitrary_difference = quantile(between, 0.5);
+  model.mirrored_difference = quantile(nearest_of_mirrored, 0.5);
+  double min_threshold = std::min(PlaceModel::related_share * model.arbitrary_difference,
+                                  PlaceModel::unrelated_difference);
+  if (nearest_view_difference.size() >= static_cast<std::size_t>(PlaceModel::min_views)) {
+    model.nearest_view_difference = quantile(nearest_view_difference, 0.9);
     min_threshold = std::min(min_threshold, *model.nearest_view_difference);
   }
-  model.threshold = std::max(0.5 * (model.neighbouring + model.mirrored), min_threshold);
+  model.threshold =
+      std::max(0.5 * (model.neighbouring_difference + model.mirrored_difference), min_threshold);
   model.learnt = true;
   return model;
 }
@@ -164,12 +166,13 @@ std::array<double, column_term_count> column_terms(const PlaceEvidence& evidence
   constexpr int max_views = 1000;
   constexpr int max_components = 15;
   const double difference = std::max(evidence.difference, min_difference);
-  return {1.0,
-          std::log(difference / std::max(evidence.chance, min_difference)),
-          std::log(difference / std::max(evidence.tenth, min_difference)),
-          std::log(std::clamp(evidence.views, min_views, max_views)),
-          std::log(std::max(evidence.of_all_columns, large_difference) / large_difference),
-          std::log(std::clamp(evidence.components, 1, max_components) / double{max_components})};
+  return {
+      1.0,
+      std::log(difference / std::max(evidence.chance, min_difference)),
+      std::log(difference / std::max(evidence.tenth_difference, min_difference)),
+      std::log(std::clamp(evidence.views, min_views, max_views)),
+      std::log(std::max(evidence.difference_of_all_columns, large_difference) / large_difference),
+      std::log(std::clamp(evidence.components, 1, max_components) / double{max_components})};
 }
 
 double place_probability(const PlaceEvidence& evidence) noexcept {
@@ -228,7 +231,7 @@ double PlaceCriterion::chance_difference(const PackedSignature& query,
   if (std::ranges::all_of(query_profiles.values(), is_flat)) return 0.0;
   const ColumnProfiles elsewhere(mirror(query), 0, mask.allowed_rows);
   std::vector<double> by_chance;
-  for (std::size_t i = 0; i < sample_.size() && by_chance.size() < chance_views; ++i) {
+  for (std::size_t i = 0; i < sample_.size() && by_chance.size() < chance_view_count; ++i) {
     if (std::ranges::find(mask.excluded_views, sample_[i]) != mask.excluded_views.end()) continue;
     const ColumnProfiles reference =
         mask.allowed_rows.empty() ? profiles_[i] : profiles(sample_[i], mask.allowed_rows);
@@ -255,7 +258,7 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
   std::vector<const RankedMatch*> best(matches.size());
   std::ranges::transform(matches, best.begin(), [](const RankedMatch& match) { return &match; });
   const auto end =
-      best.begin() + static_cast<std::ptrdiff_t>(std::min(examined_matches, best.size()));
+      best.begin() + static_cast<std::ptrdiff_t>(std::min(examined_match_count, best.size()));
   std::ranges::partial_sort(best.begin(), end, best.end(), {}, [](const RankedMatch* match) {
     return std::pair(match->columns.difference, match->match.view);
   });
@@ -264,11 +267,11 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
   for (auto match = best.begin(); match != end; ++match) {
     const ColumnProfiles reference = profiles((*match)->match.view, mask.allowed_rows);
     const ColumnMatch turned = match_columns(query_profiles, reference);
-    found.of_all_columns = std::min(found.of_all_columns, turned.difference);
+    found.difference_of_all_columns = std::min(found.difference_of_all_columns, turned.difference);
     differences.push_back(better_half_difference(query_profiles, reference, turned.heading_rad));
   }
   found.difference = *std::ranges::min_element(differences);
-  found.tenth = tenth_smallest(std::move(differences));
+  found.tenth_difference = tenth_smallest(std::move(differences));
   found.chance = chance_difference(query, query_profiles, mask);
   return found;
 }
@@ -285,7 +288,7 @@ std::optional<PlaceEvidence::Features> PlaceCriterion::feature_evidence(
     const auto there = features(view);
     if (!there) continue;
     by_chance.push_back(match_features(mirrored_query, *there).verified);
-    if (by_chance.size() == feature_views) break;
+    if (by_chance.size() == feature_view_count) break;
   }
   if (by_chance.empty()) return std::nullopt;
   PlaceEvidence::Features found{.chance = upper_median(std::move(by_chance)),
@@ -305,7 +308,7 @@ std::optional<PlaceEvidence::Features> PlaceCriterion::feature_evidence(
   }
   // A memory of one view has no neighbours.
   if (candidates.size() < 2) found.neighbour = found.verified;
-  for (std::size_t i = 0; i < std::min(candidates.size(), feature_views + 1); ++i) {
+  for (std::size_t i = 0; i < std::min(candidates.size(), feature_view_count + 1); ++i) {
     if (i == best) continue;
     const int shared = match_features(candidates[best], candidates[i], found.neighbour).verified;
     found.neighbour = std::max(found.neighbour, shared);
@@ -323,11 +326,11 @@ PlaceEvidence PlaceCriterion::evidence_for_first(
   for (const PackedSignature& candidate : candidates) {
     const ColumnProfiles reference(candidate);
     const ColumnMatch turned = match_columns(query_profiles, reference);
-    if (differences.empty()) found.of_all_columns = std::min(1.0, turned.difference);
+    if (differences.empty()) found.difference_of_all_columns = std::min(1.0, turned.difference);
     differences.push_back(better_half_difference(query_profiles, reference, turned.heading_rad));
   }
   found.difference = differences.front();
-  found.tenth = tenth_smallest(std::move(differences));
+  found.tenth_difference = tenth_smallest(std::move(differences));
   found.chance = chance_difference(query, query_profiles, {});
   return found;
 }

@@ -28,12 +28,13 @@ struct PlaceModel {
   static constexpr int min_views = 8;
 
   double threshold =
-      unlearnt_threshold;     ///< largest difference at which a reference explains a view
-  bool learnt = false;        ///< false if there were fewer than `min_views` views
-  int sampled_views = 0;      ///< number of views from which it was learnt
-  double neighbouring = 0.0;  ///< median difference between a view and the most similar other view
-  double arbitrary = 0.0;     ///< median difference between two views
-  double mirrored = 0.0;      ///< median difference of a mirrored view to its best match
+      unlearnt_threshold;  ///< largest difference at which a reference explains a view
+  bool learnt = false;     ///< false if there were fewer than `min_views` views
+  int sampled_views = 0;   ///< number of views from which it was learnt
+  double neighbouring_difference =
+      0.0;  ///< median difference between a view and the most similar other view
+  double arbitrary_difference = 0.0;  ///< median difference between two views
+  double mirrored_difference = 0.0;   ///< median difference of a mirrored view to its best match
   /// 90 % quantile of the difference between a view and the one nearest in space; nullopt if fewer
   /// than `min_views` of the sampled views have a position.
   std::optional<double> nearest_view_difference;

@@ -20,45 +20,47 @@ namespace {
 /// Candidates for the radius of the neighbourhood, in spacings (rings of a grid), and for the
 /// variogram's exponent. An exponent of 1 is exact if signatures change with position as a random
 /// walk, 2 if they change linearly; but 2 has no unique solution.
-constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
-constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
+constexpr std::array<double, 6> neighbourhood_choices = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
+constexpr std::array<double, 3> exponent_choices = {1.0, 1.25, 1.5};
 /// Share of the true positions within the radius. Half of the others may be due to lookalike
 /// places.
 constexpr double coverage = 0.95;
 constexpr double max_wrong_share = 0.5 * (1.0 - coverage);
-/// Number of matches searched for a left-out view: `candidates` remain after its best matches at up
-/// to 48 other places have been removed.
-constexpr int searched_matches = 4 * PositionModel::candidates;
+/// Number of matches searched for a left-out view: `max_candidates` remain after its best matches
+/// at up to 48 other places have been removed.
+constexpr int searched_match_count = 4 * PositionModel::max_candidates;
 /// Largest distance between a view and its best match, in spacings, at which the match is right: a
 /// grid's neighbours are nearer.
-constexpr double own_place_spacings = 2.0;
+constexpr double max_right_match_spacings = 2.0;
 /// Smallest unit of squared differences; avoids a division by 0 if all views are identical.
 constexpr double min_difference_unit = 1e-4;
 
 /// Views left out of the memory in turn, and the views that resemble them.
 struct LeftOutViews {
-  std::vector<Point2> truths;
+  std::vector<Point2> true_positions;
   /// All matches of the search, lookalikes included. The interpolation is learnt from these, since
   /// they matter if there are few views.
   std::vector<ResemblingViews> found;
   /// Matches without lookalikes, ranked as for a query; the radius is learnt from these.
   std::vector<ResemblingViews> answered;
 
-  [[nodiscard]] std::size_t size() const { return truths.size(); }
+  [[nodiscard]] std::size_t size() const { return true_positions.size(); }
   [[nodiscard]] bool is_found_near(std::size_t i, double spacing_m) const {
-    return distance(found[i].positions[0], truths[i]) <= own_place_spacings * spacing_m;
+    return distance(found[i].positions[0], true_positions[i]) <=
+           max_right_match_spacings * spacing_m;
   }
   [[nodiscard]] bool is_answered_near(std::size_t i, double spacing_m) const {
-    return distance(answered[i].positions[0], truths[i]) <= own_place_spacings * spacing_m;
+    return distance(answered[i].positions[0], true_positions[i]) <=
+           max_right_match_spacings * spacing_m;
   }
 };
 
 // Returns the best match at each place farther than `elsewhere_spacings` from `truth` and from the
 // others: the view's lookalikes.
-std::vector<ViewId> find_doubles(const VisualMemory& memory, Point2 truth,
-                                 std::span<const RankedMatch> ranked, double spacing_m) {
+std::vector<ViewId> find_lookalikes(const VisualMemory& memory, Point2 truth,
+                                    std::span<const RankedMatch> ranked, double spacing_m) {
   std::vector<Point2> places{truth};
-  std::vector<ViewId> doubles;
+  std::vector<ViewId> lookalikes;
   for (const RankedMatch& match : ranked) {
     const auto& pose = memory.info(match.match.view).pose;
     if (!pose || std::ranges::any_of(places, [&](Point2 place) {
@@ -67,26 +69,26 @@ std::vector<ViewId> find_doubles(const VisualMemory& memory, Point2 truth,
       continue;
     }
     places.push_back(pose->position());
-    doubles.push_back(match.match.view);
+    lookalikes.push_back(match.match.view);
   }
-  return doubles;
+  return lookalikes;
 }
 
-void leave_out(const ColumnRanking& ranking, const NeighbourSupport& support, ViewId view,
-               double spacing_m, LeftOutViews& left_out) {
+void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& support, ViewId view,
+                       double spacing_m, LeftOutViews& left_out) {
   const VisualMemory& memory = ranking.memory();
   const PackedSignature own = memory.packed(view);
   const Point2 truth = memory.info(view).pose->position();
   std::vector<ViewId> excluded{view};
   const SearchResult found =
-      memory.search(own, {.top = searched_matches, .components = ranking.components()},
+      memory.search(own, {.top = searched_match_count, .components = ranking.components()},
                     {.excluded_views = excluded, .allowed_rows = {}});
   std::vector<RankedMatch> ranked = ranking.rank(own, found.matches);
   const auto nearest =
       std::span(found.matches)
-          .first(std::min<std::size_t>(found.matches.size(), PositionModel::candidates));
+          .first(std::min<std::size_t>(found.matches.size(), PositionModel::max_candidates));
   const std::vector<RankedMatch> all = ranking.rank(own, nearest);
-  for (const ViewId other : find_doubles(memory, truth, ranked, spacing_m)) {
+  for (const ViewId other : find_lookalikes(memory, truth, ranked, spacing_m)) {
     excluded.push_back(other);
     std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
   }
@@ -99,20 +101,21 @@ void leave_out(const ColumnRanking& ranking, const NeighbourSupport& support, Vi
   if (!begins_posed(ranked) || !begins_posed(all)) return;
   left_out.found.push_back(compare_with_each_other(ranking, all));
   left_out.answered.push_back(compare_with_each_other(ranking, ranked));
-  left_out.truths.push_back(truth);
+  left_out.true_positions.push_back(truth);
 }
 
 LeftOutViews leave_out_in_turn(const ColumnRanking& ranking, std::span<const ViewId> views,
                                double spacing_m) {
   const NeighbourSupport support(ranking);
   LeftOutViews left_out;
-  for (const ViewId view : views) leave_out(ranking, support, view, spacing_m, left_out);
+  for (const ViewId view : views) add_left_out_view(ranking, support, view, spacing_m, left_out);
   return left_out;
 }
 
 double learn_difference_unit(const LeftOutViews& left_out) {
   std::vector<double> differences;
-  for (const ResemblingViews& near : left_out.found) differences.push_back(near.to_query(0));
+  for (const ResemblingViews& near : left_out.found)
+    differences.push_back(near.squared_query_differences(0));
   return std::max(min_difference_unit, quantile(differences, 0.5));
 }
 
@@ -121,15 +124,15 @@ double learn_difference_unit(const LeftOutViews& left_out) {
 // neighbourhood, because averaging over many wrong places lowers their error.
 bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
   double best_sum_m = std::numeric_limits<double>::infinity();
-  for (const double spacings : neighbourhoods) {
-    for (const double exponent : exponents) {
+  for (const double spacings : neighbourhood_choices) {
+    for (const double exponent : exponent_choices) {
       const double neighbourhood_m = spacings * model.spacing_m;
       double sum_m = 0.0;
       for (std::size_t i = 0; i < left_out.size(); ++i) {
         if (!left_out.is_found_near(i, model.spacing_m)) continue;
         const KrigedPosition kriged =
             krige(left_out.found[i], neighbourhood_m, exponent, model.difference_unit);
-        sum_m += distance(kriged.position, left_out.truths[i]);
+        sum_m += distance(kriged.position, left_out.true_positions[i]);
       }
       if (sum_m < best_sum_m) {
         best_sum_m = sum_m;
@@ -152,7 +155,7 @@ InterpolationErrors interpolate_all(const LeftOutViews& left_out, const Position
   for (std::size_t i = 0; i < left_out.size(); ++i) {
     const KrigedPosition kriged =
         krige(left_out.answered[i], model.neighbourhood_m, model.exponent, model.difference_unit);
-    result.errors_m.push_back(distance(kriged.position, left_out.truths[i]));
+    result.errors_m.push_back(distance(kriged.position, left_out.true_positions[i]));
     result.variances.push_back(kriged.variance);
   }
   return result;

@@ -16,7 +16,7 @@ struct PositionModel {
   static constexpr int min_views = 8;
   /// Number of best matches considered in an interpolation, before those far from the best one are
   /// dropped. More would change positions by less than their error.
-  static constexpr int candidates = 16;
+  static constexpr int max_candidates = 16;
 
   /// False if there were fewer than `min_views` posed views; the position is then that of the best
   /// match.

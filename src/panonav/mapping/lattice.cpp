@@ -48,11 +48,12 @@ class MeasuredPairs {
     }
     const std::size_t before = springs_.size();
     springs_.resize(before + added.size());
-    executor_.for_chunks(added.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
-      for (std::size_t i = begin; i < end; ++i) {
-        springs_[before + i] = views_.measure(added[i], window(added[i]));
-      }
-    });
+    executor_.for_each_chunk(added.size(), 16,
+                             [&](std::size_t begin, std::size_t end, std::size_t) {
+                               for (std::size_t i = begin; i < end; ++i) {
+                                 springs_[before + i] = views_.measure(added[i], window(added[i]));
+                               }
+                             });
     std::ranges::sort(springs_, {}, [](const auto& s) { return NodePair{s.a, s.b}; });
   }
   void clear() {
@@ -71,10 +72,10 @@ class Arranger {
  public:
   Arranger(const VisualMemory& memory, const LatticeOptions& options,
            std::span<const CoarseMotion> motion, Executor& executor,
-           const LatticeStepCallback& watch)
+           const LatticeStepCallback& step_callback)
       : options_(options),
         executor_(executor),
-        watch_(watch),
+        step_callback_(step_callback),
         views_(memory, options),
         motions_(memory, motion),
         measured_(views_, executor) {
@@ -101,7 +102,7 @@ class Arranger {
         relax();  // [M04 section 3.2]
       }
       rescale_layout();
-      if (watch_) watch_(layout_.poses, layout_.components);
+      if (step_callback_) step_callback_(layout_.poses, layout_.components);
     }
     finish();
     return std::move(lattice_);
@@ -167,7 +168,7 @@ class Arranger {
   void grow_from_most_certain() {
     measure(proposals_);
     const double unit = lattice_.errors.phase_unit;
-    auto grown = grow_components(size(), measured_.springs(), unit, layout_, watch_);
+    auto grown = grow_components(size(), measured_.springs(), unit, layout_, step_callback_);
     layout_ = std::move(grown.start);
     proposals_ = std::move(grown.proposals);
     lattice_.energy = grown.energy;
@@ -246,7 +247,7 @@ class Arranger {
     const auto motion_terms = motions_.spring_terms();
     terms.insert(terms.end(), motion_terms.begin(), motion_terms.end());
     const auto solution = solve_lattice(terms, layout_.poses, {}, [this] {
-      if (watch_) watch_(layout_.poses, layout_.components);
+      if (step_callback_) step_callback_(layout_.poses, layout_.components);
     });
     for (std::size_t s = 0; s < lattice_.springs.size(); ++s) {
       lattice_.springs[s].weight = solution.weights[s];
@@ -300,7 +301,7 @@ class Arranger {
 
   LatticeOptions options_;
   Executor& executor_;
-  const LatticeStepCallback& watch_;
+  const LatticeStepCallback& step_callback_;
   SpringViews views_;
   NodeMotions motions_;
   bool by_motion_ = false;  // motion connects all views
@@ -318,11 +319,13 @@ void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::neighbours>("number of most similar views to which each view is connected", 1,
                              1000),
-      option<&T::components>("number of compared Fourier components; 0: all", 0),
-      option<&T::phases>("compute directions and headings from the phases"),
+      option<&T::components>("number of Fourier components to compare; 0: all", 0),
+      option<&T::phases>(
+          "compute directions and headings from the phases of the Fourier components"),
       option<&T::landmarks>("number of views in the initial arrangement", 3, 2000),
-      option<&T::rounds>("number of times that the springs are computed again from the arrangement",
-                         1, 20),
+      option<&T::rounds>(
+          "number of times that the springs between views are recomputed from the arrangement", 1,
+          20),
   };
   table.visit(options, visitor);
 }
@@ -356,9 +359,9 @@ CoarseMotion make_coarse_motion(ViewId from, ViewId to, const Pose2& step,
 
 Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                 std::span<const CoarseMotion> motion, Executor& executor,
-                const LatticeStepCallback& watch) {
+                const LatticeStepCallback& step_callback) {
   validate(options);
-  return Arranger(memory, options, motion, executor, watch).arrange();
+  return Arranger(memory, options, motion, executor, step_callback).arrange();
 }
 
 TopologicalMap to_topological_map(const Lattice& lattice) {

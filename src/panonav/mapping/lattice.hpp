@@ -118,7 +118,7 @@ using LatticeStepCallback =
 /// OptionError; ContractError on a motion with an unknown view. Same bits on any number of threads.
 [[nodiscard]] Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                               std::span<const CoarseMotion> motion, Executor& executor,
-                              const LatticeStepCallback& watch = {});
+                              const LatticeStepCallback& step_callback = {});
 
 /// Adds the views of the memory that the lattice does not have, one after the other. A view gets
 /// springs to the most similar views of the lattice. Each spring proposes a pose; the one with the

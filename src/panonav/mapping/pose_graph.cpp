@@ -220,7 +220,7 @@ void visit_options(PoseGraphOptions& options, OptionVisitor& visitor) {
   using T = PoseGraphOptions;
   constexpr OptionTable table{
       option<&T::max_iterations>("largest number of steps of the solver", 1, 1000),
-      option<&T::settled_m>("largest change of a position at which the solver stops", above(0),
+      option<&T::settled_m>("the solver stops when no position changes by more than this", above(0),
                             1e6),
       option<&T::doubt_deviations>(
           "error of a loop closure above which its weight decreases, in standard deviations",

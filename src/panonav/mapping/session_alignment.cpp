@@ -221,11 +221,12 @@ void visit_options(SessionAlignmentOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::min_places>("number of common places that must agree before two maps are joined",
                              1, 1000000),
-      option<&T::min_confirmed>("smallest share of matching places where both maps overlap", 0, 1),
-      option<&T::distinctness>(
-          "smallest ratio of agreeing places between the best and the second best alignment", 1,
-          1e6),
-      option<&T::max_drift>("assumed drift of both maps per metre between two places", 0, 100),
+      option<&T::min_confirmed>(
+          "smallest share of places that must match where the two maps overlap", 0, 1),
+      option<&T::distinctness>("smallest ratio of the number of agreeing places of the best "
+                               "alignment to that of the second best alignment",
+                               1, 1e6),
+      option<&T::max_drift>("assumed drift of each map per metre between two places", 0, 100),
   };
   table.visit(options, visitor);
 }

@@ -56,16 +56,18 @@ ViewId find_representative(const Representatives& kept, ViewId view) {
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
   using T = SparseMemoryOptions;
   constexpr OptionTable table{
-      option<&T::max_difference>("largest difference between a redundant view and a kept view", 0,
-                                 1),
-      option<&T::reach_m>(
-          "largest distance between a redundant view and a kept view if positions are known",
-          above(0), 1e6),
-      option<&T::reach_links>("largest number of links between a redundant view and a kept view if "
-                              "positions are unknown",
-                              0, 1000),
+      option<&T::max_difference>(
+          "A view is redundant if its difference from a kept view is at most this", 0, 1),
+      option<&T::reach_m>("A view is redundant only if that kept view is within this distance; "
+                          "used if positions are known",
+                          above(0), 1e6),
+      option<&T::reach_links>(
+          "A view is redundant only if that kept view is within this number of links; "
+          "used if positions are unknown",
+          0, 1000),
       option<&T::outdated_within_m>(
-          "a view is outdated if a newer view is within this distance; 0: never", 0, 1e6),
+          "Also delete a view as outdated if a newer view is within this distance; 0: never", 0,
+          1e6),
   };
   table.visit(options, visitor);
 }

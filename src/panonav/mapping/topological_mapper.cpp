@@ -58,17 +58,18 @@ double squared(double value) {
 void visit_options(MappingOptions& options, OptionVisitor& visitor) {
   using T = MappingOptions;
   constexpr OptionTable table{
-      option<&T::capture_difference>(
-          "difference from the last stored view above which a view is stored; 0: store every view",
-          0, 1),
+      option<&T::capture_difference>("store an image as a view if it differs from the last stored "
+                                     "view by more than this; 0: store every image",
+                                     0, 1),
       option<&T::close_loops>("search for loop closures"),
       option<&T::bridge_m>(
           "assumed length of a step that cannot be computed; 0: start a new component", 0, 1e6),
-      option<&T::wheels>("use the odometry for steps, corrected by the rotation from the images"),
-      option<&T::step_deviation>("standard deviation of positions from images, per metre", above(0),
-                                 10),
-      option<&T::turn_deviation>("standard deviation of headings from images (rad), per metre",
-                                 above(0), 10),
+      option<&T::wheels>(
+          "take the steps from the odometry, and correct their rotations with the images"),
+      option<&T::step_deviation>(
+          "standard deviation of the positions computed from images, per metre", above(0), 10),
+      option<&T::turn_deviation>(
+          "standard deviation of the headings computed from images (rad), per metre", above(0), 10),
   };
   table.visit(options, visitor);
 }

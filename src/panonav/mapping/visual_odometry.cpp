@@ -71,18 +71,21 @@ std::optional<VisualStep> home_vector_step(const OdometryView& before, const Odo
 void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
   using T = VisualOdometryOptions;
   constexpr OptionTable table{
-      choice<&T::rule>("method for the motion between two views", "published", "home_vector"),
+      choice<&T::rule>("method to compute the motion between two views", "published",
+                       "home_vector"),
       option<&T::scale_m>("metres per unit of length of the visual odometry", above(0), 1e6),
-      option<&T::camera_height_m>(
-          "height of the camera above level ground; it is used to compute lengths; 0: unknown", 0,
-          100),
-      option<&T::distance_components>(
-          "number of components for the distance in the published rule (k1); 0: all", 0, 4096),
-      option<&T::turn_components>(
-          "number of components for the rotation in the published rule (k2); 0: all", 0, 4096),
+      option<&T::camera_height_m>("height of the camera above level ground, from which lengths in "
+                                  "metres are computed; 0: unknown",
+                                  0, 100),
+      option<&T::distance_components>("number of Fourier components from which the published rule "
+                                      "computes the distance (k1); 0: all",
+                                      0, 4096),
+      option<&T::turn_components>("number of Fourier components from which the published rule "
+                                  "computes the rotation (k2); 0: all",
+                                  0, 4096),
       option<&T::iterations>("number of refinements of the home vector", 0, 20),
-      option<&T::nearer_side>(
-          "correct rotations for objects that are nearer on one side of the path"),
+      option<&T::nearer_side>("correct the error of rotations that is caused by nearer objects on "
+                              "one side of the path"),
       option<&T::max_residual>(
           "largest share of the views' energy that the computed step does not explain", 0, 1),
   };

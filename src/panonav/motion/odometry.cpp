@@ -8,19 +8,21 @@ namespace panonav {
 void visit_options(OdometryNoise& options, OptionVisitor& visitor) {
   using T = OdometryNoise;
   constexpr OptionTable table{
-      choice<&T::drive>("drive of the robot", "differential", "holonomic"),
-      option<&T::translation_from_translation>("standard deviation of the distance after 1 m, in m",
-                                               0, 10),
+      choice<&T::drive>("type of drive of the robot", "differential", "holonomic"),
+      option<&T::translation_from_translation>(
+          "standard deviation of the measured distance after 1 m, in m", 0, 10),
       option<&T::translation_from_rotation>(
-          "standard deviation of the distance after a rotation by 1 rad, in m", 0, 10),
-      option<&T::rotation_from_translation>("standard deviation of the heading after 1 m, in rad",
-                                            0, 10),
+          "standard deviation of the measured distance after a rotation by 1 rad, in m", 0, 10),
+      option<&T::rotation_from_translation>(
+          "standard deviation of the measured heading after 1 m, in rad", 0, 10),
       option<&T::rotation_from_rotation>(
-          "standard deviation of the heading after a rotation by 1 rad, in rad", 0, 10),
-      option<&T::translation_scale_error>(
-          "standard deviation of the constant relative error of distances in a run", 0, 10),
-      option<&T::rotation_scale_error>(
-          "standard deviation of the constant relative error of rotations in a run", 0, 10),
+          "standard deviation of the measured heading after a rotation by 1 rad, in rad", 0, 10),
+      option<&T::translation_scale_error>("standard deviation of the relative error of distances; "
+                                          "the error is constant during a run",
+                                          0, 10),
+      option<&T::rotation_scale_error>("standard deviation of the relative error of rotations; the "
+                                       "error is constant during a run",
+                                       0, 10),
   };
   table.visit(options, visitor);
 }

@@ -12,12 +12,12 @@ namespace panonav {
 void visit_options(BaseOptions& options, OptionVisitor& visitor) {
   using T = BaseOptions;
   constexpr OptionTable table{
-      choice<&T::drive>("drive of the robot", "differential", "holonomic"),
+      choice<&T::drive>("type of drive of the robot", "differential", "holonomic"),
       option<&T::speed_m_s>("largest speed", 0.001, 100),
       option<&T::turn_rad_s>("largest rotation speed", 0.001, 100),
       option<&T::period_s>("time for which a command is valid", 0.001, 10),
-      option<&T::on_spot_rad>("largest angle that a differential drive steers while driving; for "
-                              "larger angles it rotates on the spot",
+      option<&T::on_spot_rad>("largest change of heading that a robot with differential drive "
+                              "makes while driving; for larger changes it rotates on the spot",
                               above(0), std::numbers::pi / 2),
   };
   table.visit(options, visitor);

@@ -42,7 +42,7 @@ class AreaPlanner {
   /// Made at construction, or as passed to the constructor.
   [[nodiscard]] const SubAreas& areas() const noexcept { return areas_; }
   /// Number of gates used, over all borders.
-  [[nodiscard]] std::size_t used_gates() const noexcept;
+  [[nodiscard]] std::size_t used_gate_count() const noexcept;
 
   /// Throws ContractError when the view is not in the graph.
   void set_goal(ViewId goal);
@@ -57,7 +57,7 @@ class AreaPlanner {
   /// True if the edge of this number is excluded from plans.
   [[nodiscard]] bool is_blocked(std::size_t edge) const { return blocked_.at(edge) != 0; }
   /// Number of blocked edges.
-  [[nodiscard]] std::size_t blocked_edges() const noexcept;
+  [[nodiscard]] std::size_t blocked_edge_count() const noexcept;
 
   /// Returns the guides of the area's nodes towards the goal, in the order of the nodes. Without a
   /// goal, all are unreachable. Throws ContractError if there is no such area.
@@ -85,10 +85,10 @@ class AreaPlanner {
   [[nodiscard]] std::pair<std::size_t, std::size_t> ends_of(std::size_t edge,
                                                             std::size_t area) const;
   [[nodiscard]] std::vector<Guide> search_from(std::size_t area, std::size_t node) const;
-  [[nodiscard]] std::optional<std::size_t> find_end_beyond(std::size_t area,
-                                                           const NavigationGraph::Exit& exit) const;
+  [[nodiscard]] std::optional<std::size_t> find_gate_end_beyond(
+      std::size_t area, const NavigationGraph::Exit& exit) const;
   void choose_gates(Border& border) const;
-  void find_paths(std::size_t area);
+  void compute_gate_paths(std::size_t area);
   void plan_over_areas();
 
   NavigationGraph graph_;
@@ -96,7 +96,7 @@ class AreaPlanner {
   PlannerOptions options_;
   std::vector<std::uint8_t> blocked_;  // by edge
   std::vector<Border> borders_;
-  std::vector<GateEnds> ends_;  // by area
+  std::vector<GateEnds> gate_ends_;  // by area
   std::optional<std::size_t> goal_;
 };
 

@@ -16,7 +16,7 @@ void visit_options(FieldOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::links_ahead>("number of edges ahead that are used to compute a direction", 1, 100),
       option<&T::max_bend_rad>(
-          "bend of the path after which edges are not used to compute a direction", 0,
+          "bend of the path beyond which edges are not used to compute a direction", 0,
           std::numbers::pi),
   };
   table.visit(options, visitor);
@@ -30,13 +30,13 @@ std::vector<Guide> search_area(const NavigationGraph& graph, const SubAreas& are
           static_cast<double>(blocked.size()), "0 or the number of edges");
   const std::vector<std::size_t>& nodes = areas.nodes[area];
   std::vector<Guide> guides(nodes.size());
-  for (std::size_t place = 0; place < nodes.size(); ++place) guides[place].next = nodes[place];
+  for (std::size_t index = 0; index < nodes.size(); ++index) guides[index].next = nodes[index];
   using Open = std::pair<double, std::size_t>;
   std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
   for (const SearchRoot& root : roots) {
     require(root.node < graph.size() && areas.area_of[root.node] == area, "node of a root",
             static_cast<double>(root.node), "a node of the area");
-    Guide& guide = guides[areas.place_of[root.node]];
+    Guide& guide = guides[areas.index_in_area[root.node]];
     if (!(root.path_length < guide.path_length)) continue;
     guide = {root.path_length, root.next, root.edge, std::nullopt};
     open.emplace(root.path_length, root.node);
@@ -44,12 +44,12 @@ std::vector<Guide> search_area(const NavigationGraph& graph, const SubAreas& are
   while (!open.empty()) {
     const auto [length, node] = open.top();
     open.pop();
-    if (length > guides[areas.place_of[node]].path_length) continue;
+    if (length > guides[areas.index_in_area[node]].path_length) continue;
     for (const NavigationGraph::Exit& exit : graph.exits(node)) {
       if (areas.area_of[exit.node] != area) continue;
       if (!blocked.empty() && blocked[exit.edge] != 0) continue;
       const double longer = length + graph.edges()[exit.edge].length;
-      Guide& guide = guides[areas.place_of[exit.node]];
+      Guide& guide = guides[areas.index_in_area[exit.node]];
       if (longer < guide.path_length) {
         guide = {longer, node, exit.edge, std::nullopt};
         open.emplace(longer, exit.node);
@@ -62,15 +62,15 @@ std::vector<Guide> search_area(const NavigationGraph& graph, const SubAreas& are
 namespace {
 
 // Returns the mean direction to the next nodes, up to the first bend larger than `max_bend_rad`.
-std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas& areas,
-                                   std::size_t node, const FieldOptions& options,
-                                   std::span<const Guide> guides) {
+std::optional<double> compute_direction(const NavigationGraph& graph, const SubAreas& areas,
+                                        std::size_t node, const FieldOptions& options,
+                                        std::span<const Guide> guides) {
   std::vector<double> directions;
   Pose2 node_from_here;
   std::optional<double> first;
   std::size_t here = node;
   for (int i = 0; i < options.links_ahead && areas.area_of[here] == areas.area_of[node]; ++i) {
-    const Guide& guide = guides[areas.place_of[here]];
+    const Guide& guide = guides[areas.index_in_area[here]];
     if (!guide.is_reachable() || guide.next == here) break;
     const auto motion = graph.motion_from(here, guide.edge);
     if (!motion) break;
@@ -98,9 +98,9 @@ void set_directions(const NavigationGraph& graph, const SubAreas& areas, std::si
   require(area < areas.nodes.size(), "area", static_cast<double>(area), "one of the areas");
   require(guides.size() == areas.nodes[area].size(), "number of guides",
           static_cast<double>(guides.size()), "the number of nodes of the area");
-  for (std::size_t place = 0; place < guides.size(); ++place) {
-    guides[place].direction_rad =
-        direction_at(graph, areas, areas.nodes[area][place], options, guides);
+  for (std::size_t index = 0; index < guides.size(); ++index) {
+    guides[index].direction_rad =
+        compute_direction(graph, areas, areas.nodes[area][index], options, guides);
   }
 }
 

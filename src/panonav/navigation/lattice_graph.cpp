@@ -21,23 +21,23 @@ struct Spring {
   std::optional<Pose2> motion;  // a_from_b by the phases, in units of R
   double length = 0.0;          // in the arrangement
   double weight = 0.0;
-  bool one_component = false;
+  bool is_within_component = false;
   int support = 0;  // number of third views that confirm it
 };
 
 /// Largest disagreement between a spring's motion and the chain of two motions over a third view:
 /// 20 degrees, and this share of the motion's length.
 constexpr double max_rotation_error_rad = 0.35;
-constexpr double max_position_error = 0.4;
+constexpr double max_position_error_share = 0.4;
 /// Largest length of springs that become edges, in spacings. The spacing is estimated a tenth too
 /// small (as the minimum of several noisy distances), so this means two spacings: on a square grid,
 /// distances between views are 1, 1.41 and 2 spacings.
-constexpr double max_spacings = 2.3;
+constexpr double max_edge_spacings = 2.3;
 /// Limits for springs that were rejected, perhaps only because the arrangement is distorted: they
 /// become edges if they are as short as springs to nearest views and confirmed by this number of
 /// third views.
-constexpr double max_spacings_of_rejected = 1.5;
-constexpr int min_support_of_rejected = 3;
+constexpr double max_rejected_edge_spacings = 1.5;
+constexpr int min_rejected_edge_support = 3;
 /// Smallest share of neighbours that the ends of an edge have in common. On an open square grid
 /// with edges up to two spacings, the share is a half for nearest neighbours and a quarter for
 /// views two spacings apart; one neighbour may be missing.
@@ -66,8 +66,9 @@ void count_support(std::size_t views, std::vector<Spring>& springs) {
       const Pose2 around = first.motion * second->motion;
       const double off = distance(around.position(), spring.motion->position());
       const double rotation = angle_difference(around.heading_rad, spring.motion->heading_rad);
-      spring.support += static_cast<int>(std::abs(rotation) <= max_rotation_error_rad &&
-                                         off <= max_position_error * get_length(*spring.motion));
+      spring.support +=
+          static_cast<int>(std::abs(rotation) <= max_rotation_error_rad &&
+                           off <= max_position_error_share * get_length(*spring.motion));
     }
   }
 }
@@ -75,8 +76,8 @@ void count_support(std::size_t views, std::vector<Spring>& springs) {
 // Returns for each view the spacing of the references around it, in the unit of `lengths` (one for
 // each spring): the median, over the view and its neighbours by springs, of the distance to the
 // nearest neighbour. Infinite if no length is known.
-std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>& springs,
-                                    const std::vector<double>& lengths) {
+std::vector<double> compute_local_spacings(std::size_t views, const std::vector<Spring>& springs,
+                                           const std::vector<double>& lengths) {
   constexpr double unknown = std::numeric_limits<double>::infinity();
   std::vector<double> nearest(views, unknown);
   for (std::size_t i = 0; i < springs.size(); ++i) {
@@ -102,8 +103,8 @@ std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>
 struct Candidate {
   NavigationGraph::Edge edge;
   EdgeEnds ends;
-  double spacings = 0.0;    // its length in spacings of the references around
-  bool joins_only = false;  // kept only if it joins two components
+  double spacings = 0.0;        // its length in spacings of the references around
+  bool is_bridge_only = false;  // kept only if it joins two components
 };
 
 // Makes edges with lengths in units of the local spacing of the references. The unit of phases
@@ -113,7 +114,7 @@ struct Candidate {
 std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
                                        const std::vector<Spring>& springs, double min_weight) {
   const auto is_rejected = [&](const Spring& spring) {
-    return spring.weight < min_weight || !spring.one_component;
+    return spring.weight < min_weight || !spring.is_within_component;
   };
   std::vector<double> laid_out;
   std::vector<double> read;
@@ -121,8 +122,9 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
     laid_out.push_back(is_rejected(spring) ? 0.0 : spring.length);
     read.push_back(spring.motion ? get_length(*spring.motion) : 0.0);
   }
-  const std::vector<double> spacings_laid_out = spacings_around(views.size(), springs, laid_out);
-  const std::vector<double> spacings_read = spacings_around(views.size(), springs, read);
+  const std::vector<double> spacings_laid_out =
+      compute_local_spacings(views.size(), springs, laid_out);
+  const std::vector<double> spacings_read = compute_local_spacings(views.size(), springs, read);
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const Spring& spring = springs[i];
@@ -137,9 +139,9 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
       candidate.spacings = candidate.edge.length = length / spacing;
     }
     if (read[i] > 0.0) scale_displacement(*candidate.edge.a_from_b, candidate.spacings / read[i]);
-    candidate.joins_only =
-        candidate.spacings > (rejected ? max_spacings_of_rejected : max_spacings) ||
-        (rejected && spring.support < min_support_of_rejected);
+    candidate.is_bridge_only =
+        candidate.spacings > (rejected ? max_rejected_edge_spacings : max_edge_spacings) ||
+        (rejected && spring.support < min_rejected_edge_support);
     candidates.push_back(candidate);
   }
   return candidates;
@@ -150,19 +152,19 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
 void mark_isolated_edges(std::size_t views, std::vector<Candidate>& candidates) {
   std::vector<std::vector<std::size_t>> around(views);
   for (const Candidate& candidate : candidates) {
-    if (candidate.joins_only) continue;
+    if (candidate.is_bridge_only) continue;
     around[candidate.ends.a].push_back(candidate.ends.b);
     around[candidate.ends.b].push_back(candidate.ends.a);
   }
   for (auto& list : around) std::ranges::sort(list);
   for (Candidate& candidate : candidates) {
-    if (candidate.joins_only) continue;
+    if (candidate.is_bridge_only) continue;
     const auto& a = around[candidate.ends.a];
     const auto& b = around[candidate.ends.b];
     const auto common = std::ranges::count_if(
         a, [&](std::size_t node) { return std::ranges::binary_search(b, node); });
     const auto others = static_cast<double>(std::max(a.size(), b.size()) - 1);
-    candidate.joins_only = static_cast<double>(common + 1) < min_common_share * others;
+    candidate.is_bridge_only = static_cast<double>(common + 1) < min_common_share * others;
   }
 }
 
@@ -170,20 +172,20 @@ std::vector<NavigationGraph::Edge> choose_edges(const std::vector<ViewId>& views
                                                 std::vector<Spring> springs, double min_weight) {
   count_support(views.size(), springs);
   std::erase_if(springs, [&](const Spring& spring) {
-    return (spring.weight < min_weight || !spring.one_component) && spring.support == 0;
+    return (spring.weight < min_weight || !spring.is_within_component) && spring.support == 0;
   });
   std::vector<Candidate> candidates = make_candidates(views, springs, min_weight);
   mark_isolated_edges(views.size(), candidates);
   // Sorts marked edges last, the shortest first, so that they are kept only if no other edges
   // connect the two components.
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
-    return std::pair(candidate.joins_only, candidate.spacings);
+    return std::pair(candidate.is_bridge_only, candidate.spacings);
   });
   DisjointSets groups(views.size());
   std::vector<NavigationGraph::Edge> kept;
   for (const Candidate& candidate : candidates) {
     const bool joins = groups.join(candidate.ends.a, candidate.ends.b);
-    if (joins || !candidate.joins_only) kept.push_back(candidate.edge);
+    if (joins || !candidate.is_bridge_only) kept.push_back(candidate.edge);
   }
   fill_missing_lengths(kept);
   return kept;

@@ -32,7 +32,7 @@ void require_valid(const NavigationGraph::Edge& edge) {
 /// half of the quarter rotation after which rooms look similar.
 constexpr float max_heading_error_rad = 0.5F;
 
-bool agree(const Pose2& a, const Pose2& b) {
+bool motions_agree(const Pose2& a, const Pose2& b) {
   const double turned = angle_difference(a.heading_rad, b.heading_rad);
   const double aside = angle_difference(std::atan2(a.y_m, a.x_m), std::atan2(b.y_m, b.x_m));
   return std::abs(turned) <= max_disagreement_rad && std::abs(aside) <= max_disagreement_rad;
@@ -55,7 +55,7 @@ bool is_supported(const NavigationGraph& graph, const NavigationGraph::Edge& edg
     const auto c_from_b = graph.motion_from(first.node, second->edge);
     if (!a_from_c || !c_from_b) continue;
     ++readable;
-    closed += static_cast<int>(agree(*edge.a_from_b, *a_from_c * *c_from_b));
+    closed += static_cast<int>(motions_agree(*edge.a_from_b, *a_from_c * *c_from_b));
   }
   return triangles == 0 || 2 * closed > readable;
 }
@@ -64,7 +64,7 @@ bool is_supported(const NavigationGraph& graph, const NavigationGraph::Edge& edg
 
 NavigationGraph::NavigationGraph(std::vector<ViewId> views,
                                  std::vector<NavigationGraph::Edge> edges)
-    : views_(std::move(views)), begins_(views_.size() + 1) {
+    : views_(std::move(views)), exit_begins_(views_.size() + 1) {
   for (std::size_t i = 1; i < views_.size(); ++i) {
     require(views_[i - 1] < views_[i], "views", static_cast<double>(views_[i].value), "ascending");
   }
@@ -86,12 +86,12 @@ NavigationGraph::NavigationGraph(std::vector<ViewId> views,
                   [](const Ends& x, const Ends& y) { return x.low == y.low && x.high == y.high; }),
       ends.end());
   for (const Ends& e : ends) {
-    ++begins_[e.low + 1];
-    ++begins_[e.high + 1];
+    ++exit_begins_[e.low + 1];
+    ++exit_begins_[e.high + 1];
   }
-  std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
-  exits_.resize(begins_.back());
-  std::vector<std::size_t> next(begins_.begin(), begins_.end() - 1);
+  std::partial_sum(exit_begins_.begin(), exit_begins_.end(), exit_begins_.begin());
+  exits_.resize(exit_begins_.back());
+  std::vector<std::size_t> next(exit_begins_.begin(), exit_begins_.end() - 1);
   // Fills exits to lower nodes first and those to higher nodes last, so that the exits of each node
   // ascend.
   for (const Ends& e : ends) {
@@ -194,8 +194,9 @@ std::vector<EdgeEnds> find_near_pairs(const TopologicalMap& map, double reach) {
 
 }  // namespace
 
-NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const VisualMemory& memory,
-                                              Executor& executor, double min_weight) {
+NavigationGraph make_graph_from_map_and_neighbours(const TopologicalMap& map,
+                                                   const VisualMemory& memory, Executor& executor,
+                                                   double min_weight) {
   const NavigationGraph mapped = graph_from_map(map, min_weight);
   if (mapped.edges().empty()) return mapped;
   std::vector<double> lengths;
@@ -212,7 +213,7 @@ NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const V
   const std::vector<EdgeEnds> pairs = find_near_pairs(map, reach);
   std::vector<std::optional<NavigationGraph::Edge>> found(pairs.size());
   constexpr std::size_t pairs_per_chunk = 64;
-  executor.for_chunks(
+  executor.for_each_chunk(
       pairs.size(), pairs_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
         for (std::size_t i = begin; i < end; ++i) {
           const TopologicalMap::Node& a = map.nodes[pairs[i].a];

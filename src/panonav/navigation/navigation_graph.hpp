@@ -51,7 +51,8 @@ class NavigationGraph {
   [[nodiscard]] std::span<const Edge> edges() const noexcept { return edges_; }
   /// The edges of a node, ascending by the node at their other end.
   [[nodiscard]] std::span<const Exit> exits(std::size_t node) const {
-    return std::span(exits_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
+    return std::span(exits_).subspan(exit_begins_[node],
+                                     exit_begins_[node + 1] - exit_begins_[node]);
   }
   /// Pose of an edge's other end in the frame of `node`, one of its ends: node_from_other.
   [[nodiscard]] std::optional<Pose2> motion_from(std::size_t node, std::size_t edge) const;
@@ -59,7 +60,7 @@ class NavigationGraph {
  private:
   std::vector<ViewId> views_;
   std::vector<Edge> edges_;
-  std::vector<std::size_t> begins_;
+  std::vector<std::size_t> exit_begins_;
   std::vector<Exit> exits_;
 };
 
@@ -92,10 +93,10 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// be at most 1.5 times the median length of its edges, their views must be as similar as those of
 /// most edges, and the two views must agree on a direction. The memory must hold the map's views.
 /// Cost: one and a half home vectors for each such pair.
-[[nodiscard]] NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map,
-                                                            const VisualMemory& memory,
-                                                            Executor& executor,
-                                                            double min_weight = 0.1);
+[[nodiscard]] NavigationGraph make_graph_from_map_and_neighbours(const TopologicalMap& map,
+                                                                 const VisualMemory& memory,
+                                                                 Executor& executor,
+                                                                 double min_weight = 0.1);
 
 /// Uses the springs of weight at least `min_weight` that are at most two local spacings of the
 /// references long, and rejected springs of at most one and a half spacings that three third views

@@ -22,12 +22,12 @@ namespace {
 constexpr double max_correction_rad = std::numbers::pi / 3.0;
 /// A detour by a larger angle is not counted as an attempt at the edge ahead, as it advances along
 /// the edge by half a step or less.
-constexpr double max_aside_rad = 1.0;
+constexpr double max_attempt_detour_rad = 1.0;
 /// Length, in typical edge lengths, from which an edge is followed to its end, because no
 /// references are along it.
-constexpr double min_long_edge = 2.0;
+constexpr double min_long_edge_factor = 2.0;
 /// Number of steps per typical edge length: `step_m` is about half of that length.
-constexpr double steps_per_length = 2.0;
+constexpr double steps_per_edge_length = 2.0;
 /// Smallest number of components from which a home vector can be computed.
 constexpr int min_components = 3;
 
@@ -49,7 +49,7 @@ MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
                       : learn_place_scale(source, graph, scales.coarse_components);
   std::vector<double> lengths;
   for (const NavigationGraph::Edge& edge : graph.edges()) lengths.push_back(edge.length);
-  if (!lengths.empty()) scales.typical_length = upper_median(std::move(lengths));
+  if (!lengths.empty()) scales.median_edge_length = upper_median(std::move(lengths));
   scales.is_narrow = find_bottlenecks(graph, planner.areas(), options.near_links);
   return scales;
 }
@@ -70,7 +70,7 @@ Navigator::Core::Core(const ViewSource& source_, AreaPlanner planner_,
 }
 
 void Navigator::Core::set_goal(ViewId view) {
-  if (planner.blocked_edges() > 0) planner.unblock_all();
+  if (planner.blocked_edge_count() > 0) planner.unblock_all();
   planner.set_goal(view);
   const std::size_t node = *graph().node_of(view);
   const auto around = nodes_around(graph(), {&node, 1}, options.near_links);
@@ -113,7 +113,7 @@ void Navigator::Core::replan() {
 }
 
 const Guide& Navigator::Core::guide() const {
-  return plan.field.at(planner.areas().place_of[*place.node]);
+  return plan.field.at(planner.areas().index_in_area[*place.node]);
 }
 
 // Commits to a long edge, or to an edge to whose start the robot has come back without an
@@ -123,8 +123,8 @@ void Navigator::Core::commit_to_edge_if_needed() {
   const bool came_back = progress.steps_without_progress >= options.min_agreeing_steps &&
                          !progress.was_obstructed() &&
                          guide().path_length <= progress.min_path_length && length > 0.0;
-  if (plan.committed || (length < min_long_edge && !came_back)) return;
-  const double steps = steps_per_length * std::max(1.0, length);
+  if (plan.committed || (length < min_long_edge_factor && !came_back)) return;
+  const double steps = steps_per_edge_length * std::max(1.0, length);
   plan.committed = {*place.node, guide(), static_cast<int>(std::ceil(steps))};
 }
 
@@ -190,7 +190,7 @@ bool Navigator::Core::return_to_known_place(Step& step) {
   if (place.doubt.unknown_steps == options.min_agreeing_steps &&
       areas.area_of[node] == views.area()) {
     // Something hides the next place, so this counts as an obstructed attempt.
-    const Guide& ahead = plan.field.at(areas.place_of[node]);
+    const Guide& ahead = plan.field.at(areas.index_in_area[node]);
     if (ahead.is_reachable() && ahead.next != node) {
       EdgeAttempts& attempts = progress.get_or_create_attempts(ahead.edge, node);
       ++attempts.steps;
@@ -217,7 +217,7 @@ bool Navigator::Core::is_at_goal() const {
   }
   if (guide().next != goal->node) return false;
   const auto motion = graph().motion_from(*place.node, guide().edge);
-  return motion && std::hypot(motion->x_m, motion->y_m) <= 0.5 * scales.typical_length;
+  return motion && std::hypot(motion->x_m, motion->y_m) <= 0.5 * scales.median_edge_length;
 }
 
 // Returns the direction of an edge in the robot's frame: the field's direction rotated by the
@@ -263,7 +263,8 @@ void Navigator::Core::follow_field(Step& step) {
   step.decision.advance_m = options.step_m;
   last.direction_rad = step.decision.direction_rad;
   ++progress.get_or_create_attempts(ahead.edge, from).steps;
-  if (obstruction.level >= 2 || std::abs(detour) < max_aside_rad) last.target_edge = ahead.edge;
+  if (obstruction.level >= 2 || std::abs(detour) < max_attempt_detour_rad)
+    last.target_edge = ahead.edge;
 }
 
 // Begins a leg along a recorded route if the place is certain and nothing has obstructed the robot,
@@ -271,7 +272,7 @@ void Navigator::Core::follow_field(Step& step) {
 void Navigator::Core::begin_leg_if_possible(Step& step) {
   if (pilot.routes().empty() || step.report.line.empty() || obstruction.is_present ||
       place.doubt.unknown_steps > 0 || place.doubt.other_place_steps > 0 ||
-      planner.blocked_edges() > 0) {
+      planner.blocked_edge_count() > 0) {
     return;
   }
   std::vector<ViewId> path;
@@ -377,13 +378,13 @@ NavigationDecision Navigator::Core::observe(const FourierSignature& view,
   return std::move(decision);
 }
 
-std::string_view name_of(NavigationDecision::State state) {
+std::string_view to_string(NavigationDecision::State state) {
   constexpr std::array<std::string_view, 5> names{"moving", "arrived", "blocked", "lost",
                                                   "unreachable"};
   return names.at(static_cast<std::size_t>(state));
 }
 
-std::string_view name_of(NavigationDecision::Event event) {
+std::string_view to_string(NavigationDecision::Event event) {
   constexpr std::array<std::string_view, 11> names{
       "relocalised", "kidnapped", "entered_area",  "unknown_place", "obstructed", "closed",
       "reopened",    "homing",    "homing_failed", "route",         "route_left"};
@@ -391,7 +392,7 @@ std::string_view name_of(NavigationDecision::Event event) {
 }
 
 std::string describe(const NavigationDecision& decision) {
-  std::string line = std::to_string(decision.step) + " " + std::string(name_of(decision.state));
+  std::string line = std::to_string(decision.step) + " " + std::string(to_string(decision.state));
   if (decision.nearest) {
     line += " at view " + std::to_string(decision.nearest->value) + " (probability " +
             to_fixed_text(decision.probability, 2) + ")";
@@ -406,7 +407,7 @@ std::string describe(const NavigationDecision& decision) {
             to_fixed_text(degrees(decision.direction_rad), 1) + " degrees";
   }
   for (const NavigationDecision::Event event : decision.events)
-    line += ", " + std::string(name_of(event));
+    line += ", " + std::string(to_string(event));
   return line;
 }
 
@@ -415,9 +416,11 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::step_m>("length of the longest step", 0.001, 100),
       option<&T::near_links>(
-          "the next place is searched within this number of edges from the last place", 1, 10),
-      option<&T::coarse_components>("number of components compared in open space; 0: all", 0, 1000),
-      option<&T::views_ahead>("number of views of the next area that are loaded in a step", 0, 1e6),
+          "search for the next place within this number of edges from the last place", 1, 10),
+      option<&T::coarse_components>("number of Fourier components compared in open space; 0: all",
+                                    0, 1000),
+      option<&T::views_ahead>("number of views of the next area that are loaded in each step", 0,
+                              1e6),
       options_of<&T::homing>(),
       option<&T::min_agreeing_steps>(
           "number of steps that must agree before a new place or a blocked edge is accepted", 1,
@@ -429,7 +432,7 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
       option<&T::min_leg_m>("shortest part of a path for which a recorded route is used", 0.001,
                             1000),
       option<&T::attempts>("number of attempts at blocked edges and at homing", 1, 1000),
-      option<&T::max_run_steps>("largest number of steps of a run", 1, 1e9),
+      option<&T::max_run_steps>("largest number of steps of the whole drive", 1, 1e9),
   };
   table.visit(options, visitor);
 }
@@ -458,7 +461,7 @@ NavigationDecision Navigator::observe(const FourierSignature& view, const RobotR
 const AreaPlanner& Navigator::planner() const noexcept {
   return core_->planner;
 }
-std::size_t Navigator::loaded_views() const noexcept {
+std::size_t Navigator::loaded_view_count() const noexcept {
   return core_->views.size();
 }
 

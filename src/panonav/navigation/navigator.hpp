@@ -108,10 +108,10 @@ struct NavigationDecision {
   std::vector<Event> events;  ///< in the order in which they happened
 };
 /// Returns "moving", "arrived", "blocked", "lost" or "unreachable".
-[[nodiscard]] std::string_view name_of(NavigationDecision::State state);
+[[nodiscard]] std::string_view to_string(NavigationDecision::State state);
 /// Returns the event in lower case with underscores, as in logs and JSON: "relocalised",
 /// "entered_area", ...
-[[nodiscard]] std::string_view name_of(NavigationDecision::Event event);
+[[nodiscard]] std::string_view to_string(NavigationDecision::Event event);
 /// Returns one line for a log.
 [[nodiscard]] std::string describe(const NavigationDecision& decision);
 
@@ -156,7 +156,7 @@ class Navigator {
   [[nodiscard]] const AreaPlanner& planner() const noexcept;
   /// Returns the number of loaded views: those in and around the current area, and prefetched
   /// views of the next area.
-  [[nodiscard]] std::size_t loaded_views() const noexcept;
+  [[nodiscard]] std::size_t loaded_view_count() const noexcept;
 
  private:
   struct Core;

@@ -10,7 +10,7 @@ namespace panonav {
 namespace {
 
 /// Number of least dissimilar views of each area that are also compared by their phases.
-constexpr int compared_per_area = 3;
+constexpr int compared_views_per_area = 3;
 
 }  // namespace
 
@@ -27,7 +27,7 @@ std::optional<FoundView> search_whole_memory(const ViewSource& source, const Nav
     if (views.empty()) continue;
     const VisualMemory memory = source.load(views);
     const SearchResult found =
-        memory.search(pack(view, memory.full_scale()), {.top = compared_per_area});
+        memory.search(pack(view, memory.full_scale()), {.top = compared_views_per_area});
     for (const Match& match : found.matches) {
       const double difference = image_difference(homing_view(memory, match.view), query);
       if (!best || difference < best->difference) {

@@ -32,7 +32,7 @@ struct Component {
   std::vector<std::size_t> begins, neighbours;
 
   [[nodiscard]] std::size_t size() const { return nodes.size(); }
-  [[nodiscard]] std::span<const std::size_t> of(std::size_t i) const {
+  [[nodiscard]] std::span<const std::size_t> neighbours_of(std::size_t i) const {
     return std::span(neighbours).subspan(begins[i], begins[i + 1] - begins[i]);
   }
 };
@@ -55,13 +55,13 @@ Component make_component(const NavigationGraph& graph, std::vector<std::size_t> 
 
 // Returns the number of edges on the shortest path from `from` to every node over nodes of `side`;
 // `none` if there is no such path.
-std::vector<std::size_t> steps_from(const Component& component, std::size_t from,
-                                    std::span<const std::uint8_t> sides, std::uint8_t side) {
+std::vector<std::size_t> count_steps_from(const Component& component, std::size_t from,
+                                          std::span<const std::uint8_t> sides, std::uint8_t side) {
   std::vector<std::size_t> steps(component.size(), none);
   std::vector<std::size_t> queue{from};
   steps[from] = 0;
   for (std::size_t head = 0; head < queue.size(); ++head) {
-    for (const std::size_t next : component.of(queue[head])) {
+    for (const std::size_t next : component.neighbours_of(queue[head])) {
       if (steps[next] != none || sides[next] != side) continue;
       steps[next] = steps[queue[head]] + 1;
       queue.push_back(next);
@@ -83,15 +83,15 @@ std::size_t find_farthest(std::span<const std::size_t> steps) {
 // first eigenvector in each step.
 std::vector<double> second_eigenvector(const Component& component, int iterations) {
   const std::vector<std::uint8_t> everywhere(component.size(), 0);
-  const auto outermost = find_farthest(steps_from(component, 0, everywhere, 0));
-  const auto steps = steps_from(component, outermost, everywhere, 0);
+  const auto outermost = find_farthest(count_steps_from(component, 0, everywhere, 0));
+  const auto steps = count_steps_from(component, outermost, everywhere, 0);
   std::vector<double> values(steps.begin(), steps.end());
   std::vector<double> relaxed(values.size());
   for (int i = 0; i <= iterations; ++i) {
     double sum = 0.0;
     double weight = 0.0;
     for (std::size_t n = 0; n < component.size(); ++n) {
-      const auto degree = static_cast<double>(component.of(n).size());
+      const auto degree = static_cast<double>(component.neighbours_of(n).size());
       sum += degree * values[n];
       weight += degree;
     }
@@ -103,9 +103,10 @@ std::vector<double> second_eigenvector(const Component& component, int iteration
     if (i == iterations || largest == 0.0) break;
     for (std::size_t n = 0; n < component.size(); ++n) {
       double around = 0.0;
-      for (const std::size_t next : component.of(n)) around += values[next];
-      relaxed[n] =
-          0.5 * (values[n] + around / static_cast<double>(component.of(n).size())) / largest;
+      for (const std::size_t next : component.neighbours_of(n)) around += values[next];
+      relaxed[n] = 0.5 *
+                   (values[n] + around / static_cast<double>(component.neighbours_of(n).size())) /
+                   largest;
     }
     values.swap(relaxed);
   }
@@ -130,8 +131,9 @@ std::vector<std::uint8_t> find_best_cut(const Component& component,
   for (std::size_t count = 1; count < component.size(); ++count) {
     const std::size_t node = order[count - 1];
     sides[node] = 1;
-    volume += static_cast<double>(component.of(node).size());
-    for (const std::size_t next : component.of(node)) cut += sides[next] != 0 ? -1.0 : 1.0;
+    volume += static_cast<double>(component.neighbours_of(node).size());
+    for (const std::size_t next : component.neighbours_of(node))
+      cut += sides[next] != 0 ? -1.0 : 1.0;
     if (count < low || component.size() - count < low) continue;
     const double normalised = cut / volume + cut / (total - volume);
     if (normalised < best) {
@@ -151,7 +153,7 @@ void move_fragments(const Component& component, std::uint8_t side,
   std::vector<std::size_t> sizes;
   for (std::size_t n = 0; n < component.size(); ++n) {
     if (sides[n] != side || piece[n] != none) continue;
-    const auto steps = steps_from(component, n, sides, side);
+    const auto steps = count_steps_from(component, n, sides, side);
     sizes.push_back(0);
     for (std::size_t m = 0; m < component.size(); ++m) {
       if (steps[m] == none) continue;
@@ -176,7 +178,7 @@ std::vector<std::vector<std::size_t>> find_pieces(const NavigationGraph& graph,
   std::vector<std::vector<std::size_t>> result;
   for (std::size_t n = 0; n < component.size(); ++n) {
     if (visited[n] != 0) continue;
-    const auto steps = steps_from(component, n, visited, 0);
+    const auto steps = count_steps_from(component, n, visited, 0);
     result.emplace_back();
     for (std::size_t m = 0; m < component.size(); ++m) {
       if (steps[m] == none) continue;
@@ -192,9 +194,9 @@ std::vector<std::vector<std::size_t>> find_pieces(const NavigationGraph& graph,
 SubAreas make_single_area(const NavigationGraph& graph) {
   SubAreas areas;
   areas.area_of.assign(graph.size(), 0);
-  areas.place_of.resize(graph.size());
-  std::iota(areas.place_of.begin(), areas.place_of.end(), 0U);
-  areas.nodes.push_back(areas.place_of);
+  areas.index_in_area.resize(graph.size());
+  std::iota(areas.index_in_area.begin(), areas.index_in_area.end(), 0U);
+  areas.nodes.push_back(areas.index_in_area);
   return areas;
 }
 
@@ -202,7 +204,7 @@ SubAreas divide_into_areas(const NavigationGraph& graph, const SubAreaOptions& o
   validate(options);
   SubAreas areas;
   areas.area_of.resize(graph.size());
-  areas.place_of.resize(graph.size());
+  areas.index_in_area.resize(graph.size());
   std::vector<std::size_t> number(graph.size(), none);
   std::vector<std::size_t> all(graph.size());
   std::iota(all.begin(), all.end(), 0U);
@@ -229,9 +231,9 @@ SubAreas divide_into_areas(const NavigationGraph& graph, const SubAreaOptions& o
   }
   std::ranges::sort(areas.nodes);
   for (std::size_t a = 0; a < areas.nodes.size(); ++a) {
-    for (std::size_t place = 0; place < areas.nodes[a].size(); ++place) {
-      areas.area_of[areas.nodes[a][place]] = a;
-      areas.place_of[areas.nodes[a][place]] = place;
+    for (std::size_t index = 0; index < areas.nodes[a].size(); ++index) {
+      areas.area_of[areas.nodes[a][index]] = a;
+      areas.index_in_area[areas.nodes[a][index]] = index;
     }
   }
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {

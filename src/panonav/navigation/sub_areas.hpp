@@ -19,7 +19,7 @@ void visit_options(SubAreaOptions& options, OptionVisitor& visitor);
 /// The views of a graph in areas. Every area is connected within itself.
 struct SubAreas {
   std::vector<std::size_t> area_of;             ///< by node
-  std::vector<std::size_t> place_of;            ///< by node: its index in `nodes` of its area
+  std::vector<std::size_t> index_in_area;       ///< by node: its index in `nodes` of its area
   std::vector<std::vector<std::size_t>> nodes;  ///< of each area, ascending
   std::vector<std::size_t> gates;               ///< edges between two areas, ascending
 };

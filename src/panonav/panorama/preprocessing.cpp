@@ -53,9 +53,9 @@ void replace_by_gradients(Panorama& panorama, int first_row, int end_row) {
 void visit_options(PreprocessingOptions& options, OptionVisitor& visitor) {
   using T = PreprocessingOptions;
   constexpr OptionTable table{
-      option<&T::masked_rows_top>("number of rows at the upper edge that are ignored", 0),
-      option<&T::masked_rows_bottom>("number of rows at the lower edge that are ignored", 0),
-      option<&T::edge_channel>("replace the brightness by the length of its gradient"),
+      option<&T::masked_rows_top>("number of ignored rows at the upper edge of the panorama", 0),
+      option<&T::masked_rows_bottom>("number of ignored rows at the lower edge of the panorama", 0),
+      option<&T::edge_channel>("replace the brightness by the magnitude of its gradient"),
       option<&T::remove_mean>("subtract the mean brightness of the view"),
       option<&T::normalise_gain>("scale the contrast of every view to the same standard deviation"),
   };

@@ -18,7 +18,7 @@ namespace panonav {
 namespace {
 
 // Tolerance for distances, so that rounding of coordinates does not decide whether a pair is used.
-constexpr double rounding_m = 1e-6;
+constexpr double distance_tolerance_m = 1e-6;
 
 /// Home vector of a pair, without its quality.
 struct PairVector {
@@ -50,7 +50,7 @@ std::vector<PairVector> compute_home_vectors(const RecordedViews& goals,
   if (progress) progress(work, 0, goals.views.size());
   for (std::size_t begin = 0; begin < goals.views.size(); begin += batch) {
     const std::size_t many = std::min(batch, goals.views.size() - begin);
-    executor.for_chunks(many, 1, [&](std::size_t i, std::size_t, std::size_t) {
+    executor.for_each_chunk(many, 1, [&](std::size_t i, std::size_t, std::size_t) {
       const HomingView& home = goals.views[begin + i];
       for (std::size_t p = 0; p < count; ++p) {
         const HomeVector found = home_vector(home, places.views[p], homing);
@@ -74,7 +74,7 @@ double estimate_typical_distance_m(const std::vector<Pose2>& goals,
       const double off_m = distance(goals[g].position(), places[p].position());
       const PairVector& found = vectors[g * places.size() + p];
       const double length = std::hypot(found.xi, found.eta);
-      if (off_m > rounding_m && off_m <= near_m + rounding_m && length > 0.0) {
+      if (off_m > distance_tolerance_m && off_m <= near_m + distance_tolerance_m && length > 0.0) {
         ratios.push_back(off_m / length);
       }
     }
@@ -113,12 +113,12 @@ void summarise_pairs(const std::vector<PairVector>& vectors, const CatchmentSett
       const Pose2& goal = survey.goals[g];
       const Pose2& place = survey.places[p];
       const double off_m = distance(goal.position(), place.position());
-      if (off_m <= rounding_m) continue;
+      if (off_m <= distance_tolerance_m) continue;
       const double error = static_cast<double>(vectors[g * survey.places.size() + p].heading_rad) -
                            (goal.heading_rad - place.heading_rad);
       const auto bin = static_cast<std::size_t>(std::lround(off_m / bin_m));
       if (bin < errors.size()) errors[bin].add(error);
-      if (off_m <= max_m + rounding_m) all.add(error);
+      if (off_m <= max_m + distance_tolerance_m) all.add(error);
     }
   }
   for (std::size_t i = 0; i < homeward.size(); ++i) {
@@ -127,7 +127,7 @@ void summarise_pairs(const std::vector<PairVector>& vectors, const CatchmentSett
   }
   result.pairs = all.count;
   result.orientation_error_rad = all.compute_deviation();
-  result.component = mean_homeward_component(survey, max_m + rounding_m);
+  result.component = mean_homeward_component(survey, max_m + distance_tolerance_m);
 }
 
 }  // namespace
@@ -225,8 +225,9 @@ std::size_t count_places_in_catchment(const CatchmentResult& result, std::size_t
                                       double accepted_m) {
   const std::size_t count = result.survey.places.size();
   const auto ends = std::span(result.final_m).subspan(goal * count, count);
-  return static_cast<std::size_t>(std::ranges::count_if(
-      ends, [&](float end_m) { return static_cast<double>(end_m) <= accepted_m + rounding_m; }));
+  return static_cast<std::size_t>(std::ranges::count_if(ends, [&](float end_m) {
+    return static_cast<double>(end_m) <= accepted_m + distance_tolerance_m;
+  }));
 }
 
 }  // namespace panonav

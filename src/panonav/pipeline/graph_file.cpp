@@ -10,7 +10,7 @@ namespace panonav {
 
 namespace {
 
-std::string_view name_of(Link::Kind kind) {
+std::string_view to_string(Link::Kind kind) {
   switch (kind) {
     case Link::Kind::sequence:
       return "sequence";
@@ -45,13 +45,13 @@ std::string escape_xml(std::string_view text) {
   return safe;
 }
 
-std::string data(std::string_view key, std::string_view value) {
+std::string format_data(std::string_view key, std::string_view value) {
   return "<data key=\"" + std::string(key) + "\">" + std::string(value) + "</data>";
 }
 
 std::string format_pose(const Pose2& pose) {
-  return data("x_m", to_text(pose.x_m)) + data("y_m", to_text(pose.y_m)) +
-         data("heading_rad", to_text(pose.heading_rad));
+  return format_data("x_m", to_text(pose.x_m)) + format_data("y_m", to_text(pose.y_m)) +
+         format_data("heading_rad", to_text(pose.heading_rad));
 }
 
 }  // namespace
@@ -74,13 +74,13 @@ void write_graph(const std::filesystem::path& path, const TopologicalMap& map,
       "<graph edgedefault=\"directed\">\n";
   for (const TopologicalMap::Node& node : map.nodes) {
     text += "<node id=\"" + std::to_string(node.view.value) + "\">" +
-            data("name", escape_xml(name(node.view))) + format_pose(node.pose) +
-            data("component", std::to_string(node.component)) + "</node>\n";
+            format_data("name", escape_xml(name(node.view))) + format_pose(node.pose) +
+            format_data("component", std::to_string(node.component)) + "</node>\n";
   }
   for (const TopologicalMap::Edge& edge : map.edges) {
     text += "<edge source=\"" + std::to_string(edge.a.value) + "\" target=\"" +
-            std::to_string(edge.b.value) + "\">" + data("kind", name_of(edge.kind)) +
-            data("weight", to_text(edge.weight)) + format_pose(edge.a_from_b) + "</edge>\n";
+            std::to_string(edge.b.value) + "\">" + format_data("kind", to_string(edge.kind)) +
+            format_data("weight", to_text(edge.weight)) + format_pose(edge.a_from_b) + "</edge>\n";
   }
   text += "</graph>\n</graphml>\n";
   write_file(path, text);

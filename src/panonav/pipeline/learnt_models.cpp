@@ -25,8 +25,8 @@ constexpr std::string_view learning_version = "4";
 template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, PlaceModel>
 void visit_members(Model& m, const Visit& visit) {
-  visit(m.threshold), visit(m.learnt), visit(m.sampled_views), visit(m.neighbouring);
-  visit(m.arbitrary), visit(m.mirrored), visit(m.nearest_view_difference);
+  visit(m.threshold), visit(m.learnt), visit(m.sampled_views), visit(m.neighbouring_difference);
+  visit(m.arbitrary_difference), visit(m.mirrored_difference), visit(m.nearest_view_difference);
 }
 template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, PositionModel>

@@ -29,20 +29,20 @@ bool holds_views(Memoriser& memoriser) {
 }
 
 /// Stores views on a separate thread.
-class Storer {
+class ViewStorer {
  public:
   /// `has_views`: the memory holds views already.
-  Storer(Memoriser& memoriser, bool has_views)
+  ViewStorer(Memoriser& memoriser, bool has_views)
       : memoriser_(memoriser), has_views_(has_views), thread_([this] { work(); }) {}
-  ~Storer() { join(); }
-  Storer(const Storer&) = delete;
-  Storer& operator=(const Storer&) = delete;
+  ~ViewStorer() { join(); }
+  ViewStorer(const ViewStorer&) = delete;
+  ViewStorer& operator=(const ViewStorer&) = delete;
 
   void add(Observation observation) {
     const std::lock_guard lock(mutex_);
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     waiting_.push_back(std::move(observation));
-    came_.notify_one();
+    changed_.notify_one();
   }
   [[nodiscard]] std::size_t waiting() const {
     const std::lock_guard lock(mutex_);
@@ -63,16 +63,16 @@ class Storer {
   void join() {
     {
       const std::lock_guard lock(mutex_);
-      over_ = true;
+      is_finishing_ = true;
     }
-    came_.notify_one();
+    changed_.notify_one();
     if (thread_.joinable()) thread_.join();
   }
   void work() {
     lower_thread_priority();
     std::unique_lock lock(mutex_);
     while (true) {
-      came_.wait(lock, [this] { return over_ || !waiting_.empty(); });
+      changed_.wait(lock, [this] { return is_finishing_ || !waiting_.empty(); });
       if (waiting_.empty()) return;
       Observation next = std::move(waiting_.front());
       bool has_views = has_views_;
@@ -93,11 +93,11 @@ class Storer {
 
   Memoriser& memoriser_;
   mutable std::mutex mutex_;
-  std::condition_variable came_;
+  std::condition_variable changed_;
   std::deque<Observation> waiting_;  // the first one is being stored
   std::exception_ptr failure_;
   bool has_views_;
-  bool over_ = false;
+  bool is_finishing_ = false;
   std::thread thread_;
 };
 
@@ -151,7 +151,7 @@ struct LiveMemory::Implementation {
 
   /// Starts learning from all views on another thread when at least 16 and a fifth of them are new.
   /// Until the new models are ready, the earlier ones are used.
-  void refresh() {
+  void refresh_recogniser() {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;
     const bool due = !recogniser || added.size() >= std::max(min_new, views / 5);
@@ -175,7 +175,7 @@ struct LiveMemory::Implementation {
   std::filesystem::path path;
   LiveMemoryOptions options;
   std::optional<Memoriser> memoriser;  // used by the thread of `storer`, if there is one
-  std::optional<Storer> storer;
+  std::optional<ViewStorer> storer;
   std::optional<MemoryUpdater> updater;  // of the views that existed at the start
   std::unique_ptr<PlaceRecogniser> recogniser;
   std::optional<Panorama> panorama;  // of the observation named `answered`
@@ -195,7 +195,7 @@ LiveMemory& LiveMemory::operator=(LiveMemory&&) noexcept = default;
 
 LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   auto& self = *implementation_;
-  if (self.options.add) self.refresh();
+  if (self.options.add) self.refresh_recogniser();
   Answer answer;
   self.panorama.reset();
   if (self.recogniser) {

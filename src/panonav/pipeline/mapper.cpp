@@ -53,15 +53,15 @@ Mapper::EncodedView Mapper::encode(const Observation& observation) const {
 }
 
 bool Mapper::add(EncodedView encoded) {
-  const std::size_t number = count_++;
-  all_odometry_ = all_odometry_ && encoded.odometry.has_value();
-  any_pose_ = any_pose_ || encoded.info.pose.has_value();
+  const std::size_t number = observation_count_++;
+  has_all_odometry_ = has_all_odometry_ && encoded.odometry.has_value();
+  has_any_pose_ = has_any_pose_ || encoded.info.pose.has_value();
   OdometryView view(std::move(encoded.signature));
   auto start = Clock::now();
   const bool is_node = mapper_.is_new(view);
-  run_.mapping_s += seconds_since(start);
+  result_.mapping_s += seconds_since(start);
   if (!is_node) {
-    ++run_.skipped;
+    ++result_.skipped;
     return false;
   }
   const NewView added{std::move(encoded.info), pack(view.signature, file_.header().full_scale),
@@ -69,8 +69,8 @@ bool Mapper::add(EncodedView encoded) {
   const auto known = file_.find(added.info.name);
   const ViewId id = known ? *known : file_.append(added);
   std::optional<Pose2> moved;
-  if (odometry_of_node_ && encoded.odometry)
-    moved = inverse(*odometry_of_node_) * *encoded.odometry;
+  if (last_node_odometry_ && encoded.odometry)
+    moved = inverse(*last_node_odometry_) * *encoded.odometry;
   start = Clock::now();
   try {
     node_views_.append_with_id(id, added.signature, added.info);
@@ -78,9 +78,9 @@ bool Mapper::add(EncodedView encoded) {
   } catch (const ContractError& error) {
     throw FileError(file_.path().string(), added.info.name + ": " + error.what());
   }
-  run_.mapping_s += seconds_since(start);
-  run_.observations.push_back(number);
-  odometry_of_node_ = encoded.odometry;
+  result_.mapping_s += seconds_since(start);
+  result_.observations.push_back(number);
+  last_node_odometry_ = encoded.odometry;
   return true;
 }
 
@@ -99,19 +99,19 @@ Mapper::Result Mapper::map(const Dataset& recording, Executor& executor,
 Mapper::Result Mapper::finish() {
   const auto start = Clock::now();
   mapper_.finish();
-  run_.mapping_s += seconds_since(start);
-  run_.map = mapper_.map();
-  run_.scale_m = mapper_.scale_m();
-  run_.wheels = options_.mapping.wheels && all_odometry_;
+  result_.mapping_s += seconds_since(start);
+  result_.map = mapper_.map();
+  result_.scale_m = mapper_.scale_m();
+  result_.wheels = options_.mapping.wheels && has_all_odometry_;
   std::vector<Link> links;
-  for (const TopologicalMap::Edge& edge : run_.map.edges)
+  for (const TopologicalMap::Edge& edge : result_.map.edges)
     links.push_back({edge.a, edge.b, edge.kind});
   file_.change([&] {
     file_.link(links);
-    file_.save_map(map_name, run_.map);
-    if (!any_pose_) {
-      const std::size_t component = find_largest_component(run_.map);
-      for (const TopologicalMap::Node& node : run_.map.nodes) {
+    file_.save_map(map_name, result_.map);
+    if (!has_any_pose_) {
+      const std::size_t component = find_largest_component(result_.map);
+      for (const TopologicalMap::Node& node : result_.map.nodes) {
         if (node.component != component) continue;
         file_.set_pose(node.view,
                        ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
@@ -119,7 +119,7 @@ Mapper::Result Mapper::finish() {
     }
     learn_and_store_models(file_);
   });
-  return run_;
+  return result_;
 }
 
 }  // namespace panonav

@@ -94,11 +94,11 @@ class Mapper {
   ViewEncoder encoder_;
   VisualMemory node_views_;  // the nodes so far
   TopologicalMapper mapper_;
-  Result run_;
-  std::size_t count_ = 0;
-  std::optional<Pose2> odometry_of_node_;
-  bool all_odometry_ = true;
-  bool any_pose_ = false;
+  Result result_;
+  std::size_t observation_count_ = 0;
+  std::optional<Pose2> last_node_odometry_;
+  bool has_all_odometry_ = true;
+  bool has_any_pose_ = false;
 };
 
 /// Returns the component with the largest number of nodes; of ties the first one.

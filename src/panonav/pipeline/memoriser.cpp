@@ -20,7 +20,7 @@ namespace panonav {
 
 namespace {
 
-double now_s() {
+double unix_time_s() {
   const auto since = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration<double>(since).count();
 }
@@ -50,7 +50,7 @@ MemoryHeader make_memory_header(std::span<const Observation> first, const Pictur
   MemoryHeader header;
   header.source = source;
   header.preprocessing = preprocessing;
-  header.created_s = now_s();
+  header.created_s = unix_time_s();
   const Panorama panorama = make_first_panorama(first.front(), source, signature);
   header.shape = {panorama.rows(), signature.components};
   header.panorama_columns = panorama.columns();

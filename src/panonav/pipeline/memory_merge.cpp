@@ -133,7 +133,7 @@ void append_disconnected(TopologicalMap& map, const TopologicalMap& more) {
   renumber_components(map);
 }
 
-void require_comparable(const MemoryFile& first, const MemoryFile& second) {
+void require_same_settings(const MemoryFile& first, const MemoryFile& second) {
   const auto require_same = [&](const char* what, bool same) {
     if (same) return;
     throw ContractError(
@@ -344,7 +344,7 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
                             const std::function<void()>& advance) {
   const MemoryFile a = MemoryFile::open(first, Access::read_only);
   const MemoryFile b = MemoryFile::open(second, Access::read_only);
-  require_comparable(a, b);
+  require_same_settings(a, b);
   if (memory_exists(memory)) {
     throw FileError(mask_passwords(memory.string()),
                     "already exists; a merged memory is a new one");

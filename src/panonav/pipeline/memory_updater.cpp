@@ -21,7 +21,7 @@ namespace {
 constexpr const char* use_parameter = "use of views";
 constexpr const char* use_version = "1";
 
-std::string to_parameter(const MemoryUpdate::Use& use) {
+std::string to_parameter(const MemoryUpdate::UseStatistics& use) {
   std::string text = std::string(use_version) + " " + std::to_string(use.runs) + " " +
                      to_hex_text(use.spacing_m) + " " + to_hex_text(use.far_difference) + " " +
                      to_hex_text(use.range_m) + " " + std::to_string(use.places) + " " +
@@ -35,21 +35,21 @@ std::string to_parameter(const MemoryUpdate::Use& use) {
 }
 
 // Parses stored statistics; returns empty ones for an unknown version.
-MemoryUpdate::Use parse_memory_use(const std::optional<std::string>& text) {
-  MemoryUpdate::Use use;
+MemoryUpdate::UseStatistics parse_memory_use(const std::optional<std::string>& text) {
+  MemoryUpdate::UseStatistics use;
   if (!text) return use;
-  constexpr std::size_t head = 7;  // words before the views
-  constexpr std::size_t per_view = 5;
+  constexpr std::size_t header_word_count = 7;  // words before the views
+  constexpr std::size_t words_per_view = 5;
   const std::vector<std::string> words = split_words(*text);
-  if (words.size() < head || words[0] != use_version || !read_number(words[1], use.runs) ||
-      !read_hex_number(words[2], use.spacing_m) || !read_hex_number(words[3], use.far_difference) ||
-      !read_hex_number(words[4], use.range_m) || !read_number(words[5], use.places) ||
-      !read_number(words[6], use.size)) {
+  if (words.size() < header_word_count || words[0] != use_version ||
+      !read_number(words[1], use.runs) || !read_hex_number(words[2], use.spacing_m) ||
+      !read_hex_number(words[3], use.far_difference) || !read_hex_number(words[4], use.range_m) ||
+      !read_number(words[5], use.places) || !read_number(words[6], use.size)) {
     return {};
   }
-  for (std::size_t i = head; i + per_view <= words.size(); i += per_view) {
+  for (std::size_t i = header_word_count; i + words_per_view <= words.size(); i += words_per_view) {
     std::uint32_t view = 0;
-    MemoryUpdate::Use::View one;
+    MemoryUpdate::UseStatistics::View one;
     if (!read_number(words[i], view) || !read_number(words[i + 1], one.matched) ||
         !read_number(words[i + 2], one.failed) || !read_number(words[i + 3], one.last_run)) {
       break;
@@ -60,7 +60,7 @@ MemoryUpdate::Use parse_memory_use(const std::optional<std::string>& text) {
   return use;
 }
 
-ObservationModel make_model(const MemoryFile& file, const ColumnRanking& ranking) {
+ObservationModel load_or_learn_model(const MemoryFile& file, const ColumnRanking& ranking) {
   const VisualMemory& memory = ranking.memory();
   const auto oriented = std::ranges::count_if(memory.views(), [&](ViewId view) {
     const auto& pose = memory.info(view).pose;
@@ -89,15 +89,15 @@ struct MemoryUpdater::Implementation {
         memory(file.load()),
         encoder(file.header(), file.header().source),
         ranking(memory),
-        update(ranking, make_model(file, ranking), parse_memory_use(file.parameter(use_parameter)),
-               options) {}
+        update(ranking, load_or_learn_model(file, ranking),
+               parse_memory_use(file.parameter(use_parameter)), options) {}
 
   MemoryFile file;
   VisualMemory memory;
   ViewEncoder encoder;
   ColumnRanking ranking;
   MemoryUpdate update;
-  std::map<std::size_t, NewView> kept;  // by number of the observation in the run
+  std::map<std::size_t, NewView> candidate_views;  // by number of the observation in the run
   std::size_t observations = 0;
   bool finished = false;
 
@@ -122,7 +122,7 @@ void MemoryUpdater::observe(const Observation& observation, const Panorama& pano
   view.info.name = observation.name;
   view.info.stamp_s = observation.stamp_s;
   view.signature = self.encoder.packed(panorama);
-  MemoryUpdate::AnsweredView answered{
+  MemoryUpdate::LocalisedView answered{
       *observation.odometry, view.signature, place.known_probability, {}, {}};
   if (place.position && place.heading_rad) {
     answered.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
@@ -130,12 +130,12 @@ void MemoryUpdater::observe(const Observation& observation, const Panorama& pano
   }
   const std::size_t number = self.observations++;
   self.update.add(std::move(answered));
-  std::erase_if(self.kept,
+  std::erase_if(self.candidate_views,
                 [&](const auto& one) { return !self.update.can_become_view(one.first); });
   if (!self.update.can_become_view(number)) return;
   view.thumbnail = encode_thumbnail(panorama);
   if (const auto features = self.encoder.features(panorama)) view.features = pack(*features);
-  self.kept.emplace(number, std::move(view));
+  self.candidate_views.emplace(number, std::move(view));
 }
 
 bool MemoryUpdater::is_near_known_place() const {
@@ -168,7 +168,7 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
         }
         std::vector<NewView> added;
         for (const auto& [number, pose] : planned.added) {
-          NewView& view = added.emplace_back(std::move(self.kept.at(number)));
+          NewView& view = added.emplace_back(std::move(self.candidate_views.at(number)));
           view.info.name = "update " + std::to_string(planned.use.runs) + "/" + view.info.name;
           view.info.pose = pose;
         }

@@ -50,7 +50,7 @@ std::optional<Observation> DatasetObservations::next() {
     first_decoded_ = next_;
     decoded_.clear();
     decoded_.resize(std::min(decoded_ahead, size() - next_));
-    executor_->for_chunks(decoded_.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    executor_->for_each_chunk(decoded_.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
       try {
         decoded_[i].observation = read_observation(dataset_.entries[first_decoded_ + i]);
       } catch (const Error&) {

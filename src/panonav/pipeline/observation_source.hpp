@@ -33,7 +33,7 @@ void process_in_order(std::size_t count, Executor& executor, const Make& make, c
     const std::size_t some = std::min(batch, count - begin);
     std::vector<std::optional<decltype(make(begin))>> made(some);
     std::vector<std::exception_ptr> failures(some);
-    executor.for_chunks(some, 1, [&](std::size_t i, std::size_t, std::size_t) {
+    executor.for_each_chunk(some, 1, [&](std::size_t i, std::size_t, std::size_t) {
       try {
         made[i].emplace(make(begin + i));
       } catch (const Error&) {

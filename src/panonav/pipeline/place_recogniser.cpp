@@ -37,7 +37,8 @@ class ObservationQuery {
   }
   [[nodiscard]] QueryFeatures features() {
     return [this](Handedness handedness) {
-      return encoder_.features(handedness == Handedness::as_seen ? panorama() : mirror(panorama()));
+      return encoder_.features(handedness == Handedness::original ? panorama()
+                                                                  : mirror(panorama()));
     };
   }
 
@@ -94,7 +95,7 @@ struct PlaceRecogniser::Implementation {
   }
 
   // True if stored models can be used: they were learnt with all components.
-  [[nodiscard]] bool can_use_kept_models() const { return options.localiser.components == 0; }
+  [[nodiscard]] bool can_use_stored_models() const { return options.localiser.components == 0; }
 
   /// Returns a cached source of the memory's features; empty if the memory has none. Features of
   /// views after `last_view` are ignored.
@@ -106,11 +107,11 @@ struct PlaceRecogniser::Implementation {
 
   void learn_from_held_views(const MemoryFile& file) {
     const FeatureSource source = get_or_create_features(file, std::ranges::max(memory->views()));
-    if (can_use_kept_models()) models = load_stored_models(file, *memory);
+    if (can_use_stored_models()) models = load_stored_models(file, *memory);
     if (!models) models = learn_place_models(*memory, source, options.localiser.components);
     Localiser localiser(*memory, models->place, models->position, options.localiser,
                         models->spacing_m);
-    publish(std::move(localiser), source);
+    set_localiser(std::move(localiser), source);
   }
 
   void learn_from_index(const MemoryFile& file) {
@@ -118,11 +119,11 @@ struct PlaceRecogniser::Implementation {
     if (views.empty()) throw_empty_memory(file);
     const FeatureSource source = get_or_create_features(file, std::nullopt);
     const std::unique_ptr<ViewIndex> index = indexed->index();
-    const std::vector<ViewId> drawn = sample_reference_views(views);
-    models = find_models(file, *index, views, drawn, source);
-    Localiser localiser(std::make_shared<const VisualMemory>(index->load(drawn)), models->place,
+    const std::vector<ViewId> sampled = sample_reference_views(views);
+    models = find_models(file, *index, views, sampled, source);
+    Localiser localiser(std::make_shared<const VisualMemory>(index->load(sampled)), models->place,
                         models->position, options.localiser, models->spacing_m);
-    publish(std::move(localiser), source);
+    set_localiser(std::move(localiser), source);
   }
 
   /// Returns models of a memory that is not held. A small memory uses current stored models or
@@ -130,21 +131,21 @@ struct PlaceRecogniser::Implementation {
   /// from a part of the views.
   [[nodiscard]] LearntModels find_models(const MemoryFile& file, ViewIndex& index,
                                          std::span<const ViewId> views,
-                                         std::span<const ViewId> drawn,
+                                         std::span<const ViewId> sampled,
                                          const FeatureSource& source) const {
     const bool is_small = views.size() <= options.max_learnt_views;
     std::optional<LearntModels> found;
     std::optional<VisualMemory> all;
     if (is_small) all.emplace(index.load(views));
-    if (can_use_kept_models())
+    if (can_use_stored_models())
       found = is_small ? load_stored_models(file, *all) : load_stored_models(file);
     if (!found && !is_small) found = models;
     if (found) return *found;
-    if (!is_small) all = load_learning_sample(index, views, drawn, options.max_learnt_views);
+    if (!is_small) all = load_learning_sample(index, views, sampled, options.max_learnt_views);
     return learn_place_models(*all, source, options.localiser.components);
   }
 
-  void publish(Localiser localiser, const FeatureSource& source) {
+  void set_localiser(Localiser localiser, const FeatureSource& source) {
     if (source) localiser.use_features(source, models->by_features);
     auto next = std::make_shared<const Localiser>(std::move(localiser));
     const std::lock_guard lock(mutex);
@@ -200,7 +201,7 @@ Place PlaceRecogniser::localise(const Observation& observation,
   const Implementation& own = *implementation_;
   const std::shared_ptr<const Localiser> localiser = own.localiser();
   ObservationQuery query(own.encoder, observation);
-  const PackedSignature signature = query.signature(localiser->ranks_by_features());
+  const PackedSignature signature = query.signature(localiser->is_ranked_by_features());
   const std::unique_ptr<ViewIndex> index = own.index();
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {

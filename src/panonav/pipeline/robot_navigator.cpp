@@ -28,7 +28,7 @@ std::optional<NavigationGraph> load_graph(RobotNavigatorOptions::GraphOrigin ori
       if (!map) return std::nullopt;
       std::vector<ViewId> views;
       for (const TopologicalMap::Node& node : map->nodes) views.push_back(node.view);
-      return graph_from_map_and_neighbours(*map, file.load(views), executor);
+      return make_graph_from_map_and_neighbours(*map, file.load(views), executor);
     }
     case RobotNavigatorOptions::GraphOrigin::lattice: {
       const auto map = file.map("lattice");
@@ -56,7 +56,7 @@ NavigationGraph load_requested_graph(
     origin = *requested;
     auto graph = load_graph(origin, source, executor);
     if (graph) return std::move(*graph);
-    throw FileError(path, "has no " + std::string(name_of(origin)) +
+    throw FileError(path, "has no " + std::string(to_string(origin)) +
                               "; leave out the option edges to use the existing edges");
   }
   for (std::size_t i = 0;; ++i) {
@@ -109,7 +109,7 @@ KnownRoute load_known_route(const MemoryFileViews& source, const std::string& na
 
 }  // namespace
 
-std::string_view name_of(RobotNavigatorOptions::GraphOrigin origin) {
+std::string_view to_string(RobotNavigatorOptions::GraphOrigin origin) {
   return origin_names.at(static_cast<std::size_t>(origin));
 }
 
@@ -171,28 +171,29 @@ RobotNavigator::Step RobotNavigator::step(const Observation& observation, RobotR
   const BaseOptions& base = options_.base;
   const Pose2 moved = odometry_ && observation.odometry
                           ? inverse(*odometry_) * *observation.odometry
-                          : integrate_velocity(last_.velocity, base.period_s);
+                          : integrate_velocity(last_step_.velocity, base.period_s);
   odometry_ = observation.odometry;
   moved_ = moved_ * moved;
   target_ = inverse(moved) * target_;
   time_left_s_ -= base.period_s;
-  last_.decided =
+  last_step_.decided =
       report.obstacle || time_left_s_ <= 0.0 || std::hypot(target_.x_m, target_.y_m) <= near_m;
-  if (last_.decided) {
-    last_.decision = observe(observation, report);
+  if (last_step_.decided) {
+    last_step_.decision = observe(observation, report);
     moved_ = {};
-    const double advance_m = last_.decision.advance_m;
-    const double direction_rad = last_.decision.direction_rad;
+    const double advance_m = last_step_.decision.advance_m;
+    const double direction_rad = last_step_.decision.direction_rad;
     target_ = {advance_m * std::cos(direction_rad), advance_m * std::sin(direction_rad)};
     // Allows twice the expected time, since wheels may slip.
     time_left_s_ = 2.0 * (std::numbers::pi / base.turn_rad_s + advance_m / base.speed_m_s) + 1.0;
   }
-  last_.velocity = {};
+  last_step_.velocity = {};
   const double left_m = std::hypot(target_.x_m, target_.y_m);
-  if (last_.decision.state == NavigationDecision::State::moving && left_m > 0.0) {
-    last_.velocity = compute_command_towards(std::atan2(target_.y_m, target_.x_m), left_m, base);
+  if (last_step_.decision.state == NavigationDecision::State::moving && left_m > 0.0) {
+    last_step_.velocity =
+        compute_command_towards(std::atan2(target_.y_m, target_.x_m), left_m, base);
   }
-  return last_;
+  return last_step_;
 }
 
 }  // namespace panonav

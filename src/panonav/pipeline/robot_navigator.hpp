@@ -38,7 +38,7 @@ struct RobotNavigatorOptions {
   KnownRouteOptions known_route;  ///< how the route is followed
 };
 /// Returns "map", "lattice", "links" or "arrangement".
-[[nodiscard]] std::string_view name_of(RobotNavigatorOptions::GraphOrigin origin);
+[[nodiscard]] std::string_view to_string(RobotNavigatorOptions::GraphOrigin origin);
 /// Returns the origin with this name; nullopt if there is none.
 [[nodiscard]] std::optional<RobotNavigatorOptions::GraphOrigin> parse_graph_origin(
     std::string_view name);
@@ -110,7 +110,7 @@ class RobotNavigator {
   std::optional<LineEncoder> line_encoder_;
   std::optional<Navigator> navigator_;
   // State of the current step.
-  Step last_;
+  Step last_step_;
   Point2 target_;                  // end of the step in the current robot frame
   double time_left_s_ = 0.0;       // after which the step ends in any case
   Pose2 moved_;                    // motion since the decision

@@ -9,7 +9,7 @@
 
 namespace panonav {
 
-std::string_view name_of(RouteDriver::State state) {
+std::string_view to_string(RouteDriver::State state) {
   constexpr std::array<std::string_view, 4> names{"searching", "driving", "arrived", "lost"};
   return names.at(static_cast<std::size_t>(state));
 }
@@ -33,8 +33,8 @@ void RouteDriver::plan_path_from(Point2 place) {
   });
   start_m_ = pass == passes.end() ? project_onto_route(poses(), place).along_m : pass->along_m;
   // Smallest length of a path, needed if the robot is already at the route's end.
-  constexpr double min_way_m = 0.01;
-  const double from_m = std::min(start_m_, std::max(0.0, length_m_ - min_way_m));
+  constexpr double min_path_m = 0.01;
+  const double from_m = std::min(start_m_, std::max(0.0, length_m_ - min_path_m));
   path_.emplace(route_segment(poses(), from_m, length_m_), options_.path);
 }
 
@@ -55,7 +55,7 @@ RouteDriver::Step RouteDriver::step(const Observation& observation,
   blind_m_ = step.fix || confirmed ? 0.0 : blind_m_ + std::hypot(moved.x_m, moved.y_m);
   if (!path_) {
     if (!step.fix) {
-      if (++searches_ >= max_searches) step.state = RouteDriver::State::lost;
+      if (++failed_searches_ >= max_searches) step.state = RouteDriver::State::lost;
       return step;
     }
     plan_path_from(step.fix->pose.position());

@@ -75,10 +75,10 @@ class RouteDriver {
   double length_m_ = 0.0;
   std::optional<Pose2> odometry_;  // of the last step
   double blind_m_ = 0.0;           // driven since the last fix
-  int searches_ = 0;
+  int failed_searches_ = 0;
 };
 
 /// Returns "searching", "driving", "arrived" or "lost".
-[[nodiscard]] std::string_view name_of(RouteDriver::State state);
+[[nodiscard]] std::string_view to_string(RouteDriver::State state);
 
 }  // namespace panonav

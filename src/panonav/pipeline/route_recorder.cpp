@@ -66,7 +66,7 @@ RouteRecorder::RouteRecorder(MemoryFile memory, const std::optional<PictureSourc
       file_(std::move(memory)),
       source_(choose_source(file_, options)),
       encoder_(source.value_or(file_.header().source), source_),
-      end_(find_route_end(file_, options.name)) {}
+      route_end_(find_route_end(file_, options.name)) {}
 
 std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
   const auto route = file_.route(options_.name);
@@ -86,7 +86,7 @@ std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
     }
   }
   if (found < known.size()) return 0;
-  last_ = end_;
+  last_ = route_end_;
   return skipped;
 }
 
@@ -111,8 +111,8 @@ RouteRecorder::EncodedLine RouteRecorder::encode(const Observation& observation)
 }
 
 void RouteRecorder::add(EncodedLine line) {
-  if (!last_ && end_) {
-    const double gap_m = distance(end_->position(), line.pose.position());
+  if (!last_ && route_end_) {
+    const double gap_m = distance(route_end_->position(), line.pose.position());
     if (gap_m > max_gap_m) {
       throw FileError(file_.path().string(), "the first line lies " + format_number(gap_m) +
                                                  " m from the end of the route '" + options_.name +
@@ -139,10 +139,10 @@ void RouteRecorder::flush() {
   }
   waiting_.clear();
   file_.change([&] {
-    if (!source_kept_) store_route_source(file_, options_.name, source_);
+    if (!is_source_stored_) store_route_source(file_, options_.name, source_);
     appended_ += file_.append_route(options_.name, more);
   });
-  source_kept_ = true;
+  is_source_stored_ = true;
 }
 
 RouteRecorder::Recorded RouteRecorder::record(

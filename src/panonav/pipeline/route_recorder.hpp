@@ -97,10 +97,10 @@ class RouteRecorder {
   RouteRecorderOptions options_;
   MemoryFile file_;
   RouteSource source_;
-  bool source_kept_ = false;
+  bool is_source_stored_ = false;
   LineEncoder encoder_;
-  std::optional<Pose2> end_;   // last pose of the route before this recording
-  std::optional<Pose2> last_;  // pose of the last added line
+  std::optional<Pose2> route_end_;  // last pose of the route before this recording
+  std::optional<Pose2> last_;       // pose of the last added line
   std::vector<EncodedLine> waiting_;
   std::size_t appended_ = 0;
 };

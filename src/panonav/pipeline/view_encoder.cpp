@@ -113,10 +113,10 @@ Panorama ViewEncoder::panorama(ImageView picture, const Tilt& tilt) const {
     require_same("rows", picture.height, picture_shape_->rows);
     require_same("columns", picture.width, picture_shape_->columns);
   }
-  return checked(reader_.convert(picture, tilt));
+  return check_panorama(reader_.convert(picture, tilt));
 }
 
-Panorama ViewEncoder::checked(Panorama panorama) const {
+Panorama ViewEncoder::check_panorama(Panorama panorama) const {
   require_same("rows", panorama.rows(), header_.shape.rows);
   require_same("columns", panorama.columns(), header_.panorama_columns);
   check_band(panorama.elevations());
@@ -134,7 +134,7 @@ Panorama ViewEncoder::panorama(const Observation& observation) const {
     const Tilt tilt = observation.tilt.value_or(Tilt{});
     if (const auto* image = std::get_if<Image>(&observation.picture))
       return panorama(image->view(), tilt);
-    return checked(level_panorama(std::get<Panorama>(observation.picture), tilt));
+    return check_panorama(level_panorama(std::get<Panorama>(observation.picture), tilt));
   });
 }
 
@@ -205,14 +205,15 @@ PanoramaShape choose_panorama_shape(const PictureSource& source, const Signature
 void visit_options(SignatureOptions& options, OptionVisitor& visitor) {
   using T = SignatureOptions;
   constexpr OptionTable table{
-      option<&T::rows>(
-          "Rows of the panorama; images are resampled; 0: 80, or the rows of the given panorama", 0,
-          4096),
-      option<&T::columns>("Columns of the panorama; images are resampled; 0: 512, or the columns "
-                          "of the given panorama",
+      option<&T::rows>("Rows of the panorama to which images are resampled; 0: as many rows as the "
+                       "input panorama has; for other images: 80",
+                       0, 4096),
+      option<&T::columns>("Columns of the panorama to which images are resampled; 0: as many "
+                          "columns as the input panorama has; for other images: 512",
                           0, 16384),
-      option<&T::components>("Number of Fourier components of a signature, including k = 0", 1,
-                             1024),
+      option<&T::components>("Number of Fourier components of each image row, including the "
+                             "constant component (k = 0)",
+                             1, 1024),
   };
   table.visit(options, visitor);
 }
@@ -269,7 +270,8 @@ int thumbnail_columns(const MemoryHeader& header) noexcept {
 
 void parallel_for(Executor& executor, std::size_t count,
                   const std::function<void(std::size_t)>& body) {
-  executor.for_chunks(count, 1, [&](std::size_t begin, std::size_t, std::size_t) { body(begin); });
+  executor.for_each_chunk(count, 1,
+                          [&](std::size_t begin, std::size_t, std::size_t) { body(begin); });
 }
 
 }  // namespace panonav

@@ -73,7 +73,7 @@ class ViewEncoder {
   [[nodiscard]] std::optional<LocalFeatures> features(const Panorama& panorama) const;
 
  private:
-  [[nodiscard]] Panorama checked(Panorama panorama) const;
+  [[nodiscard]] Panorama check_panorama(Panorama panorama) const;
   void check_band(const std::optional<ElevationBand>& band) const;
 
   class Workspaces;

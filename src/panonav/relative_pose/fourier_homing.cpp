@@ -206,7 +206,7 @@ void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
 }
 
 void PairOfViews::rotate_home(double turn_rad) {
-  for_frequencies(known_ + 1, turn_rad, [&](int k, float c, float s) {
+  for_each_frequency(known_ + 1, turn_rad, [&](int k, float c, float s) {
     const float* const a = home_.cosines(k).data();
     const float* const b = home_.sines(k).data();
     float* const turned_a = c_.home_a(k);
@@ -353,10 +353,10 @@ void PairOfViews::displace_current(const DisplacementStart& start) {
       a[static_cast<std::size_t>(k)] = c_.current_a(k)[y];
       b[static_cast<std::size_t>(k)] = c_.current_b(k)[y];
     }
-    turn_row(std::span(a).first(count), std::span(b).first(count), start.ahead_rad);
+    rotate_row(std::span(a).first(count), std::span(b).first(count), start.ahead_rad);
     displace(start.displacement, std::span(a).first(count), std::span(b).first(count),
              std::span(to_a).first(count), std::span(to_b).first(count));
-    turn_row(std::span(to_a).first(count), std::span(to_b).first(count), -start.ahead_rad);
+    rotate_row(std::span(to_a).first(count), std::span(to_b).first(count), -start.ahead_rad);
     for (int k = 0; k <= known_; ++k) {
       c_.current_a(k)[y] = to_a[static_cast<std::size_t>(k)];
       c_.current_b(k)[y] = to_b[static_cast<std::size_t>(k)];
@@ -406,13 +406,14 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::highest>("highest compared frequency; 0: all", 0, 62),
       option<&T::iterations>("number of refinements of the solution", 0, 20),
-      option<&T::rising>("compare higher frequencies in each iteration"),
+      option<&T::rising>("compare higher frequencies with each iteration"),
       choice<&T::turn>("method for the first estimate of the heading", "sequential", "global"),
       choice<&T::gradient>("views whose gradients are used", "current", "both"),
       choice<&T::weights>("weights of components and rows", "equal", "coherence"),
-      option<&T::starting_estimates>("number of tested headings", 1,
+      option<&T::starting_estimates>("number of headings with which the solution is started", 1,
                                      static_cast<double>(max_starting_estimates)),
-      option<&T::displacement_search>("test displacements up to two thirds of R first"),
+      option<&T::displacement_search>(
+          "first test displacements up to two thirds of R, the typical distance of objects"),
       option<&T::vertical_motion>(
           "also model the vertical motion of rows above and below the horizon"),
       option<&T::tilt>("allow a small tilt of the robot"),

@@ -49,7 +49,7 @@ std::vector<float> average_rows(const Panorama& panorama, double half_band_rad) 
 void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor) {
   using T = HorizonScanlineOptions;
   constexpr OptionTable table{
-      option<&T::columns>("number of values of a line", 16, 16384),
+      option<&T::columns>("number of pixels of a line", 16, 16384),
       option<&T::half_band_rad>("rows within this angle from the horizon are averaged", 0, 0.5),
   };
   table.visit(options, visitor);

@@ -122,9 +122,10 @@ class RouteLines::FitProblem {
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
   using T = RouteFitOptions;
   constexpr OptionTable table{
-      option<&T::coarse_deg>("width of the smoothing of the lines at the first level", 0, 45),
+      option<&T::coarse_deg>("width of the filter that smooths the lines at the first level", 0,
+                             45),
       option<&T::levels>("number of levels from coarse to fine", 1, 8),
-      option<&T::max_steps>("number of steps at each level", 1, 100),
+      option<&T::max_steps>("largest number of steps at each level", 1, 100),
       option<&T::reach_m>(
           "largest distance from the predicted position at which lines are compared", 0.1, 1000),
       option<&T::robust>("reduce the weight of changed parts of the scene"),

@@ -21,7 +21,7 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
                                    100),
       option<&T::search_sides>("number of tested positions on each side of the route", 0, 100),
       option<&T::max_candidates>("number of positions that a search refines", 1, 1000),
-      option<&T::recovery_m>("largest error of a predicted position", 0, 100),
+      option<&T::recovery_m>("assumed largest error of a predicted position", 0, 100),
       option<&T::surprise_m>(
           "distance from the predicted position above which the next line must confirm the result",
           0, 100),

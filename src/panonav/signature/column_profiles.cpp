@@ -228,8 +228,8 @@ ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& ref
   return make_column_match(query, costs, static_cast<std::size_t>(best));
 }
 
-std::array<ColumnMatch, 2> match_columns_two_best(const ColumnProfiles& query,
-                                                  const ColumnProfiles& reference) {
+std::array<ColumnMatch, 2> find_two_best_column_matches(const ColumnProfiles& query,
+                                                        const ColumnProfiles& reference) {
   constexpr std::size_t min_separation = (columns + 5) / 6;
   const auto costs = compute_rotation_costs(query, reference);
   // Packs each cost with its rotation in the low bits, so that one minimum gives both (and the

@@ -61,8 +61,8 @@ struct ColumnMatch {
 
 /// Finds the best rotation, as `match_columns`, and the best one at least 60 degrees away from it:
 /// a corridor looks much the same after half a turn. Slightly slower than `match_columns`.
-[[nodiscard]] std::array<ColumnMatch, 2> match_columns_two_best(const ColumnProfiles& query,
-                                                                const ColumnProfiles& reference);
+[[nodiscard]] std::array<ColumnMatch, 2> find_two_best_column_matches(
+    const ColumnProfiles& query, const ColumnProfiles& reference);
 
 /// Computes the mean absolute difference of each compared column in units of contrast, with the
 /// robot rotated by `heading_rad` relative to the reference: for each column the minimum over the

@@ -303,12 +303,12 @@ struct AngleTable {
 };
 // Tabulates cosines and sines of the multiples of `step`.
 AngleTable make_angle_table(double step) {
-  AngleTable circle{};
-  for (std::size_t i = 0; i < circle.sines.size(); ++i) {
-    circle.sines[i] = static_cast<float>(std::sin(step * static_cast<double>(i)));
-    circle.cosines[i] = static_cast<float>(std::cos(step * static_cast<double>(i)));
+  AngleTable table{};
+  for (std::size_t i = 0; i < table.sines.size(); ++i) {
+    table.sines[i] = static_cast<float>(std::sin(step * static_cast<double>(i)));
+    table.cosines[i] = static_cast<float>(std::cos(step * static_cast<double>(i)));
   }
-  return circle;
+  return table;
 }
 
 }  // namespace

@@ -36,10 +36,10 @@ std::shared_ptr<const MemoryScheme> find_registered_scheme(const std::filesystem
 
 struct RegisteredHandler {
   std::mutex mutex;
-  LeftOutHandler handler;
+  SkippedRowHandler handler;
 };
 
-RegisteredHandler& left_out_handler() {
+RegisteredHandler& skipped_row_handler() {
   static RegisteredHandler registered;
   return registered;
 }
@@ -64,14 +64,14 @@ std::chrono::milliseconds reply_timeout() {
   return process_reply_timeout;
 }
 
-void set_left_out_handler(LeftOutHandler handler) {
-  RegisteredHandler& registered = left_out_handler();
+void set_skipped_row_handler(SkippedRowHandler handler) {
+  RegisteredHandler& registered = skipped_row_handler();
   const std::lock_guard lock(registered.mutex);
   registered.handler = std::move(handler);
 }
 
-void report_left_out(const std::filesystem::path& memory, const MemoryFile::Fault& row) {
-  RegisteredHandler& registered = left_out_handler();
+void report_skipped_row(const std::filesystem::path& memory, const MemoryFile::Fault& row) {
+  RegisteredHandler& registered = skipped_row_handler();
   const std::lock_guard lock(registered.mutex);
   if (registered.handler) registered.handler(memory, row);
 }
@@ -106,7 +106,7 @@ bool memory_exists(const std::filesystem::path& memory) {
 
 std::string memory_name(const std::filesystem::path& memory) {
   const auto scheme = find_memory_scheme(memory);
-  return scheme ? scheme->name_memory(memory) : memory.filename().string();
+  return scheme ? scheme->get_memory_name(memory) : memory.filename().string();
 }
 
 }  // namespace panonav

@@ -90,7 +90,7 @@ struct MemoryFile::Implementation {
   void append_link(const LinkRow& row, VisualMemory& memory) const {
     if (tables->is_left_out(row.a) || tables->is_left_out(row.b)) return;
     const Link link = tables->checked(row);
-    if (!memory.contains(link.a) || !memory.contains(link.b)) tables->fail_incomplete(link);
+    if (!memory.contains(link.a) || !memory.contains(link.b)) tables->fail_link_without_view(link);
     memory.link(link);
   }
   /// Returns the attachment of a view; nullopt if there is none, or if it was left out as bad.
@@ -163,7 +163,8 @@ void MemoryFile::copy_to(const std::filesystem::path& path) const {
       std::vector<Link> kept_links;
       for (const Link& link : links()) {
         from.accept_row(std::nullopt, [&] {
-          if (!copied.contains(link.a) || !copied.contains(link.b)) from.fail_incomplete(link);
+          if (!copied.contains(link.a) || !copied.contains(link.b))
+            from.fail_link_without_view(link);
           kept_links.push_back(link);
         });
       }
@@ -338,7 +339,7 @@ void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
 std::optional<TopologicalMap> MemoryFile::map(std::string_view name) const {
   return implementation_->read([&](MemoryTables& tables) {
     auto map = read_map(tables, name);
-    if (map) forget_views(*map, tables.left_out_views());
+    if (map) remove_views_from_map(*map, tables.left_out_views());
     return map;
   });
 }

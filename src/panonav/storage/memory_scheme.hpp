@@ -22,7 +22,7 @@ class MemoryScheme {
   /// True if there is a memory at the address.
   [[nodiscard]] virtual bool exists(const std::filesystem::path& address) const = 0;
   /// Returns the name of the memory. Throws FileError if the address names none.
-  [[nodiscard]] virtual std::string name_memory(const std::filesystem::path& address) const = 0;
+  [[nodiscard]] virtual std::string get_memory_name(const std::filesystem::path& address) const = 0;
   /// Creates a memory with the content that `fill` writes, completely or not at all. Throws
   /// FileError if it exists already.
   virtual void create(const std::filesystem::path& address, const MemoryHeader& header,
@@ -55,13 +55,13 @@ void set_reply_timeout(std::chrono::milliseconds timeout);
 
 /// Called from any thread with a memory and a row that was left out because our programs never
 /// write such content; `view` is nullopt if the row is no view.
-using LeftOutHandler =
+using SkippedRowHandler =
     std::function<void(const std::filesystem::path& memory, const MemoryFile::Fault& row)>;
 /// Sets the handler to which the first few bad rows of each opened memory on a server are reported;
 /// by default there is none. Any thread may call.
-void set_left_out_handler(LeftOutHandler handler);
-/// Calls the handler of `set_left_out_handler`; for schemes.
-void report_left_out(const std::filesystem::path& memory, const MemoryFile::Fault& row);
+void set_skipped_row_handler(SkippedRowHandler handler);
+/// Calls the handler of `set_skipped_row_handler`; for schemes.
+void report_skipped_row(const std::filesystem::path& memory, const MemoryFile::Fault& row);
 
 /// Returns the scheme of an address; nullptr for the path of a file. Throws FileError if the
 /// scheme of the address is not registered.

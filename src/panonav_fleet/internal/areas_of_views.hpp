@@ -29,17 +29,18 @@ class AreasOfViews {
     return view.value < numbers_.size() && numbers_[view.value] != no_view;
   }
   /// Returns the views of these areas, ascending. Cost: a pass over all ids.
-  [[nodiscard]] std::vector<ViewId> within(const std::set<MemoryArea>& areas) const {
+  [[nodiscard]] std::vector<ViewId> find_views_in(const std::set<MemoryArea>& areas) const {
     std::vector<std::uint32_t> known;
     for (const MemoryArea& area : areas) {
       const auto found = areas_.find(area);
       if (found != areas_.end()) known.push_back(found->second);
     }
     std::ranges::sort(known);
-    return with([&](std::uint32_t number) { return std::ranges::binary_search(known, number); });
+    return select_views(
+        [&](std::uint32_t number) { return std::ranges::binary_search(known, number); });
   }
   [[nodiscard]] std::vector<ViewId> all() const {
-    return with([](std::uint32_t number) { return number != no_view; });
+    return select_views([](std::uint32_t number) { return number != no_view; });
   }
   [[nodiscard]] std::uint64_t bytes() const { return numbers_.size() * sizeof(std::uint32_t); }
 
@@ -51,10 +52,10 @@ class AreasOfViews {
         .first->second;
   }
   template <class Condition>
-  [[nodiscard]] std::vector<ViewId> with(const Condition& holds) const {
+  [[nodiscard]] std::vector<ViewId> select_views(const Condition& matches) const {
     std::vector<ViewId> views;
     for (std::size_t id = 0; id < numbers_.size(); ++id) {
-      if (holds(numbers_[id])) views.push_back({static_cast<std::uint32_t>(id)});
+      if (matches(numbers_[id])) views.push_back({static_cast<std::uint32_t>(id)});
     }
     return views;
   }

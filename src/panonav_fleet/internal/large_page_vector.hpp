@@ -15,7 +15,7 @@ namespace panonav::fleet {
 /// requests pages from the system itself, because a heap would leave gaps between aligned blocks.
 template <class T>
 struct LargePageAllocator {
-  static constexpr std::size_t page = std::size_t{2} << 20U;
+  static constexpr std::size_t page_bytes = std::size_t{2} << 20U;
   using value_type = T;
   LargePageAllocator() = default;
   template <class U>
@@ -23,13 +23,14 @@ struct LargePageAllocator {
   [[nodiscard]] T* allocate(std::size_t count) {
     if (is_small(count)) return CacheLineAllocator<T>().allocate(count);
     const std::size_t bytes = round_up_to_page(count);
-    void* const got =
-        mmap(nullptr, bytes + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    void* const got = mmap(nullptr, bytes + page_bytes, PROT_READ | PROT_WRITE,
+                           MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (got == MAP_FAILED) throw std::bad_alloc();
     auto* const begin = static_cast<char*>(got);
-    const std::size_t before = (page - reinterpret_cast<std::uintptr_t>(begin) % page) % page;
+    const std::size_t before =
+        (page_bytes - reinterpret_cast<std::uintptr_t>(begin) % page_bytes) % page_bytes;
     if (before > 0) munmap(begin, before);
-    if (before < page) munmap(begin + before + bytes, page - before);
+    if (before < page_bytes) munmap(begin + before + bytes, page_bytes - before);
 #ifdef MADV_HUGEPAGE
     static_cast<void>(madvise(begin + before, bytes, MADV_HUGEPAGE));
 #endif
@@ -45,10 +46,10 @@ struct LargePageAllocator {
 
  private:
   static bool is_small(std::size_t count) {
-    return count * sizeof(T) < page / 2;
+    return count * sizeof(T) < page_bytes / 2;
   }
   static std::size_t round_up_to_page(std::size_t count) {
-    return (count * sizeof(T) + page - 1) / page * page;
+    return (count * sizeof(T) + page_bytes - 1) / page_bytes * page_bytes;
   }
 };
 

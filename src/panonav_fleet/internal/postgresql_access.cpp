@@ -80,7 +80,7 @@ class PostgresqlScheme final : public MemoryScheme {
     return find_memory(memories, parsed).has_value();
   }
 
-  [[nodiscard]] std::string name_memory(const std::filesystem::path& address) const override {
+  [[nodiscard]] std::string get_memory_name(const std::filesystem::path& address) const override {
     return parse_server_address(address).memory;
   }
 

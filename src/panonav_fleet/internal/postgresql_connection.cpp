@@ -174,7 +174,7 @@ void PostgresqlConnection::fail(const pg_result* result) const {
   throw FileError(printable_address_.native(), "cannot be used: " + text);
 }
 
-PostgresqlRows PostgresqlConnection::checked(pg_result* raw) {
+PostgresqlRows PostgresqlConnection::check_result(pg_result* raw) {
   Result result(raw);
   const auto status = PQresultStatus(raw);
   if (status != PGRES_TUPLES_OK && status != PGRES_COMMAND_OK && status != PGRES_SINGLE_TUPLE) {
@@ -243,19 +243,19 @@ pg_result* PostgresqlConnection::exchange(const std::string& sql, const Postgres
 }
 
 void PostgresqlConnection::execute(const std::string& sql) {
-  static_cast<void>(checked(exchange(sql, nullptr)));
+  static_cast<void>(check_result(exchange(sql, nullptr)));
 }
 
 bool PostgresqlConnection::execute_unless_duplicate(const std::string& sql,
                                                     const PostgresqlValues* values) {
   Result result(exchange(sql, values));
   if (get_sqlstate(result.get()) == "23505") return false;
-  static_cast<void>(checked(result.release()));
+  static_cast<void>(check_result(result.release()));
   return true;
 }
 
 PostgresqlRows PostgresqlConnection::run(const std::string& sql, const PostgresqlValues& values) {
-  return checked(exchange(sql, &values));
+  return check_result(exchange(sql, &values));
 }
 
 void PostgresqlConnection::discard_results() noexcept {
@@ -286,7 +286,7 @@ void PostgresqlConnection::stream(const std::string& sql, const PostgresqlValues
   PQsetSingleRowMode(connection_.get());
   try {
     while (pg_result* result = next_result()) {
-      const PostgresqlRows rows = checked(result);
+      const PostgresqlRows rows = check_result(result);
       if (rows.size() > 0) take(rows);
     }
   } catch (...) {

@@ -43,7 +43,7 @@ class PostgresqlValues {
     bool null = false;
     std::string bytes;
   };
-  Value& next(unsigned type);
+  Value& add_value(unsigned type);
   /// Begins an array value and returns its bytes, to which its elements are then appended.
   std::string& begin_array(unsigned type, unsigned element_type, std::size_t count);
   std::vector<Value> values_;
@@ -126,7 +126,7 @@ class PostgresqlConnection {
   /// end, -2 on an error.
   [[nodiscard]] int next_copy_data(char*& sent) const;
   [[nodiscard]] pg_result* exchange(const std::string& sql, const PostgresqlValues* values);
-  PostgresqlRows checked(pg_result* result);
+  PostgresqlRows check_result(pg_result* result);
   [[noreturn]] void fail(const pg_result* result) const;
   [[nodiscard]] std::string message() const;
   void discard_results() noexcept;

@@ -99,9 +99,9 @@ class PostgresqlTables final : public MemoryTables {
                    std::int64_t checksum) override;
   [[nodiscard]] std::optional<StoredBytes> block(std::string_view route,
                                                  std::int64_t number) override;
-  [[nodiscard]] std::int64_t blocks(std::string_view route) override;
+  [[nodiscard]] std::int64_t block_count(std::string_view route) override;
   [[nodiscard]] std::int64_t route_bytes(std::string_view route) override;
-  [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
+  [[nodiscard]] std::vector<std::string> list_routes_with_blocks() override;
 
   void run_with_undo(const std::function<void()>& changes, const std::string& what) override;
   /// Returns at most one change, the last.
@@ -123,16 +123,16 @@ class PostgresqlTables final : public MemoryTables {
   /// Returns the id of this connection's session, to which the views that it adds refer.
   std::int64_t get_or_create_session();
   /// Records a change at a position for the notification of the transaction.
-  void note_changed_area(const std::optional<double>& x_m, const std::optional<double>& y_m) {
+  void record_changed_area(const std::optional<double>& x_m, const std::optional<double>& y_m) {
     if (x_m && y_m) {
       areas_.insert(to_memory_area(*x_m, *y_m));
     } else {
       changes_unplaced_views_ = true;
     }
   }
-  void note_changed_area(const std::optional<ReferencePose>& pose) {
+  void record_changed_area(const std::optional<ReferencePose>& pose) {
     if (pose) {
-      note_changed_area(pose->x_m, pose->y_m);
+      record_changed_area(pose->x_m, pose->y_m);
     } else {
       changes_unplaced_views_ = true;
     }
@@ -151,7 +151,7 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] ViewRow read_view_row(const Rows& rows) const;
   [[nodiscard]] std::vector<std::string> query_texts(const std::string& sql);
   void make_incoming_table_if_needed();
-  void note_changed_rows(const Rows& rows);
+  void record_changed_rows(const Rows& rows);
   void notify();
 
   std::optional<std::string> robot_;

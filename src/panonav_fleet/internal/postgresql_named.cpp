@@ -79,7 +79,7 @@ std::optional<StoredBytes> PostgresqlTables::block(std::string_view route, std::
   return StoredBytes{rows.copy(0, 0), rows.integer(0, 1)};
 }
 
-std::int64_t PostgresqlTables::blocks(std::string_view route) {
+std::int64_t PostgresqlTables::block_count(std::string_view route) {
   return run("SELECT count(*) FROM panonav.route_blocks WHERE memory = $1 AND route = $2", route)
       .integer(0, 0);
 }
@@ -92,7 +92,7 @@ std::int64_t PostgresqlTables::route_bytes(std::string_view route) {
       .integer(0, 0);
 }
 
-std::vector<std::string> PostgresqlTables::routes_with_blocks() {
+std::vector<std::string> PostgresqlTables::list_routes_with_blocks() {
   return query_texts("SELECT DISTINCT route FROM panonav.route_blocks WHERE memory = $1");
 }
 

@@ -15,7 +15,7 @@ namespace {
 constexpr const char* view_fields =
     "v.id, v.name, v.x_m, v.y_m, v.heading_rad, v.stamp_s, v.signature, v.checksum";
 
-std::string table_of(ViewAttachment table) {
+std::string attachment_table_name(ViewAttachment table) {
   return table == ViewAttachment::thumbnails ? "panonav.thumbnails" : "panonav.features";
 }
 
@@ -261,7 +261,7 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
     add_attachment(ids[i], view.features);
     thumbnails = thumbnails || !view.thumbnail.empty();
     features = features || !view.features.empty();
-    note_changed_area(view.info.pose);
+    record_changed_area(view.info.pose);
   }
   connection_.copy_in("COPY pg_temp.panonav_incoming FROM STDIN (FORMAT binary)", rows.finish());
   std::string sql =
@@ -269,13 +269,13 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
       "heading_rad, stamp_s, session, signature, checksum) SELECT " +
       memory + ", id, name, x_m, y_m, heading_rad, stamp_s, " + std::to_string(*session_) +
       ", signature, checksum FROM pg_temp.panonav_incoming;";
-  const auto beside = [&](const std::string& table, const std::string& column) {
+  const auto add_attachment_insert = [&](const std::string& table, const std::string& column) {
     sql += "INSERT INTO panonav." + table + "(memory, view, bytes, checksum) SELECT " + memory +
            ", id, " + column + ", " + column + "_checksum FROM pg_temp.panonav_incoming WHERE " +
            column + " IS NOT NULL;";
   };
-  if (thumbnails) beside("thumbnails", "thumbnail");
-  if (features) beside("features", "features");
+  if (thumbnails) add_attachment_insert("thumbnails", "thumbnail");
+  if (features) add_attachment_insert("features", "features");
   sql += "UPDATE panonav.memories SET last_view = " + std::to_string(ids.back().value) +
          " WHERE id = " + memory + "; RELEASE rows; TRUNCATE pg_temp.panonav_incoming";
   if (connection_.execute_unless_duplicate(sql)) return;
@@ -298,8 +298,8 @@ void PostgresqlTables::require_views(std::span<const ViewId> views) {
   if (missing.size() > 0) throw_unknown_view({static_cast<std::uint32_t>(missing.integer(0, 0))});
 }
 
-void PostgresqlTables::note_changed_rows(const Rows& rows) {
-  for (int i = 0; i < rows.size(); ++i) note_changed_area(rows.real(i, 0), rows.real(i, 1));
+void PostgresqlTables::record_changed_rows(const Rows& rows) {
+  for (int i = 0; i < rows.size(); ++i) record_changed_area(rows.real(i, 0), rows.real(i, 1));
 }
 
 void PostgresqlTables::remove(std::span<const ViewId> views) {
@@ -311,7 +311,7 @@ void PostgresqlTables::remove(std::span<const ViewId> views) {
         "DELETE FROM panonav.features WHERE memory = $1 AND view = ANY($2)"}) {
     connection_.run(sql, values);
   }
-  note_changed_rows(connection_.run(
+  record_changed_rows(connection_.run(
       "DELETE FROM panonav.views WHERE memory = $1 AND id = ANY($2) RETURNING x_m, y_m", values));
 }
 
@@ -328,8 +328,8 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
           &values)) {
     throw_used_name("view", info.name, path());
   }
-  note_changed_rows(before);
-  note_changed_area(info.pose);
+  record_changed_rows(before);
+  record_changed_area(info.pose);
 }
 
 void PostgresqlTables::read_views(const Consume<ViewRow>& consume) {
@@ -431,21 +431,23 @@ std::vector<PosedView> PostgresqlTables::views_within(const PositionBounds& boun
 }
 
 bool PostgresqlTables::has_attachments(ViewAttachment table) {
-  return run("SELECT (EXISTS (SELECT FROM " + table_of(table) + " WHERE memory = $1))::int4::int8")
+  return run("SELECT (EXISTS (SELECT FROM " + attachment_table_name(table) +
+             " WHERE memory = $1))::int4::int8")
              .integer(0, 0) != 0;
 }
 
 std::vector<ViewId> PostgresqlTables::views_with_attachment(ViewAttachment table) {
   std::vector<ViewId> views;
-  const Rows rows = run("SELECT view FROM " + table_of(table) + " WHERE memory = $1 ORDER BY view");
+  const Rows rows =
+      run("SELECT view FROM " + attachment_table_name(table) + " WHERE memory = $1 ORDER BY view");
   for (int i = 0; i < rows.size(); ++i) views.push_back(read_view_id(rows, i, 0));
   return views;
 }
 
 std::optional<StoredBytes> PostgresqlTables::bytes(ViewAttachment table, ViewId view) {
-  const Rows rows = connection_.run(
-      "SELECT bytes, checksum FROM " + table_of(table) + " WHERE memory = $1 AND view = $2",
-      Values().add(memory_).add(std::int64_t{view.value}));
+  const Rows rows = connection_.run("SELECT bytes, checksum FROM " + attachment_table_name(table) +
+                                        " WHERE memory = $1 AND view = $2",
+                                    Values().add(memory_).add(std::int64_t{view.value}));
   if (rows.size() == 0) return std::nullopt;
   return StoredBytes{rows.copy(0, 0), rows.integer(0, 1)};
 }

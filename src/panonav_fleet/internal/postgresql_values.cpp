@@ -28,13 +28,13 @@ std::uint64_t read_big_endian(std::string_view bytes) {
   return word;
 }
 
-PostgresqlValues::Value& PostgresqlValues::next(unsigned type) {
+PostgresqlValues::Value& PostgresqlValues::add_value(unsigned type) {
   return values_.emplace_back(Value{type, false, {}});
 }
 
 std::string& PostgresqlValues::begin_array(unsigned type, unsigned element_type,
                                            std::size_t count) {
-  std::string& bytes = next(type).bytes;
+  std::string& bytes = add_value(type).bytes;
   // Number of dimensions, 1 if there are nulls, element type; then size and first index of the
   // dimension.
   append_big_endian(bytes, count == 0 ? 0 : 1, 4);
@@ -48,12 +48,12 @@ std::string& PostgresqlValues::begin_array(unsigned type, unsigned element_type,
 }
 
 PostgresqlValues& PostgresqlValues::add(std::int64_t value) {
-  append_big_endian(next(int8_type).bytes, static_cast<std::uint64_t>(value), 8);
+  append_big_endian(add_value(int8_type).bytes, static_cast<std::uint64_t>(value), 8);
   return *this;
 }
 
 PostgresqlValues& PostgresqlValues::add(const std::optional<double>& value) {
-  Value& field = next(float8_type);
+  Value& field = add_value(float8_type);
   field.null = !value;
   // Adding 0 turns -0 into 0: SQLite does not keep the sign of zero, so the checksums do not have
   // it either.
@@ -62,17 +62,17 @@ PostgresqlValues& PostgresqlValues::add(const std::optional<double>& value) {
 }
 
 PostgresqlValues& PostgresqlValues::add(std::string_view text) {
-  next(text_type).bytes = text;
+  add_value(text_type).bytes = text;
   return *this;
 }
 
 PostgresqlValues& PostgresqlValues::add_null() {
-  next(text_type).null = true;
+  add_value(text_type).null = true;
   return *this;
 }
 
 PostgresqlValues& PostgresqlValues::add(std::span<const std::uint8_t> bytes) {
-  next(bytea_type).bytes.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  add_value(bytea_type).bytes.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   return *this;
 }
 

@@ -298,7 +298,7 @@ void ServerExchange::stage_views(std::span<const NewView> views) {
     add_attachment(signature);
     add_attachment(views[i].thumbnail);
     add_attachment(views[i].features);
-    tables_.note_changed_area(views[i].info.pose);
+    tables_.record_changed_area(views[i].info.pose);
   }
   connection().copy_in("COPY pg_temp.panonav_staged FROM STDIN (FORMAT binary)", rows.finish());
 }
@@ -370,13 +370,13 @@ std::vector<Upload> ServerExchange::submit_changes(const std::string& file, std:
     server_checksums.push_back(view.upload.server_checksum);
     rows.begin_row(6).add(std::int64_t{view.upload.server_view.value});
     add_info(rows, view.info);
-    tables_.note_changed_area(view.info.pose);
+    tables_.record_changed_area(view.info.pose);
   }
   const PostgresqlRows before =
       connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                        values().add(Numbers(ids)));
   for (int i = 0; i < before.size(); ++i) {
-    tables_.note_changed_area(before.real(i, 0), before.real(i, 1));
+    tables_.record_changed_area(before.real(i, 0), before.real(i, 1));
   }
   connection().execute(
       "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_changed(id bigint, name text COLLATE \"C\", "
@@ -411,7 +411,7 @@ std::vector<ViewId> ServerExchange::submit_removals(
       connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                        values().add(Numbers(ids)));
   for (int i = 0; i < there.size(); ++i)
-    tables_.note_changed_area(there.real(i, 0), there.real(i, 1));
+    tables_.record_changed_area(there.real(i, 0), there.real(i, 1));
   const std::string areas = tables_.consume_changed_areas();
   const PostgresqlRows rows = connection().run("SELECT panonav.take_removals($1, $2, $3, $4, $5)",
                                                values()

@@ -25,12 +25,12 @@ struct SketchedView {
 /// Buffers of a thread, reused for one segment after the other.
 struct SegmentScratch {
   explicit SegmentScratch(const SegmentLayout& layout)
-      : room(layout),
+      : query_buffers(layout),
         tables(layout.dimensions(0) * 16),
         bounds(layout.max_rows()),
         indices(layout.max_rows()),
         level_bounds(layout.max_rows()) {}
-  SketchSegment::Encoded room;
+  SketchSegment::QueryBuffers query_buffers;
   AlignedVector<std::uint8_t> tables, bounds;
   std::vector<std::uint32_t> indices, level_bounds;
   std::uint64_t bytes_read = 0;
@@ -60,7 +60,7 @@ class SketchSearch {
     std::ranges::sort(excluded_);
     query_.sums.resize(layout.total());
     layout.sum_blocks(query.magnitudes.data(), query_.sums.data());
-    query_.counted = layout.counted(components, mask.allowed_rows);
+    query_.sum_flags = layout.make_sum_flags(components, mask.allowed_rows);
   }
 
   SearchResult run() {
@@ -114,34 +114,35 @@ class SketchSearch {
     candidates.resize(count);
   }
 
-  std::span<const std::uint32_t> cells(const SketchSegment& segment, std::uint32_t limit,
-                                       std::size_t first, std::size_t count,
-                                       SegmentScratch& scratch) const {
+  std::span<const std::uint32_t> compute_cell_bounds(const SketchSegment& segment,
+                                                     std::uint32_t limit, std::size_t first,
+                                                     std::size_t count,
+                                                     SegmentScratch& scratch) const {
     scratch.bytes_read += count * kernels::cell_block * layout_.dimensions(0) / 2;
     return segment.compute_cell_bounds(layout_, kernels_, query_, scratch.tables, limit, first,
                                        count, scratch.bounds, scratch.indices);
   }
   /// Writes the lower bounds of rows at a level to scratch.level_bounds.
-  void bounds_at(const SketchSegment& segment, int level, std::span<const std::uint32_t> rows,
-                 SegmentScratch& scratch) const {
+  void compute_level_bounds(const SketchSegment& segment, int level,
+                            std::span<const std::uint32_t> rows, SegmentScratch& scratch) const {
     scratch.bytes_read += rows.size() * layout_.dimensions(level);
-    segment.bounds_at(layout_, kernels_, query_, level, rows, scratch.room,
-                      scratch.level_bounds.data());
+    segment.compute_level_bounds(layout_, kernels_, query_, level, rows, scratch.query_buffers,
+                                 scratch.level_bounds.data());
   }
 
   /// Calls body(segment number, index in the order, scratch, chunk number) for the segments `begin`
   /// to `end` of the order on the threads of the executor, in chunks of `chunk` segments.
   template <class Body>
-  void for_segments(std::size_t begin, std::size_t end, std::size_t chunk, const Body& body) {
+  void for_each_segment(std::size_t begin, std::size_t end, std::size_t chunk, const Body& body) {
     std::vector<std::uint64_t> bytes((end - begin + chunk - 1) / chunk);
-    executor_.for_chunks(end - begin, chunk,
-                         [&](std::size_t from, std::size_t to, std::size_t number) {
-                           SegmentScratch scratch(layout_);
-                           for (std::size_t i = from; i < to; ++i) {
-                             body(order_[begin + i].second, begin + i, scratch, number);
-                           }
-                           bytes[number] = scratch.bytes_read;
-                         });
+    executor_.for_each_chunk(end - begin, chunk,
+                             [&](std::size_t from, std::size_t to, std::size_t number) {
+                               SegmentScratch scratch(layout_);
+                               for (std::size_t i = from; i < to; ++i) {
+                                 body(order_[begin + i].second, begin + i, scratch, number);
+                               }
+                               bytes[number] = scratch.bytes_read;
+                             });
     for (const std::uint64_t of_chunk : bytes) result_.bytes_read += of_chunk;
   }
 
@@ -160,7 +161,7 @@ class SketchSearch {
       for (; end < candidates.size() && candidates[end].segment == number; ++end) {
         rows.push_back(candidates[end].row);
       }
-      bounds_at(*segments_[number].sketches, level, rows, scratch);
+      compute_level_bounds(*segments_[number].sketches, level, rows, scratch);
       for (std::size_t i = begin; i < end; ++i) {
         candidates[i].bound = scratch.level_bounds[i - begin];
       }
@@ -178,12 +179,12 @@ class SketchSearch {
     }
     query_.choose_unit(layout_, estimate_median_bound(*segments_.front().sketches));
     if (segments_.size() > first_segments) {
-      for_segments(0, order_.size(), 64,
-                   [this](std::uint32_t number, std::size_t place, SegmentScratch& scratch,
-                          std::size_t /*chunk*/) {
-                     order_[place].first =
-                         find_sample_minimum(*segments_[number].sketches, number, scratch);
-                   });
+      for_each_segment(0, order_.size(), 64,
+                       [this](std::uint32_t number, std::size_t index, SegmentScratch& scratch,
+                              std::size_t /*chunk*/) {
+                         order_[index].first =
+                             find_sample_minimum(*segments_[number].sketches, number, scratch);
+                       });
       std::ranges::sort(order_);
     }
     std::vector<SketchedView> best;
@@ -191,9 +192,9 @@ class SketchSearch {
     while (begin < order_.size() && (begin == 0 || best.size() < 2 * top_)) {
       const std::size_t end = std::min(order_.size(), begin + first_segments);
       std::vector<std::vector<SketchedView>> found(end - begin);
-      for_segments(begin, end, 1,
-                   [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
-                       std::size_t chunk) { collect_best(number, scratch, found[chunk]); });
+      for_each_segment(begin, end, 1,
+                       [&](std::uint32_t number, std::size_t /*index*/, SegmentScratch& scratch,
+                           std::size_t chunk) { collect_best(number, scratch, found[chunk]); });
       for (const auto& of_segment : found) {
         best.insert(best.end(), of_segment.begin(), of_segment.end());
       }
@@ -210,11 +211,11 @@ class SketchSearch {
 
   std::uint32_t find_sample_minimum(const SketchSegment& segment, std::size_t number,
                                     SegmentScratch& scratch) const {
-    segment.make_tables(layout_, kernels_, query_, scratch.tables);
+    segment.make_cell_tables(layout_, kernels_, query_, scratch.tables);
     std::uint32_t min_bound = std::numeric_limits<std::uint32_t>::max();
     for (std::size_t block = number % sampled_every; block < segment.blocks();
          block += sampled_every) {
-      cells(segment, 0, block, 1, scratch);
+      compute_cell_bounds(segment, 0, block, 1, scratch);
       const std::size_t rows =
           std::min(kernels::cell_block, segment.rows() - block * kernels::cell_block);
       min_bound = std::min<std::uint32_t>(
@@ -228,8 +229,8 @@ class SketchSearch {
                     std::vector<SketchedView>& best) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
-    sketches.make_tables(layout_, kernels_, query_, scratch.tables);
-    cells(sketches, 0, 0, sketches.blocks(), scratch);
+    sketches.make_cell_tables(layout_, kernels_, query_, scratch.tables);
+    compute_cell_bounds(sketches, 0, 0, sketches.blocks(), scratch);
     // Finds the smallest limit that enough of the bounds do not exceed.
     std::array<std::size_t, 256> counts{};
     for (std::size_t row = 0; row < sketches.rows(); ++row) ++counts[scratch.bounds[row]];
@@ -251,7 +252,7 @@ class SketchSearch {
       rows.push_back(row);
     }
     SegmentScratch scratch(layout_);
-    bounds_at(segment, 1, rows, scratch);
+    compute_level_bounds(segment, 1, rows, scratch);
     const auto bounds = std::span(scratch.level_bounds).first(rows.size());
     const auto middle = bounds.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
     std::ranges::nth_element(bounds, middle);
@@ -266,11 +267,11 @@ class SketchSearch {
     while (begin < order_.size()) {
       const std::size_t end = std::min(order_.size(), begin + std::max(2 * chunk, 3 * begin));
       std::vector<std::vector<SketchedView>> found((end - begin + chunk - 1) / chunk);
-      for_segments(begin, end, chunk,
-                   [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
-                       std::size_t of_chunk) {
-                     collect_within(number, nearest_.limit(), scratch, found[of_chunk]);
-                   });
+      for_each_segment(begin, end, chunk,
+                       [&](std::uint32_t number, std::size_t /*index*/, SegmentScratch& scratch,
+                           std::size_t of_chunk) {
+                         collect_within(number, nearest_.limit(), scratch, found[of_chunk]);
+                       });
       for (const auto& of_chunk : found) {
         waiting.insert(waiting.end(), of_chunk.begin(), of_chunk.end());
       }
@@ -285,8 +286,8 @@ class SketchSearch {
                       std::vector<SketchedView>& found) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
-    sketches.make_tables(layout_, kernels_, query_, scratch.tables);
-    const auto passed = cells(sketches, limit, 0, sketches.blocks(), scratch);
+    sketches.make_cell_tables(layout_, kernels_, query_, scratch.tables);
+    const auto passed = compute_cell_bounds(sketches, limit, 0, sketches.blocks(), scratch);
     // Filters in place: kept entries are written before the current one.
     const std::span<std::uint32_t> rows(scratch.indices.data(), passed.size());
     std::size_t kept = 0;
@@ -296,7 +297,7 @@ class SketchSearch {
     }
     for (int level = 1; level <= 2 && kept > 0; ++level) {
       const auto compared = rows.first(kept);
-      bounds_at(sketches, level, compared, scratch);
+      compute_level_bounds(sketches, level, compared, scratch);
       kept = 0;
       for (std::size_t i = 0; i < compared.size(); ++i) {
         if (scratch.level_bounds[i] > limit) continue;

@@ -10,8 +10,8 @@ namespace panonav::fleet {
 
 namespace {
 
-constexpr std::size_t codes_of_a_cell = 16;  // of four bits
-constexpr std::size_t sums_of_a_step = 8;    // that share a step
+constexpr std::size_t codes_per_cell = 16;  // of four bits
+constexpr std::size_t sums_per_step = 8;    // that share a step
 
 std::size_t round_up(std::size_t count, std::size_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
@@ -20,14 +20,14 @@ std::size_t round_up(std::size_t count, std::size_t multiple) {
 /// Returns the number of blocks of a component. Low components have more, because views differ most
 /// in them; with 15 components the sums fill whole cache lines.
 int choose_block_count(int level, int component, int components) {
-  constexpr std::array usual{2, 4, 16};
-  if (level == 2) return component == 0 ? 2 * usual[2] : usual[2];
-  if (component < 2) return 2 * usual[static_cast<std::size_t>(level)];
+  constexpr std::array default_block_counts{2, 4, 16};
+  if (level == 2) return component == 0 ? 2 * default_block_counts[2] : default_block_counts[2];
+  if (component < 2) return 2 * default_block_counts[static_cast<std::size_t>(level)];
   const bool last = component + 2 >= components;
-  return usual[static_cast<std::size_t>(level)] / (last ? 2 : 1);
+  return default_block_counts[static_cast<std::size_t>(level)] / (last ? 2 : 1);
 }
 
-std::int32_t sum_of(const std::uint8_t* bytes, int count) {
+std::int32_t sum_bytes(const std::uint8_t* bytes, int count) {
   return std::accumulate(bytes, bytes + count, std::int32_t{0});
 }
 
@@ -44,9 +44,9 @@ SegmentLayout::SegmentLayout(SignatureShape shape) : shape_(shape) {
     }
     dimensions_[level] = round_up(sums, level == 0 ? 2 : 64);
   }
-  constexpr std::size_t page = LargePageAllocator<std::uint8_t>::page;
-  max_rows_ =
-      std::clamp<std::size_t>(page / bytes() / kernels::cell_block, 1, 128) * kernels::cell_block;
+  constexpr std::size_t page_bytes = LargePageAllocator<std::uint8_t>::page_bytes;
+  max_rows_ = std::clamp<std::size_t>(page_bytes / bytes() / kernels::cell_block, 1, 128) *
+              kernels::cell_block;
 }
 
 void SegmentLayout::sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sums) const {
@@ -58,7 +58,7 @@ void SegmentLayout::sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sum
     const int finest = blocks_[2][k];
     for (int block = 0; block < finest; ++block) {
       const int first = first_row(block, finest);
-      at[2][block] = sum_of(rows + first, first_row(block + 1, finest) - first);
+      at[2][block] = sum_bytes(rows + first, first_row(block + 1, finest) - first);
     }
     for (int level = 1; level >= 0; --level) {
       const int blocks = blocks_[level][k];
@@ -75,9 +75,9 @@ void SegmentLayout::sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sum
   std::fill(at[2], end, 0);
 }
 
-std::vector<std::int32_t> SegmentLayout::counted(int components,
-                                                 std::span<const std::uint8_t> allowed_rows) const {
-  std::vector<std::int32_t> counted;
+std::vector<std::int32_t> SegmentLayout::make_sum_flags(
+    int components, std::span<const std::uint8_t> allowed_rows) const {
+  std::vector<std::int32_t> sum_flags;
   std::size_t padded = 0;
   for (int level = 0; level < levels; ++level) {
     for (int k = 0; k < components; ++k) {
@@ -87,20 +87,20 @@ std::vector<std::int32_t> SegmentLayout::counted(int components,
         const int rows = first_row(block + 1, blocks) - first;
         const bool all =
             allowed_rows.empty() || std::ranges::count(allowed_rows.subspan(first, rows), 0) == 0;
-        counted.push_back(all ? 1 : 0);
+        sum_flags.push_back(all ? 1 : 0);
       }
     }
     padded += dimensions_[level];
-    counted.resize(padded, 0);
+    sum_flags.resize(padded, 0);
   }
-  return counted;
+  return sum_flags;
 }
 
 SketchSegment::SketchSegment(const SegmentLayout& layout, std::span<const ViewId> views,
                              std::span<const std::uint8_t> magnitudes)
     : views_(views.begin(), views.end()),
       smallest_id_(std::ranges::min(views)),
-      largest_(std::ranges::max(views)) {
+      largest_id_(std::ranges::max(views)) {
   std::vector<std::int32_t> sums(views.size() * layout.total());
   for (std::size_t row = 0; row < views.size(); ++row) {
     layout.sum_blocks(magnitudes.data() + row * layout.shape().size(),
@@ -160,37 +160,37 @@ void SketchSegment::make_cells(const SegmentLayout& layout, const std::vector<st
   for (std::size_t d = 0; d < cells; ++d) {
     std::size_t below = 0;
     for (std::size_t b = d * max_bins; b < (d + 1) * max_bins; ++b) {
-      code_of_bin[b] = static_cast<std::uint8_t>(
-          std::min(codes_of_a_cell - 1, below * codes_of_a_cell / rows()));
+      code_of_bin[b] =
+          static_cast<std::uint8_t>(std::min(codes_per_cell - 1, below * codes_per_cell / rows()));
       below += counts[b];
     }
   }
-  cell_low_.assign(cells * codes_of_a_cell, std::numeric_limits<std::int32_t>::max());
-  cell_high_.assign(cells * codes_of_a_cell, std::numeric_limits<std::int32_t>::min());
+  cell_low_.assign(cells * codes_per_cell, std::numeric_limits<std::int32_t>::max());
+  cell_high_.assign(cells * codes_per_cell, std::numeric_limits<std::int32_t>::min());
   for (std::size_t row = 0; row < rows(); ++row) {
     const std::int32_t* const of_row = sums.data() + row * layout.total();
     std::uint8_t* const block =
         codes_.data() + row / kernels::cell_block * kernels::cell_block * (cells / 2);
-    const std::size_t place = row % kernels::cell_block;
+    const std::size_t row_in_block = row % kernels::cell_block;
     for (std::size_t d = 0; d < cells; ++d) {
       const std::uint8_t code = code_of_bin[bin(d, of_row[d])];
-      std::int32_t& smallest = cell_low_[d * codes_of_a_cell + code];
-      std::int32_t& largest = cell_high_[d * codes_of_a_cell + code];
+      std::int32_t& smallest = cell_low_[d * codes_per_cell + code];
+      std::int32_t& largest = cell_high_[d * codes_per_cell + code];
       smallest = std::min(smallest, of_row[d]);
       largest = std::max(largest, of_row[d]);
-      std::uint8_t& byte = block[d / 2 * kernels::cell_block + place];
+      std::uint8_t& byte = block[d / 2 * kernels::cell_block + row_in_block];
       byte = static_cast<std::uint8_t>(byte | (d % 2 == 0 ? code : code << 4));
     }
   }
   for (std::size_t i = 0; i < cell_low_.size(); ++i) {  // codes of no view
-    if (cell_high_[i] < cell_low_[i]) cell_low_[i] = cell_high_[i] = low[i / codes_of_a_cell];
+    if (cell_high_[i] < cell_low_[i]) cell_low_[i] = cell_high_[i] = low[i / codes_per_cell];
   }
 }
 
 void SketchSegment::make_level(const SegmentLayout& layout, int level,
                                const std::vector<std::int32_t>& sums) {
   const std::size_t count = layout.dimensions(level);
-  const std::size_t groups = count / sums_of_a_step;
+  const std::size_t groups = count / sums_per_step;
   std::size_t begin = 0;
   for (int before = 0; before < level; ++before) begin += layout.dimensions(before);
   Scale& scale = scales_[static_cast<std::size_t>(level) - 1];
@@ -209,9 +209,9 @@ void SketchSegment::make_level(const SegmentLayout& layout, int level,
   scale.max_missed.assign(groups, 0);
   for (std::size_t d = 0; d < count; ++d) {
     const auto range = static_cast<std::uint64_t>(scale.highest[d] - scale.offsets[d]);
-    std::uint64_t& step = scale.steps[d / sums_of_a_step];
+    std::uint64_t& step = scale.steps[d / sums_per_step];
     step = std::max(step, (range + 254) / 255);
-    scale.inverse_steps[d / sums_of_a_step] = 1.0F / static_cast<float>(step);
+    scale.inverse_steps[d / sums_per_step] = 1.0F / static_cast<float>(step);
   }
   for (std::size_t row = 0; row < rows(); ++row) {
     const std::int32_t* const of_row = of(row);
@@ -221,7 +221,7 @@ void SketchSegment::make_level(const SegmentLayout& layout, int level,
     for (std::size_t group = 0; group < groups; ++group) {
       const auto step = static_cast<std::int32_t>(scale.steps[group]);
       std::int32_t missed = 0;
-      for (std::size_t d = group * sums_of_a_step; d < (group + 1) * sums_of_a_step; ++d) {
+      for (std::size_t d = group * sums_per_step; d < (group + 1) * sums_per_step; ++d) {
         // The bounds are correct for any code, so rounding of the float product does no harm.
         const std::int32_t above = of_row[d] - scale.offsets[d];
         const float scaled = static_cast<float>(above) * scale.inverse_steps[group] + 0.5F;
@@ -243,13 +243,14 @@ void SegmentQuery::choose_unit(const SegmentLayout& layout, std::uint32_t larges
   const float inverse = (1.0F - 1e-6F) / static_cast<float>(unit);
   factors.resize(layout.dimensions(0));
   for (std::size_t d = 0; d < factors.size(); ++d) {
-    factors[d] = static_cast<float>(counted[d]) * inverse;
+    factors[d] = static_cast<float>(sum_flags[d]) * inverse;
   }
 }
 
-void SketchSegment::make_tables(const SegmentLayout& layout,
-                                const kernels::DistanceKernels& kernels, const SegmentQuery& query,
-                                std::span<std::uint8_t> tables) const {
+void SketchSegment::make_cell_tables(const SegmentLayout& layout,
+                                     const kernels::DistanceKernels& kernels,
+                                     const SegmentQuery& query,
+                                     std::span<std::uint8_t> tables) const {
   kernels.cell_tables(cell_low_.data(), cell_high_.data(), query.sums.data(), query.factors.data(),
                       layout.dimensions(0), tables.data());
 }
@@ -265,15 +266,16 @@ std::span<const std::uint32_t> SketchSegment::compute_cell_bounds(
                                            indices.data()));
 }
 
-SketchSegment::Encoded::Encoded(const SegmentLayout& layout)
+SketchSegment::QueryBuffers::QueryBuffers(const SegmentLayout& layout)
     : values(layout.dimensions(2)), mask(layout.dimensions(2)) {}
 
 // The sums of all views are within the scale, so the part of the query's sum outside of it is
 // part of the distance.
-void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
-                              const SegmentQuery& query, int level,
-                              std::span<const std::uint32_t> rows, Encoded& room,
-                              std::uint32_t* bounds) const {
+void SketchSegment::compute_level_bounds(const SegmentLayout& layout,
+                                         const kernels::DistanceKernels& kernels,
+                                         const SegmentQuery& query, int level,
+                                         std::span<const std::uint32_t> rows,
+                                         QueryBuffers& query_buffers, std::uint32_t* bounds) const {
   const Scale& scale = scales_[static_cast<std::size_t>(level) - 1];
   const std::size_t groups = scale.steps.size();
   std::size_t begin = layout.dimensions(0);
@@ -283,8 +285,8 @@ void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::Distan
   for (std::size_t group = 0; group < groups; ++group) {
     const auto step = static_cast<std::int32_t>(scale.steps[group]);
     std::int32_t any = 0;
-    for (std::size_t d = group * sums_of_a_step; d < (group + 1) * sums_of_a_step; ++d) {
-      const std::int32_t counts = query.counted[begin + d];
+    for (std::size_t d = group * sums_per_step; d < (group + 1) * sums_per_step; ++d) {
+      const std::int32_t counts = query.sum_flags[begin + d];
       const std::int32_t sum = query.sums[begin + d];
       const std::int32_t inside = std::clamp(sum, scale.offsets[d], scale.highest[d]);
       const std::int32_t above = inside - scale.offsets[d];
@@ -292,13 +294,13 @@ void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::Distan
       const auto code = static_cast<std::int32_t>(std::min(scaled, 255.0F));
       any |= counts;
       constant += counts * (std::abs(sum - inside) - std::abs(above - code * step));
-      room.values[d] = static_cast<std::uint8_t>(counts * code);
-      room.mask[d] = static_cast<std::uint8_t>(counts * 255);
+      query_buffers.values[d] = static_cast<std::uint8_t>(counts * code);
+      query_buffers.mask[d] = static_cast<std::uint8_t>(counts * 255);
     }
     slack += any * scale.max_missed[group];
   }
-  const kernels::DistanceKernels::SketchQuery encoded{room.values.data(),
-                                                      room.mask.data(),
+  const kernels::DistanceKernels::SketchQuery encoded{query_buffers.values.data(),
+                                                      query_buffers.mask.data(),
                                                       scale.steps.data(),
                                                       groups,
                                                       groups,

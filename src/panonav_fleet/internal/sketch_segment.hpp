@@ -40,8 +40,8 @@ class SegmentLayout {
   /// Computes the sums of all levels, one level after the other; padding is 0.
   void sum_blocks(const std::uint8_t* magnitudes, std::int32_t* sums) const;
   /// Returns 1 for each sum of the first `components` whose rows are all compared, else 0.
-  [[nodiscard]] std::vector<std::int32_t> counted(int components,
-                                                  std::span<const std::uint8_t> allowed_rows) const;
+  [[nodiscard]] std::vector<std::int32_t> make_sum_flags(
+      int components, std::span<const std::uint8_t> allowed_rows) const;
 
  private:
   [[nodiscard]] int first_row(int block, int blocks) const noexcept {
@@ -56,10 +56,10 @@ class SegmentLayout {
 
 /// A query in the form in which it is compared with segments.
 struct SegmentQuery {
-  std::vector<std::int32_t> sums;     ///< as `SegmentLayout::sum_blocks` computes them
-  std::vector<std::int32_t> counted;  ///< 1: the sum is compared; 0: it is not
-  std::vector<float> factors;         ///< for each cell: its flag divided by `unit`
-  std::uint32_t unit = 1;             ///< dissimilarity of one step of a cell bound
+  std::vector<std::int32_t> sums;       ///< as `SegmentLayout::sum_blocks` computes them
+  std::vector<std::int32_t> sum_flags;  ///< 1: the sum is compared; 0: it is not
+  std::vector<float> factors;           ///< for each cell: its flag divided by `unit`
+  std::uint32_t unit = 1;               ///< dissimilarity of one step of a cell bound
 
   /// Sets `unit` and `factors` so that cell bounds up to `largest` are distinguished.
   void choose_unit(const SegmentLayout& layout, std::uint32_t largest);
@@ -76,14 +76,14 @@ class SketchSegment {
   /// Returns the ids in the order of the rows.
   [[nodiscard]] std::span<const ViewId> views() const noexcept { return views_; }
   [[nodiscard]] ViewId smallest_id() const noexcept { return smallest_id_; }
-  [[nodiscard]] ViewId largest() const noexcept { return largest_; }
+  [[nodiscard]] ViewId largest_id() const noexcept { return largest_id_; }
   [[nodiscard]] std::size_t blocks() const noexcept;
   /// Returns the bytes of the sketches, including the padding of the last block.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
 
   /// Computes what each cell code adds to the bounds, in whole units, rounded down.
-  void make_tables(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
-                   const SegmentQuery& query, std::span<std::uint8_t> tables) const;
+  void make_cell_tables(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
+                        const SegmentQuery& query, std::span<std::uint8_t> tables) const;
   /// Computes bounds in units (255: that or more) of the rows of `count` blocks from block `first`
   /// on. Returns indices, from the first of these blocks, of the rows whose bound may be at most
   /// `limit`.
@@ -94,14 +94,15 @@ class SketchSegment {
       std::span<std::uint32_t> indices) const;
 
   /// Buffers for a query in the codes of a segment.
-  struct Encoded {
-    explicit Encoded(const SegmentLayout& layout);
+  struct QueryBuffers {
+    explicit QueryBuffers(const SegmentLayout& layout);
     AlignedVector<std::uint8_t> values, mask;
   };
   /// Computes lower bounds of the dissimilarity of rows at level 1 or 2.
-  void bounds_at(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
-                 const SegmentQuery& query, int level, std::span<const std::uint32_t> rows,
-                 Encoded& scratch, std::uint32_t* bounds) const;
+  void compute_level_bounds(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
+                            const SegmentQuery& query, int level,
+                            std::span<const std::uint32_t> rows, QueryBuffers& query_buffers,
+                            std::uint32_t* bounds) const;
 
  private:
   /// Codes of a level: a sum s is stored as the code nearest to (s - offset) / step. All sums of
@@ -117,7 +118,7 @@ class SketchSegment {
   void make_level(const SegmentLayout& layout, int level, const std::vector<std::int32_t>& sums);
 
   std::vector<ViewId> views_;
-  ViewId smallest_id_, largest_;
+  ViewId smallest_id_, largest_id_;
   LargePageVector<std::uint8_t> codes_;  // cells, then the two other levels
   std::array<std::size_t, SegmentLayout::levels> begins_{};
   std::vector<std::int32_t> cell_low_, cell_high_;  // smallest and largest sum of each code

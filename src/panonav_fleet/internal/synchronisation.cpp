@@ -77,9 +77,9 @@ void Synchronisation::match_with_server() {
                         " is now; allowed: the same memory, or a copy of the file (panonav copy), "
                         "which is not yet synchronised");
   }
-  if (state_.file.empty()) state_.file = random_identity(file_);
+  if (state_.file.empty()) state_.file = make_random_identity(file_);
   state_.memory = there.identity;
-  upload_number_ = random_number(file_);
+  upload_number_ = make_random_number(file_);
   is_server_older_ = there.last_view < state_.last_view;
 }
 
@@ -114,7 +114,7 @@ bool Synchronisation::is_stored() const {
 }
 
 void Synchronisation::store_and_commit(MemoryTables::Transaction& writing) {
-  state_.number = random_number(file_);
+  state_.number = make_random_number(file_);
   write_synchronised_state(file_, state_);
   for (const ViewId view : std::exchange(unsaved_, {})) {
     const auto found = synchronised_.find(view);

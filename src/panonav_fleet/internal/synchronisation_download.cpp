@@ -31,11 +31,11 @@ void Synchronisation::download() {
     if (row.server_view) add_to_block(local_blocks, *row.server_view, row.server_checksum);
   }
   const auto blocks = find_differing_blocks(local_blocks, server_.compute_view_blocks(areas_));
-  const std::set<std::int64_t> is_differing(blocks.begin(), blocks.end());
+  const std::set<std::int64_t> differing_blocks(blocks.begin(), blocks.end());
   auto server_checksums = server_.read_checksums_in_blocks(areas_, blocks);
   std::vector<ViewId> missing;
   for (const auto& [id, view] : local_by_server_id_) {
-    if (is_differing.contains(id.value >> block_bits) && !server_checksums.contains(id)) {
+    if (differing_blocks.contains(id.value >> block_bits) && !server_checksums.contains(id)) {
       missing.push_back(id);
     }
   }
@@ -272,11 +272,11 @@ void Synchronisation::finish_download(const std::vector<std::int64_t>& blocks,
   file_.write_links(changed_links);
   report_.links_downloaded += changed_links.size();
   bool changes_anything = !changed_links.empty();
-  const std::set<std::int64_t> is_differing(blocks.begin(), blocks.end());
+  const std::set<std::int64_t> differing_blocks(blocks.begin(), blocks.end());
   const auto is_in_scope = make_link_scope_filter();
   std::erase_if(links_, [&](const auto& entry) {
     const auto& ends = entry.first;
-    if (!is_differing.contains(ends.first.value >> block_bits) || server_links.contains(ends) ||
+    if (!differing_blocks.contains(ends.first.value >> block_bits) || server_links.contains(ends) ||
         server_view_links.left_out.contains(ends) || !is_in_scope(ends.first) ||
         !is_in_scope(ends.second)) {
       return false;

@@ -35,7 +35,8 @@ struct ViewSketches::Implementation {
 
   /// Appends the views of the growing segment with their magnitudes; nothing if all segments are
   /// full.
-  void add_growing(std::vector<ViewId>& ids, std::vector<std::uint8_t>& magnitudes) const {
+  void append_growing_segment(std::vector<ViewId>& ids,
+                              std::vector<std::uint8_t>& magnitudes) const {
     if (!growing) return;
     const LiveSegment& last = segments.back();
     const std::size_t view_bytes = layout->shape().size();
@@ -98,7 +99,7 @@ void ViewSketches::insert(std::span<const ViewId> views, std::span<const std::ui
   // The views of the growing segment come first.
   std::vector<ViewId> ids;
   std::vector<std::uint8_t> bytes;
-  own.add_growing(ids, bytes);
+  own.append_growing_segment(ids, bytes);
   if (own.growing) {
     own.segments.pop_back();
     own.growing.reset();
@@ -145,7 +146,7 @@ void ViewSketches::insert(const ViewSketches& other) {
   for (std::size_t i = 0; i < full; ++i) own.size += added.segments[i].count;
   std::vector<ViewId> ids;
   std::vector<std::uint8_t> bytes;
-  added.add_growing(ids, bytes);
+  added.append_growing_segment(ids, bytes);
   insert(ids, bytes);
 }
 
@@ -156,7 +157,7 @@ void ViewSketches::erase(std::span<const ViewId> views) {
   for (LiveSegment& segment : own.segments) {
     const SketchSegment& sketches = *segment.sketches;
     const auto first = std::ranges::lower_bound(gone, sketches.smallest_id());
-    if (first == gone.end() || sketches.largest() < *first) continue;
+    if (first == gone.end() || sketches.largest_id() < *first) continue;
     for (std::size_t row = 0; row < sketches.rows(); ++row) {
       if (!segment.has(row) || !std::ranges::binary_search(gone, sketches.views()[row])) continue;
       segment.live[row / 64] &= ~(std::uint64_t{1} << (row % 64));

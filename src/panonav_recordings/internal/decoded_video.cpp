@@ -23,16 +23,18 @@ std::unique_ptr<ChildProcess> start_ffmpeg(const std::vector<std::string>& argum
   }
 }
 
-DecodedVideo::DecodedVideo(const std::vector<std::string>& input, const std::string& chosen,
-                           std::string about, const ImageLimits& limits)
+DecodedVideo::DecodedVideo(const std::vector<std::string>& input,
+                           const std::string& select_expression, std::string about,
+                           const ImageLimits& limits)
     : about_(std::move(about)), limits_(limits) {
   std::vector<std::string> arguments{"ffmpeg",   "-nostdin",  "-hide_banner",
                                      "-nostats", "-loglevel", "level+info"};
   arguments.insert(arguments.end(), input.begin(), input.end());
   // The filter showinfo writes stamp and size of a picture to standard error before its bytes
   // arrive.
-  const std::string filter = (chosen.empty() ? "" : "select='" + chosen + "',") +
-                             std::string("format=rgb24,showinfo=checksum=0");
+  const std::string filter =
+      (select_expression.empty() ? "" : "select='" + select_expression + "',") +
+      std::string("format=rgb24,showinfo=checksum=0");
   for (const char* word : {"-map", "0:v:0", "-fps_mode", "passthrough", "-vf", filter.c_str(), "-f",
                            "rawvideo", "pipe:1"}) {
     arguments.emplace_back(word);
@@ -64,7 +66,8 @@ void DecodedVideo::parse_line(const std::string& line) {
     return;
   }
   for (const char* level : {"[error] ", "[fatal] "}) {
-    if (const auto at = line.find(level); at != std::string::npos) trouble_ = line.substr(at + 8);
+    if (const auto at = line.find(level); at != std::string::npos)
+      last_error_ = line.substr(at + 8);
   }
 }
 
@@ -72,7 +75,7 @@ bool DecodedVideo::read_messages() {
   std::array<char, 4096> buffer;
   const auto got = read(child_->errors(), buffer.data(), buffer.size());
   if (got <= 0) {
-    messages_end_ = true;
+    messages_ended_ = true;
     return false;
   }
   constexpr std::size_t max_line = 4096;
@@ -91,7 +94,7 @@ bool DecodedVideo::read_messages() {
 DecodedVideo::Ready DecodedVideo::wait(bool for_picture,
                                        const std::optional<Clock::time_point>& until) const {
   std::array<pollfd, 2> pipes{pollfd{for_picture ? child_->output() : -1, POLLIN, 0},
-                              pollfd{messages_end_ ? -1 : child_->errors(), POLLIN, 0}};
+                              pollfd{messages_ended_ ? -1 : child_->errors(), POLLIN, 0}};
   int ready = -1;
   while (ready < 0) {  // repeated if a signal interrupts it
     const auto left = until ? std::chrono::ceil<std::chrono::milliseconds>(*until - Clock::now())
@@ -110,7 +113,7 @@ std::optional<DecodedFrame> DecodedVideo::next(std::optional<std::chrono::millis
   std::optional<Clock::time_point> until;
   if (max_wait) until = Clock::now() + *max_wait;
   while (heads_.empty()) {
-    if (messages_end_) return std::nullopt;
+    if (messages_ended_) return std::nullopt;
     static_cast<void>(wait(false, until));
     if (!read_messages()) return std::nullopt;
   }

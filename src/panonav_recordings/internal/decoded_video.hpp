@@ -28,11 +28,11 @@ struct DecodedFrame {
 /// Decodes the pictures of a file or an address one after the other with the program ffmpeg.
 class DecodedVideo {
  public:
-  /// `input` has the arguments of ffmpeg up to and including the input. `chosen` is an expression
-  /// for its filter `select`; an empty one selects all pictures. Messages name `about`. Throws as
-  /// `start_ffmpeg`.
-  DecodedVideo(const std::vector<std::string>& input, const std::string& chosen, std::string about,
-               const ImageLimits& limits);
+  /// `input` has the arguments of ffmpeg up to and including the input. `select_expression` is an
+  /// expression for its filter `select`; an empty one selects all pictures. Messages name `about`.
+  /// Throws as `start_ffmpeg`.
+  DecodedVideo(const std::vector<std::string>& input, const std::string& select_expression,
+               std::string about, const ImageLimits& limits);
 
   /// Returns the next picture; `nullopt` at the end. Throws FileError for pictures beyond the
   /// limits, and if no complete picture comes within `max_wait`; the program is then killed.
@@ -41,7 +41,7 @@ class DecodedVideo {
   /// Kills the program; a `next` that another thread is in then returns `nullopt`.
   void stop() const noexcept { child_->stop(); }
   /// Returns the last error message of ffmpeg; empty without one.
-  [[nodiscard]] const std::string& last_error() const noexcept { return trouble_; }
+  [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 
  private:
   struct Head {
@@ -66,8 +66,8 @@ class DecodedVideo {
   std::unique_ptr<ChildProcess> child_;
   std::string line_;
   std::deque<Head> heads_;
-  std::string trouble_;
-  bool messages_end_ = false;
+  std::string last_error_;
+  bool messages_ended_ = false;
 };
 
 }  // namespace panonav::recordings

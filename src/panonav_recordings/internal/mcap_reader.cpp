@@ -35,7 +35,7 @@ class McapFile : public ChunkedFile {
   }
 
  protected:
-  [[nodiscard]] ChunkHead chunk_head(const Block& block) const override {
+  [[nodiscard]] ChunkHead read_chunk_head(const Block& block) const override {
     constexpr std::uint64_t max_head_bytes = head_bytes + 8 + 8 + 8 + 4 + 4 + 32 + 8;
     const Buffer bytes =
         read_bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
@@ -53,7 +53,7 @@ class McapFile : public ChunkedFile {
         head.packed_bytes != length - fixed) {
       fail("the chunk at byte " + std::to_string(block.at) + " is damaged: its head is wrong");
     }
-    const auto packing = find_packing(name);
+    const auto packing = parse_packing(name);
     if (!packing || *packing == Packing::bz2) {
       fail("the chunk at byte " + std::to_string(block.at) + " is packed by '" + std::string(name) +
            "'; allowed: none, lz4, zstd");
@@ -86,25 +86,26 @@ class McapFile : public ChunkedFile {
     return true;
   }
 
-  [[nodiscard]] std::optional<RecordedMessage> message_at(std::span<const std::uint8_t> block,
-                                                          std::size_t offset) const override {
+  [[nodiscard]] std::optional<RecordedMessage> parse_message_at(std::span<const std::uint8_t> block,
+                                                                std::size_t offset) const override {
     Fields fields(block.subspan(offset));
     const auto kind = fields.number<McapRecord>();
     const auto body = fields.bytes(fields.number<std::uint64_t>());
     if (kind != McapRecord::message || body.size() < message_head_bytes) return std::nullopt;
-    return message_in(body);
+    return parse_message(body);
   }
 
-  void declare(std::span<const std::uint8_t> block) override {
+  void add_declarations(std::span<const std::uint8_t> block) override {
     Fields fields(block);
     while (fields.left() > 0) {
       const auto kind = fields.number<McapRecord>();
       const auto body = fields.bytes(fields.number<std::uint64_t>());
-      if (fields.good()) declare(kind, body);
+      if (fields.good()) add_declaration(kind, body);
     }
   }
 
-  bool walk(std::span<const std::uint8_t> block, std::vector<Entry>& entries) const override {
+  bool list_messages(std::span<const std::uint8_t> block,
+                     std::vector<Entry>& entries) const override {
     Fields fields(block);
     while (fields.left() > 0) {
       const auto offset = static_cast<std::uint32_t>(block.size() - fields.left());
@@ -113,7 +114,7 @@ class McapFile : public ChunkedFile {
       if (!fields.good()) return false;
       if (kind != McapRecord::message) continue;
       if (body.size() < message_head_bytes) return false;
-      if (const auto message = message_in(body)) {
+      if (const auto message = parse_message(body)) {
         entries.push_back({message->time_ns, message->topic, offset});
       }
     }
@@ -122,7 +123,7 @@ class McapFile : public ChunkedFile {
 
  private:
   // Parses the body of a message record; `nullopt` if its channel is unknown.
-  [[nodiscard]] std::optional<RecordedMessage> message_in(
+  [[nodiscard]] std::optional<RecordedMessage> parse_message(
       std::span<const std::uint8_t> body) const {
     Fields fields(body);
     const auto number = fields.number<std::uint16_t>();
@@ -140,7 +141,7 @@ class McapFile : public ChunkedFile {
     return message;
   }
 
-  void declare(McapRecord kind, std::span<const std::uint8_t> body) {
+  void add_declaration(McapRecord kind, std::span<const std::uint8_t> body) {
     Fields fields(body);
     if (kind == McapRecord::schema) {
       const auto number = fields.number<std::uint16_t>();
@@ -154,8 +155,9 @@ class McapFile : public ChunkedFile {
       const auto encoding = fields.text();
       if (!fields.good() || channels_.contains(number)) return;
       if (schema_number != 0 && schema == schemas_.end()) lacks_schemas_ = true;
-      channels_.emplace(number,
-                        topic_of(name, schema == schemas_.end() ? "" : schema->second, encoding));
+      channels_.emplace(
+          number,
+          get_or_create_topic(name, schema == schemas_.end() ? "" : schema->second, encoding));
     }
   }
 
@@ -219,7 +221,7 @@ class McapFile : public ChunkedFile {
       const auto record = fields.number<McapRecord>();
       const auto body = fields.bytes(fields.number<std::uint64_t>());
       if (!fields.good()) return false;
-      declare(record, body);
+      add_declaration(record, body);
       if (record == McapRecord::chunk_index && !read_chunk_index(body, start, summary)) {
         return false;
       }
@@ -244,12 +246,12 @@ class McapFile : public ChunkedFile {
       return false;
     }
     // Each list of times and offsets has 15 bytes in addition to its pairs of 16.
-    const std::uint64_t beside = lists.size() / 10 * 15;
-    if (block.index_bytes < beside || (block.index_bytes - beside) % 16 != 0) {
+    const std::uint64_t list_head_bytes = lists.size() / 10 * 15;
+    if (block.index_bytes < list_head_bytes || (block.index_bytes - list_head_bytes) % 16 != 0) {
       summary.is_complete = false;
       return true;
     }
-    block.messages = (block.index_bytes - beside) / 16;
+    block.messages = (block.index_bytes - list_head_bytes) / 16;
     summary.indexed += block.messages;
     if (block.messages > 0) block.time = time;
     blocks_.push_back(std::move(block));
@@ -306,12 +308,12 @@ class McapFile : public ChunkedFile {
       } else if (is_cut) {
         break;
       } else if (kind == McapRecord::message && length >= message_head_bytes) {
-        if (const auto message = message_in(head.subspan(head_bytes))) {
+        if (const auto message = parse_message(head.subspan(head_bytes))) {
           add_loose_message(at, head_bytes + length, message->time_ns, message->topic);
         }
       } else if ((kind == McapRecord::schema || kind == McapRecord::channel) &&
                  length <= limits_.chunk_bytes) {
-        declare(kind, read_bytes_at(at + head_bytes, length).bytes());
+        add_declaration(kind, read_bytes_at(at + head_bytes, length).bytes());
       }
       if (is_cut) break;
       at += head_bytes + length;

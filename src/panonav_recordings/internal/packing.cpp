@@ -82,7 +82,7 @@ bool unpack_bz2(std::span<const std::uint8_t> from, std::span<std::uint8_t> to,
 
 }  // namespace
 
-std::optional<Packing> find_packing(std::string_view name) noexcept {
+std::optional<Packing> parse_packing(std::string_view name) noexcept {
   if (name.empty() || name == "none") return Packing::none;
   if (name == "lz4") return Packing::lz4;
   if (name == "zstd") return Packing::zstd;
@@ -101,23 +101,23 @@ Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size
     case Packing::none:
       filled = std::min(packed.size(), max_bytes);
       if (filled > 0) std::memcpy(to.data(), packed.data(), filled);
-      result.whole = filled == packed.size();
+      result.is_whole = filled == packed.size();
       break;
     case Packing::lz4:
-      result.whole = unpack_lz4(packed, to, filled);
+      result.is_whole = unpack_lz4(packed, to, filled);
       break;
     case Packing::zstd:
-      result.whole = unpack_zstd(packed, to, filled);
+      result.is_whole = unpack_zstd(packed, to, filled);
       break;
     case Packing::bz2:
-      result.whole = unpack_bz2(packed, to, filled);
+      result.is_whole = unpack_bz2(packed, to, filled);
       break;
   }
   result.content.size = filled;
   return result;
 }
 
-Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes) {
+Unpacked unpack_zstd_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes) {
   // For a frame that does not state its size this is ZSTD_CONTENTSIZE_UNKNOWN, larger than any
   // size.
   const auto stated_size = ZSTD_getFrameContentSize(packed.data(), packed.size());
@@ -126,14 +126,14 @@ Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_byte
     size = std::min(max_bytes, 16 * packed.size() + 4096);
   while (true) {
     Unpacked unpacked = unpack(packed, Packing::zstd, size);
-    const bool is_full = !unpacked.whole && unpacked.content.size == size;
+    const bool is_full = !unpacked.is_whole && unpacked.content.size == size;
     if (!is_full || size == max_bytes || stated_size <= max_bytes) return unpacked;
     size = std::min(max_bytes, 16 * size);
   }
 }
 
-UnpackedFile unpack_file(const std::filesystem::path& packed, const std::filesystem::path& to,
-                         std::uint64_t max_bytes) {
+UnpackedFile unpack_zstd_file(const std::filesystem::path& packed, const std::filesystem::path& to,
+                              std::uint64_t max_bytes) {
   std::ifstream from(packed, std::ios::binary);
   if (!from) throw FileError(packed.string(), "cannot be read");
   std::ofstream file(to, std::ios::binary);
@@ -154,7 +154,7 @@ UnpackedFile unpack_file(const std::filesystem::path& packed, const std::filesys
       if (ZSTD_isError(left) != 0) return done;
       is_full = out.pos == out.size;
       if (done.bytes + out.pos > max_bytes) {
-        done.too_long = true;
+        done.exceeds_limit = true;
         return done;
       }
       file.write(made.data(), static_cast<std::streamsize>(out.pos));
@@ -164,7 +164,7 @@ UnpackedFile unpack_file(const std::filesystem::path& packed, const std::filesys
   }
   file.close();
   if (!file) throw FileError(packed.string(), "cannot be unpacked: the temporary folder is full");
-  done.whole = left == 0;
+  done.is_whole = left == 0;
   return done;
 }
 

@@ -29,9 +29,9 @@ class MessageCollector {
   }
 
   /// Adds a message; one that cannot be read is counted.
-  void add(const MessageLocation& place, MessageBytes bytes) {
+  void add(const MessageLocation& location, MessageBytes bytes) {
     try {
-      add_by_role(place, bytes);
+      add_by_role(location, bytes);
     } catch (const ContractError& error) {
       if (unreadable_++ == 0) first_error_ = error.what();
       return;
@@ -64,97 +64,99 @@ class MessageCollector {
   void drop_chain_unless_connected() {
     auto& chain = made_.chain;
     if (!chain) return;
-    if (chain->other_parents() > 0) {
-      warn(std::to_string(chain->other_parents()) +
+    if (chain->ignored_transform_count() > 0) {
+      warn(std::to_string(chain->ignored_transform_count()) +
            " transforms give a frame another parent than before and are left out");
     }
-    if (chain->connected()) return;
+    if (chain->is_connected()) return;
     if (choice_.frames_are_named) {
       const auto& [top, bottom] = *choice_.frames;
       throw FileError(path_.string(), "no transforms lead from " + to_readable_line(top) + " to " +
-                                          to_readable_line(bottom) + "; it has: " + chain->known());
+                                          to_readable_line(bottom) +
+                                          "; it has: " + chain->list_transforms());
     }
     chain.reset();
   }
 
-  void add_by_role(const MessageLocation& place, MessageBytes bytes) {
-    switch (choice_.roles[place.topic]) {
+  void add_by_role(const MessageLocation& location, MessageBytes bytes) {
+    switch (choice_.roles[location.topic]) {
       case TopicRole::none:
         break;
       case TopicRole::picture:
-        add_picture(place, bytes);
+        add_picture(location, bytes);
         break;
       case TopicRole::odometry:
-        add_odometry(place, bytes);
+        add_odometry(location, bytes);
         break;
       case TopicRole::transforms:
-        add_transforms(place, bytes);
+        add_transforms(location, bytes);
         break;
       case TopicRole::tilt:
-        add_orientation(place, bytes);
+        add_orientation(location, bytes);
         break;
       case TopicRole::truth:
-        add_truth(place, bytes);
+        add_truth(location, bytes);
         break;
     }
   }
 
-  [[nodiscard]] const RecordedTopic& topic_of(const MessageLocation& place) const {
-    return recording_.topics()[place.topic];
+  [[nodiscard]] const RecordedTopic& topic_of(const MessageLocation& location) const {
+    return recording_.topics()[location.topic];
   }
   template <class Message>
-  [[nodiscard]] Message read(const MessageLocation& place, MessageBytes bytes) const {
-    return ros::read_message<Message>(bytes, topic_of(place).encoding);
+  [[nodiscard]] Message read(const MessageLocation& location, MessageBytes bytes) const {
+    return ros::read_message<Message>(bytes, topic_of(location).encoding);
   }
 
-  void add_picture(const MessageLocation& place, MessageBytes bytes) {
-    if (topic_of(place).type == ros::CompressedImage::type) {
-      made_.pictures.push_back({place, read<ros::CompressedImage>(place, bytes).header.stamp_ns});
+  void add_picture(const MessageLocation& location, MessageBytes bytes) {
+    if (topic_of(location).type == ros::CompressedImage::type) {
+      made_.pictures.push_back(
+          {location, read<ros::CompressedImage>(location, bytes).header.stamp_ns});
       return;
     }
-    const auto message = read<ros::Image>(place, bytes);
+    const auto message = read<ros::Image>(location, bytes);
     const auto size = std::pair{message.width, message.height};
     if (made_.pictures.empty()) made_.first_size = size;
-    if (made_.first_size != size) ++made_.other_sizes;
-    made_.pictures.push_back({place, message.header.stamp_ns});
+    if (made_.first_size != size) ++made_.differing_size_count;
+    made_.pictures.push_back({location, message.header.stamp_ns});
   }
 
-  void add_odometry(const MessageLocation& place, MessageBytes bytes) {
-    const auto message = read<ros::Odometry>(place, bytes);
-    made_.odometry.add({place.time_ns, message.header.stamp_ns}, message.pose.pose);
+  void add_odometry(const MessageLocation& location, MessageBytes bytes) {
+    const auto message = read<ros::Odometry>(location, bytes);
+    made_.odometry.add({location.time_ns, message.header.stamp_ns}, message.pose.pose);
     ++samples_;
   }
 
-  void add_transforms(const MessageLocation& place, MessageBytes bytes) {
-    const bool is_static = topic_of(place).name.ends_with("tf_static");
-    for (const auto& each : read<ros::TFMessage>(place, bytes).transforms) {
-      made_.chain->add(each, place.time_ns, is_static);
+  void add_transforms(const MessageLocation& location, MessageBytes bytes) {
+    const bool is_static = topic_of(location).name.ends_with("tf_static");
+    for (const auto& each : read<ros::TFMessage>(location, bytes).transforms) {
+      made_.chain->add(each, location.time_ns, is_static);
       ++samples_;
     }
   }
 
-  void add_orientation(const MessageLocation& place, MessageBytes bytes) {
-    const auto message = read<ros::Imu>(place, bytes);
+  void add_orientation(const MessageLocation& location, MessageBytes bytes) {
+    const auto message = read<ros::Imu>(location, bytes);
     const auto& [x, y, z, w] = message.orientation;
     const double length = std::sqrt(x * x + y * y + z * z + w * w);
     const bool is_stated = message.orientation_covariance[0] != -1.0 &&
                            std::abs(length - 1.0) <= ros::quaternion_tolerance;
     if (!is_stated) {
-      ++made_.without_orientation;
+      ++made_.imu_without_orientation_count;
       return;
     }
-    made_.orientation.add({place.time_ns, message.header.stamp_ns}, {{}, message.orientation});
+    made_.orientation.add({location.time_ns, message.header.stamp_ns}, {{}, message.orientation});
     ++samples_;
   }
 
-  void add_truth(const MessageLocation& place, MessageBytes bytes) {
-    if (topic_of(place).type == ros::PoseStamped::type) {
-      const auto message = read<ros::PoseStamped>(place, bytes);
-      made_.truth.add({place.time_ns, message.header.stamp_ns}, message.pose);
+  void add_truth(const MessageLocation& location, MessageBytes bytes) {
+    if (topic_of(location).type == ros::PoseStamped::type) {
+      const auto message = read<ros::PoseStamped>(location, bytes);
+      made_.truth.add({location.time_ns, message.header.stamp_ns}, message.pose);
     } else {
-      const auto message = read<ros::PointStamped>(place, bytes);
+      const auto message = read<ros::PointStamped>(location, bytes);
       made_.truth_has_headings = false;
-      made_.truth.add({place.time_ns, message.header.stamp_ns}, {message.point, {}});
+      made_.truth.add({location.time_ns, message.header.stamp_ns}, {message.point, {}});
     }
     ++samples_;
   }
@@ -173,20 +175,20 @@ class MessageCollector {
 bool RecordedMessages::sort() {
   const bool has_stamps =
       std::ranges::any_of(pictures, [](const RecordedPicture& each) { return each.stamp_ns != 0; });
-  const bool by_log = !has_stamps || !odometry.has_stamps() || !orientation.has_stamps() ||
-                      !truth.has_stamps() || (chain && !chain->has_stamps());
-  if (by_log)
+  const bool use_log_times = !has_stamps || !odometry.has_stamps() || !orientation.has_stamps() ||
+                             !truth.has_stamps() || (chain && !chain->has_stamps());
+  if (use_log_times)
     warnings.emplace_back("headers without stamps: the times of recording are used instead");
-  for (RecordedTrack* track : {&odometry, &orientation, &truth}) track->sort(by_log);
-  if (chain) chain->sort(by_log);
-  return by_log;
+  for (RecordedTrack* track : {&odometry, &orientation, &truth}) track->sort(use_log_times);
+  if (chain) chain->sort(use_log_times);
+  return use_log_times;
 }
 
 RecordedMessages collect_messages(const std::filesystem::path& path, const Recording& recording,
                                   const TopicChoice& choice) {
   MessageCollector collector(path, recording, choice);
-  recording.for_each(choice.topics, {}, [&](const MessageLocation& place, MessageBytes bytes) {
-    collector.add(place, bytes);
+  recording.for_each(choice.topics, {}, [&](const MessageLocation& location, MessageBytes bytes) {
+    collector.add(location, bytes);
   });
   return collector.finish();
 }

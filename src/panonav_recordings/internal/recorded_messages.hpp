@@ -16,7 +16,7 @@ namespace panonav::recordings {
 
 /// A picture of a recording that is not decoded yet.
 struct RecordedPicture {
-  MessageLocation place;
+  MessageLocation location;
   std::int64_t stamp_ns = 0;  ///< of the message header; 0: none
 };
 
@@ -29,8 +29,8 @@ struct RecordedMessages {
   std::optional<TransformChain> chain;  ///< connected transforms that give the odometry
   bool truth_has_headings = true;
   std::pair<std::uint32_t, std::uint32_t> first_size;  ///< width and height of the first picture
-  std::size_t other_sizes = 0;                         ///< pictures of another size
-  std::size_t without_orientation = 0;                 ///< IMU messages without orientation
+  std::size_t differing_size_count = 0;                ///< pictures of another size
+  std::size_t imu_without_orientation_count = 0;       ///< IMU messages without orientation
   std::vector<std::string> warnings;  ///< of the topic choice, then of messages left out
 
   /// Sorts all poses by header stamps, or, with a warning, by log times if a topic has no stamps.

@@ -57,10 +57,12 @@ class TopicChooser {
 
   void choose_pictures(const std::optional<std::string>& name) {
     constexpr std::string_view types = "sensor_msgs/Image or sensor_msgs/CompressedImage";
-    if (name) return use(find_named_topics(*name, is_picture_type, types), TopicRole::picture);
+    if (name)
+      return assign_role(find_named_topics(*name, is_picture_type, types), TopicRole::picture);
     auto names = find_topic_names(is_picture_type);
     if (names.size() > 1) std::erase_if(names, is_derived_from_images);
-    if (names.size() == 1) return use(numbers_of(names[0], is_picture_type), TopicRole::picture);
+    if (names.size() == 1)
+      return assign_role(find_topic_numbers(names[0], is_picture_type), TopicRole::picture);
     if (names.empty()) {
       throw FileError(path_.string(), "has no images of " + std::string(types) + "; its topics: " +
                                           list_topics(find_topic_names(is_any_type)));
@@ -74,12 +76,13 @@ class TopicChooser {
       throw ContractError("odometry", "a topic and frames", "one of the two");
     }
     if (requested.odometry) {
-      return use(find_named_topics(*requested.odometry, is_odometry_type, ros::Odometry::type),
-                 TopicRole::odometry);
+      return assign_role(
+          find_named_topics(*requested.odometry, is_odometry_type, ros::Odometry::type),
+          TopicRole::odometry);
     }
     const auto names = find_topic_names(is_odometry_type);
     if (!requested.odometry_frames && names.size() == 1) {
-      return use(numbers_of(names[0], is_odometry_type), TopicRole::odometry);
+      return assign_role(find_topic_numbers(names[0], is_odometry_type), TopicRole::odometry);
     }
     if (!requested.odometry_frames && !names.empty()) {
       choice_.warnings.push_back(
@@ -91,12 +94,13 @@ class TopicChooser {
     choice_.frames = requested.odometry_frames.value_or(
         std::pair<std::string, std::string>{"odom", "base_link"});
     for (const auto& name : find_topic_names(is_transform_type)) {
-      use(numbers_of(name, is_transform_type), TopicRole::transforms);
+      assign_role(find_topic_numbers(name, is_transform_type), TopicRole::transforms);
     }
   }
 
   void choose_tilt(const std::optional<std::string>& name, const PictureSource& source) {
-    if (name) return use(find_named_topics(*name, is_imu_type, ros::Imu::type), TopicRole::tilt);
+    if (name)
+      return assign_role(find_named_topics(*name, is_imu_type, ros::Imu::type), TopicRole::tilt);
     const auto names = find_topic_names(is_imu_type);
     if (names.empty()) return;
     if (names.size() > 1) {
@@ -107,18 +111,20 @@ class TopicChooser {
           "roll and pitch of " + to_readable_line(names[0]) +
           " are not used: panoramas of unknown elevations cannot be levelled");
     } else {
-      use(numbers_of(names[0], is_imu_type), TopicRole::tilt);
+      assign_role(find_topic_numbers(names[0], is_imu_type), TopicRole::tilt);
     }
   }
 
-  void choose_truth() { use(numbers_of("/ground_truth", is_pose_type), TopicRole::truth); }
+  void choose_truth() {
+    assign_role(find_topic_numbers("/ground_truth", is_pose_type), TopicRole::truth);
+  }
 
   [[nodiscard]] TopicChoice take() { return std::move(choice_); }
 
  private:
   /// Returns the numbers of the topics with a name and type; several if they differ in encoding or
   /// in type.
-  [[nodiscard]] TopicNumbers numbers_of(std::string_view name, IsType is_type) const {
+  [[nodiscard]] TopicNumbers find_topic_numbers(std::string_view name, IsType is_type) const {
     TopicNumbers found;
     const auto& topics = recording_.topics();
     for (std::uint32_t i = 0; i < topics.size(); ++i) {
@@ -140,7 +146,7 @@ class TopicChooser {
   /// Returns the numbers of the topics that the caller named. Throws FileError if there are none.
   [[nodiscard]] TopicNumbers find_named_topics(const std::string& name, IsType is_type,
                                                std::string_view types) const {
-    TopicNumbers found = numbers_of(name, is_type);
+    TopicNumbers found = find_topic_numbers(name, is_type);
     if (found.empty()) {
       throw FileError(path_.string(), "has no topic " + to_readable_line(name) + " of " +
                                           std::string(types) +
@@ -149,7 +155,7 @@ class TopicChooser {
     return found;
   }
 
-  void use(const TopicNumbers& topics, TopicRole role) {
+  void assign_role(const TopicNumbers& topics, TopicRole role) {
     for (const auto topic : topics) {
       choice_.roles[topic] = role;
       choice_.topics.push_back(topic);
@@ -163,7 +169,7 @@ class TopicChooser {
 
 }  // namespace
 
-bool has_pictures(const RecordedTopic& topic) {
+bool is_readable_picture_topic(const RecordedTopic& topic) {
   return is_readable(topic, is_picture_type);
 }
 

@@ -22,8 +22,9 @@ bool RecordedTrack::has_stamps() const {
          std::ranges::any_of(samples_, [](const Sample& each) { return each.times.stamp_ns != 0; });
 }
 
-void RecordedTrack::sort(bool by_log) {
-  for (Sample& each : samples_) each.at_ns = by_log ? each.times.log_ns : each.times.stamp_ns;
+void RecordedTrack::sort(bool use_log_times) {
+  for (Sample& each : samples_)
+    each.at_ns = use_log_times ? each.times.log_ns : each.times.stamp_ns;
   std::ranges::reverse(samples_);
   std::ranges::stable_sort(samples_, {}, &Sample::at_ns);
   const auto same = [](const Sample& a, const Sample& b) { return a.at_ns == b.at_ns; };
@@ -42,8 +43,8 @@ std::optional<ros::Pose> RecordedTrack::at(std::int64_t ns) const {
   if (interval > max_gap_ns || ns < a.at_ns - interval || ns > b.at_ns + interval) {
     return std::nullopt;
   }
-  return ros::between(a.pose, b.pose,
-                      static_cast<double>(ns - a.at_ns) / static_cast<double>(interval));
+  return ros::interpolate(a.pose, b.pose,
+                          static_cast<double>(ns - a.at_ns) / static_cast<double>(interval));
 }
 
 TransformChain::TransformChain(std::string_view top, std::string_view bottom)
@@ -65,7 +66,7 @@ void TransformChain::add(const ros::TransformStamped& transform, std::int64_t lo
   }
   Link& link = found->second;
   if (link.parent != parent) {
-    ++other_parents_;
+    ++ignored_transform_count_;
     return;
   }
   link.track.add({log_ns, transform.header.stamp_ns}, transform.transform);
@@ -78,8 +79,8 @@ bool TransformChain::has_stamps() const {
   });
 }
 
-void TransformChain::sort(bool by_log) {
-  for (auto& [child, link] : links_) link.track.sort(by_log);
+void TransformChain::sort(bool use_log_times) {
+  for (auto& [child, link] : links_) link.track.sort(use_log_times);
 }
 
 std::optional<ros::Pose> TransformChain::at(std::int64_t ns) const {
@@ -94,7 +95,7 @@ std::optional<ros::Pose> TransformChain::at(std::int64_t ns) const {
   return frame_from_bottom;
 }
 
-std::string TransformChain::known() const {
+std::string TransformChain::list_transforms() const {
   std::string text;
   for (const auto& [child, link] : links_) {
     text += (text.empty() ? "" : ", ") + link.parent + " -> " + child;

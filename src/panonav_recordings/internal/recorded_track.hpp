@@ -26,7 +26,7 @@ class RecordedTrack {
   [[nodiscard]] std::size_t size() const noexcept { return samples_.size(); }
   [[nodiscard]] bool has_stamps() const;
   /// Sorts by header stamp or by log time. From poses of one time only the last is kept.
-  void sort(bool by_log);
+  void sort(bool use_log_times);
   [[nodiscard]] const ros::Pose& last() const { return samples_.back().pose; }
   /// Returns the pose at a time, interpolated, or extrapolated by at most one interval beyond
   /// either end; `nullopt` in gaps of more than a second, within which a robot can turn or brake.
@@ -49,17 +49,19 @@ class TransformChain {
   TransformChain(std::string_view top, std::string_view bottom);
 
   void add(const ros::TransformStamped& transform, std::int64_t log_ns, bool is_static);
-  [[nodiscard]] bool connected() const noexcept { return connected_; }
+  [[nodiscard]] bool is_connected() const noexcept { return connected_; }
   /// Returns the number of ignored transforms that give a frame another parent than an earlier
   /// transform.
-  [[nodiscard]] std::size_t other_parents() const noexcept { return other_parents_; }
+  [[nodiscard]] std::size_t ignored_transform_count() const noexcept {
+    return ignored_transform_count_;
+  }
   [[nodiscard]] bool has_stamps() const;
-  void sort(bool by_log);
+  void sort(bool use_log_times);
   /// Returns top_from_bottom at a time; requires that the chain is connected.
   [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const;
   /// Lists all transforms as "parent -> child", for the error that no chain connects the two
   /// frames.
-  [[nodiscard]] std::string known() const;
+  [[nodiscard]] std::string list_transforms() const;
 
  private:
   struct Link {
@@ -73,7 +75,7 @@ class TransformChain {
   std::string top_, bottom_;
   std::map<std::string, Link> links_;  // by the name of the child frame
   bool connected_ = false;
-  std::size_t other_parents_ = 0;
+  std::size_t ignored_transform_count_ = 0;
 };
 
 }  // namespace panonav::recordings

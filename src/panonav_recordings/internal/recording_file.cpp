@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint64_t loose_block_bytes = 4U << 20U;
 constexpr std::size_t cache_bytes = 16U << 20U;
-constexpr std::size_t ahead_bytes = 64U << 10U;
+constexpr std::size_t read_ahead_bytes = 64U << 10U;
 constexpr std::size_t max_warnings = 20;
 
 std::string system_message() {
@@ -49,7 +49,7 @@ void RecordingFile::warn(std::string_view what) const {
   warn(FileError(path_.string(), what));
 }
 
-void RecordingFile::call(const std::filesystem::path& name) {
+void RecordingFile::set_reported_path(const std::filesystem::path& name) {
   const std::string before = path_.string() + ": ";
   for (std::string& warning : warnings_) {
     if (warning.starts_with(before)) warning.replace(0, before.size() - 2, name.string());
@@ -72,14 +72,14 @@ void RecordingFile::fail(std::string_view what) const {
   throw FileError(path_.string(), to_readable_line(what));
 }
 
-void RecordingFile::check_message_limit(std::size_t places, std::size_t max_places) const {
-  if (places > max_places) {
-    fail("has too many messages to list; allowed: up to " + std::to_string(max_places));
+void RecordingFile::check_message_limit(std::size_t locations, std::size_t max_locations) const {
+  if (locations > max_locations) {
+    fail("has too many messages to list; allowed: up to " + std::to_string(max_locations));
   }
 }
 
-std::uint32_t RecordingFile::topic_of(std::string_view name, std::string_view type,
-                                      std::string_view encoding) {
+std::uint32_t RecordingFile::get_or_create_topic(std::string_view name, std::string_view type,
+                                                 std::string_view encoding) {
   RecordedTopic topic;
   topic.name = name;
   topic.type = type;
@@ -138,12 +138,12 @@ Buffer ChunkedFile::read_bytes_at(std::uint64_t at, std::uint64_t count) const {
 std::span<const std::uint8_t> ChunkedFile::peek(std::uint64_t at, std::size_t max_bytes) {
   if (at >= size_) return {};
   max_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(max_bytes, size_ - at));
-  if (at < ahead_at_ || at + max_bytes > ahead_at_ + ahead_.size) {
-    ahead_ =
-        read_bytes_at(at, std::min<std::uint64_t>(std::max(max_bytes, ahead_bytes), size_ - at));
-    ahead_at_ = at;
+  if (at < read_ahead_at_ || at + max_bytes > read_ahead_at_ + read_ahead_.size) {
+    read_ahead_ = read_bytes_at(
+        at, std::min<std::uint64_t>(std::max(max_bytes, read_ahead_bytes), size_ - at));
+    read_ahead_at_ = at;
   }
-  return ahead_.bytes().subspan(static_cast<std::size_t>(at - ahead_at_), max_bytes);
+  return read_ahead_.bytes().subspan(static_cast<std::size_t>(at - read_ahead_at_), max_bytes);
 }
 
 void ChunkedFile::warn_of_cut(std::uint64_t at) const {
@@ -161,7 +161,7 @@ std::vector<std::optional<TimeSpan>> ChunkedFile::blocks() const {
 
 Buffer ChunkedFile::unpack_block(const Block& block) const {
   if (block.is_loose) return read_bytes_at(block.at, block.bytes);
-  const ChunkHead head = chunk_head(block);
+  const ChunkHead head = read_chunk_head(block);
   if (std::max(head.packed_bytes, head.unpacked_bytes) > limits_.chunk_bytes) {
     fail(describe_chunk(block.at) + " has " +
          std::to_string(std::max(head.packed_bytes, head.unpacked_bytes)) +
@@ -189,7 +189,7 @@ Buffer ChunkedFile::unpack_block(const Block& block) const {
     auto unpacked =
         unpack(packed.bytes(), head.packing, static_cast<std::size_t>(head.unpacked_bytes));
     packed = std::move(unpacked.content);
-    if (!block.is_cut && !(unpacked.whole && packed.size == head.unpacked_bytes)) {
+    if (!block.is_cut && !(unpacked.is_whole && packed.size == head.unpacked_bytes)) {
       fail(describe_chunk(block.at) + " is damaged: it cannot be unpacked");
     }
   }
@@ -223,14 +223,14 @@ std::shared_ptr<const Buffer> ChunkedFile::content(std::uint64_t block) const {
 }
 
 void ChunkedFile::list(std::size_t block, const std::vector<bool>& chosen_topics,
-                       const TimeSpan& within, std::size_t max_places,
-                       std::vector<MessageLocation>& places) const {
+                       const TimeSpan& within, std::size_t max_locations,
+                       std::vector<MessageLocation>& locations) const {
   const Block& from = blocks_.at(block);
   std::vector<Entry> read;
   if (!from.entries && (!list_index_entries(from, read) || read.size() != from.messages)) {
     warn("the index of " + describe_chunk(from.at) + " is damaged; the chunk itself is read");
     read.clear();
-    if (!walk(content(block)->bytes(), read)) {
+    if (!list_messages(content(block)->bytes(), read)) {
       warn(describe_chunk(from.at) + " is damaged; the part before the damage is read");
     }
   }
@@ -239,25 +239,25 @@ void ChunkedFile::list(std::size_t block, const std::vector<bool>& chosen_topics
         entry.time_ns > within.end_ns) {
       continue;
     }
-    places.push_back({entry.time_ns, entry.topic, 0, block, entry.offset});
-    check_message_limit(places.size(), max_places);
+    locations.push_back({entry.time_ns, entry.topic, 0, block, entry.offset});
+    check_message_limit(locations.size(), max_locations);
   }
 }
 
-RecordedMessage ChunkedFile::read(const MessageLocation& place) const {
-  auto block = content(place.block);
+RecordedMessage ChunkedFile::read(const MessageLocation& location) const {
+  auto block = content(location.block);
   std::optional<RecordedMessage> message;
-  if (place.offset < block->size) message = message_at(block->bytes(), place.offset);
+  if (location.offset < block->size) message = parse_message_at(block->bytes(), location.offset);
   if (!message) {
-    fail(describe_chunk(blocks_[place.block].at) + " has no message where its index says");
+    fail(describe_chunk(blocks_[location.block].at) + " has no message where its index says");
   }
   message->owner = std::move(block);
   return *std::move(message);
 }
 
-void ChunkedFile::note(Block& block, const Entry& entry) {
+void ChunkedFile::count_message(Block& block, const Entry& entry) {
   ++topics_[entry.topic].messages;
-  check_message_limit(++noted_, limits_.messages);
+  check_message_limit(++counted_messages_, limits_.messages);
   if (!block.time) block.time = TimeSpan{entry.time_ns, entry.time_ns};
   block.time->begin_ns = std::min(block.time->begin_ns, entry.time_ns);
   block.time->end_ns = std::max(block.time->end_ns, entry.time_ns);
@@ -269,17 +269,17 @@ void ChunkedFile::add_chunk(std::uint64_t at, bool is_cut) {
   block.is_cut = is_cut;
   try {
     const Buffer content = unpack_block(block);
-    declare(content.bytes());
+    add_declarations(content.bytes());
     std::vector<Entry> entries;
-    if (!walk(content.bytes(), entries) && !is_cut) {
+    if (!list_messages(content.bytes(), entries) && !is_cut) {
       warn(describe_chunk(at) + " is damaged; the part before the damage is read");
     }
     if (entries.empty()) return;
-    for (const Entry& entry : entries) note(block, entry);
+    for (const Entry& entry : entries) count_message(block, entry);
     entries.shrink_to_fit();
     block.entries = std::move(entries);
   } catch (const FileError& error) {
-    if (noted_ > limits_.messages) throw;
+    if (counted_messages_ > limits_.messages) throw;
     if (!is_cut) warn(error);
     return;
   }
@@ -304,7 +304,7 @@ void ChunkedFile::add_loose_message(std::uint64_t at, std::uint64_t bytes, std::
   }
   Block& block = blocks_.back();
   const Entry entry{time_ns, topic, static_cast<std::uint32_t>(at - block.at)};
-  note(block, entry);
+  count_message(block, entry);
   block.entries->push_back(entry);
   block.bytes += bytes;
 }

@@ -38,25 +38,27 @@ class RecordingFile {
   /// Returns the span of the messages' times of each block; nullopt for a block without messages.
   [[nodiscard]] virtual std::vector<std::optional<TimeSpan>> blocks() const = 0;
   /// Appends the locations of the messages of a block that have a chosen topic and a time within
-  /// the span, in any order. Throws FileError if `places` then has more than `max_places` elements.
+  /// the span, in any order. Throws FileError if `locations` then has more than `max_locations`
+  /// elements.
   virtual void list(std::size_t block, const std::vector<bool>& chosen_topics,
-                    const TimeSpan& within, std::size_t max_places,
-                    std::vector<MessageLocation>& places) const = 0;
+                    const TimeSpan& within, std::size_t max_locations,
+                    std::vector<MessageLocation>& locations) const = 0;
   /// Throws FileError on damage.
-  [[nodiscard]] virtual RecordedMessage read(const MessageLocation& place) const = 0;
+  [[nodiscard]] virtual RecordedMessage read(const MessageLocation& location) const = 0;
   /// Adds the line "PATH: what" to the warnings, unless it is there already.
   void warn(std::string_view what) const;
   void warn(const FileError& error) const;
   /// Sets the path that messages name, for a file that is an unpacked copy of `name`.
-  void call(const std::filesystem::path& name);
+  void set_reported_path(const std::filesystem::path& name);
 
  protected:
   explicit RecordingFile(std::filesystem::path path) : path_(std::move(path)) {}
   /// Returns the number of the topic of this name, type and encoding; adds it if there is none.
-  std::uint32_t topic_of(std::string_view name, std::string_view type, std::string_view encoding);
+  std::uint32_t get_or_create_topic(std::string_view name, std::string_view type,
+                                    std::string_view encoding);
   void forget_topics() noexcept;
   /// Throws FileError if there are more messages to list than allowed.
-  void check_message_limit(std::size_t places, std::size_t max_places) const;
+  void check_message_limit(std::size_t locations, std::size_t max_locations) const;
   [[noreturn]] void fail(std::string_view what) const;
 
   std::vector<RecordedTopic> topics_;
@@ -113,8 +115,8 @@ class ChunkedFile : public RecordingFile {
   ChunkedFile& operator=(const ChunkedFile&) = delete;
   [[nodiscard]] std::vector<std::optional<TimeSpan>> blocks() const override;
   void list(std::size_t block, const std::vector<bool>& chosen_topics, const TimeSpan& within,
-            std::size_t max_places, std::vector<MessageLocation>& places) const override;
-  [[nodiscard]] RecordedMessage read(const MessageLocation& place) const override;
+            std::size_t max_locations, std::vector<MessageLocation>& locations) const override;
+  [[nodiscard]] RecordedMessage read(const MessageLocation& location) const override;
 
  protected:
   struct Entry {
@@ -145,17 +147,18 @@ class ChunkedFile : public RecordingFile {
   ChunkedFile(std::filesystem::path path, const RecordingLimits& limits);
 
   /// Reads the head of the chunk of a block. Throws FileError on damage.
-  [[nodiscard]] virtual ChunkHead chunk_head(const Block& block) const = 0;
+  [[nodiscard]] virtual ChunkHead read_chunk_head(const Block& block) const = 0;
   /// Appends the entries of the index after the chunk. False if it is damaged.
   virtual bool list_index_entries(const Block& block, std::vector<Entry>& entries) const = 0;
   /// Parses the message whose record begins at `offset`, without owner; `nullopt` if there is none.
-  [[nodiscard]] virtual std::optional<RecordedMessage> message_at(
+  [[nodiscard]] virtual std::optional<RecordedMessage> parse_message_at(
       std::span<const std::uint8_t> block, std::size_t offset) const = 0;
   /// Adds the topics that unpacked records declare.
-  virtual void declare(std::span<const std::uint8_t> block) = 0;
+  virtual void add_declarations(std::span<const std::uint8_t> block) = 0;
   /// Appends the messages of unpacked records up to the first damaged one. Returns true if none was
   /// damaged.
-  virtual bool walk(std::span<const std::uint8_t> block, std::vector<Entry>& entries) const = 0;
+  virtual bool list_messages(std::span<const std::uint8_t> block,
+                             std::vector<Entry>& entries) const = 0;
 
   /// Unpacks a chunk during a pass over the file, and adds its topics and a block with its
   /// messages. `is_cut` is true if the file ends within the chunk, whose beginning is then used.
@@ -181,13 +184,13 @@ class ChunkedFile : public RecordingFile {
   void read_bytes(std::uint64_t at, std::span<std::uint8_t> to) const;
   [[nodiscard]] Buffer unpack_block(const Block& block) const;
   [[nodiscard]] std::shared_ptr<const Buffer> content(std::uint64_t block) const;
-  void note(Block& block, const Entry& entry);
+  void count_message(Block& block, const Entry& entry);
 
   int descriptor_ = -1;
   std::uint64_t size_ = 0;
-  std::size_t noted_ = 0;
-  std::uint64_t ahead_at_ = 0;
-  Buffer ahead_;
+  std::size_t counted_messages_ = 0;
+  std::uint64_t read_ahead_at_ = 0;
+  Buffer read_ahead_;
   mutable std::mutex cache_mutex_;
   mutable std::list<std::pair<std::uint64_t, std::shared_ptr<const Buffer>>> cache_;
 };

@@ -82,7 +82,7 @@ class BagFile : public ChunkedFile {
   }
 
  protected:
-  [[nodiscard]] ChunkHead chunk_head(const Block& block) const override {
+  [[nodiscard]] ChunkHead read_chunk_head(const Block& block) const override {
     constexpr std::uint64_t max_head_bytes = 4096;
     const Buffer bytes =
         read_bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
@@ -97,7 +97,7 @@ class BagFile : public ChunkedFile {
     if (!fields.good() || named.kind() != BagRecord::chunk || !unpacked) {
       fail(where + " is damaged: its head is wrong");
     }
-    const auto packing = find_packing(name);
+    const auto packing = parse_packing(name);
     if (!packing || *packing == Packing::zstd) {
       fail(where + " is packed by '" + std::string(name) + "'; allowed: none, bz2, lz4");
     }
@@ -108,7 +108,7 @@ class BagFile : public ChunkedFile {
   }
 
   bool list_index_entries(const Block& block, std::vector<Entry>& entries) const override {
-    const ChunkHead head = chunk_head(block);
+    const ChunkHead head = read_chunk_head(block);
     const std::uint64_t begin = head.at + head.packed_bytes;
     const std::uint64_t end = block.index_at + block.index_bytes;
     if (begin > end || end - begin > limits_.chunk_bytes) return false;
@@ -132,25 +132,26 @@ class BagFile : public ChunkedFile {
     return true;
   }
 
-  [[nodiscard]] std::optional<RecordedMessage> message_at(std::span<const std::uint8_t> block,
-                                                          std::size_t offset) const override {
+  [[nodiscard]] std::optional<RecordedMessage> parse_message_at(std::span<const std::uint8_t> block,
+                                                                std::size_t offset) const override {
     Fields fields(block.subspan(offset));
     const BagFields header(fields.prefixed());
     const auto data = fields.prefixed();
     if (!fields.good() || header.kind() != BagRecord::message) return std::nullopt;
-    return message_in(header, data);
+    return parse_message(header, data);
   }
 
-  void declare(std::span<const std::uint8_t> block) override {
+  void add_declarations(std::span<const std::uint8_t> block) override {
     Fields fields(block);
     while (fields.left() > 0) {
       const BagFields header(fields.prefixed());
       const BagFields data(fields.prefixed());
-      if (fields.good() && header.kind() == BagRecord::connection) declare(header, data);
+      if (fields.good() && header.kind() == BagRecord::connection) add_connection(header, data);
     }
   }
 
-  bool walk(std::span<const std::uint8_t> block, std::vector<Entry>& entries) const override {
+  bool list_messages(std::span<const std::uint8_t> block,
+                     std::vector<Entry>& entries) const override {
     Fields fields(block);
     while (fields.left() > 0) {
       const auto offset = static_cast<std::uint32_t>(block.size() - fields.left());
@@ -158,7 +159,7 @@ class BagFile : public ChunkedFile {
       const auto data = fields.prefixed();
       if (!fields.good()) return false;
       if (header.kind() != BagRecord::message) continue;
-      if (const auto message = message_in(header, data)) {
+      if (const auto message = parse_message(header, data)) {
         entries.push_back({message->time_ns, message->topic, offset});
       }
     }
@@ -166,7 +167,7 @@ class BagFile : public ChunkedFile {
   }
 
  private:
-  [[nodiscard]] std::optional<RecordedMessage> message_in(
+  [[nodiscard]] std::optional<RecordedMessage> parse_message(
       const BagFields& header, std::span<const std::uint8_t> data) const {
     const auto connection = header.number<std::uint32_t>("conn");
     const auto time = header.number<std::uint64_t>("time");
@@ -184,10 +185,11 @@ class BagFile : public ChunkedFile {
     return message;
   }
 
-  void declare(const BagFields& header, const BagFields& data) {
+  void add_connection(const BagFields& header, const BagFields& data) {
     const auto number = header.number<std::uint32_t>("conn");
     if (!number || connections_.contains(*number)) return;
-    connections_.emplace(*number, topic_of(header.text("topic"), data.text("type"), "ros1"));
+    connections_.emplace(*number,
+                         get_or_create_topic(header.text("topic"), data.text("type"), "ros1"));
   }
 
   // Reads the index at the end of the bag: its connections, and times and counts of the chunks.
@@ -201,7 +203,7 @@ class BagFile : public ChunkedFile {
       const auto data = fields.prefixed();
       const auto kind = header.kind();
       if (!fields.good() || !kind) return false;
-      if (*kind == BagRecord::connection) declare(header, BagFields(data));
+      if (*kind == BagRecord::connection) add_connection(header, BagFields(data));
       if (*kind != BagRecord::chunk_info) continue;
       Block block;
       const auto at = header.number<std::uint64_t>("chunk_pos");
@@ -250,12 +252,12 @@ class BagFile : public ChunkedFile {
         break;
       } else if (*kind == BagRecord::message) {
         // A killed recorder leaves the messages of its last chunk outside of any chunk.
-        if (const auto message = message_in(header, {})) {
+        if (const auto message = parse_message(header, {})) {
           add_loose_message(at, data_at + data_bytes - at, message->time_ns, message->topic);
         }
       } else if (*kind == BagRecord::connection && data_bytes <= limits_.chunk_bytes) {
         const Buffer data = read_bytes_at(data_at, data_bytes);
-        declare(BagFields(Fields(peek(at, 4 + length)).prefixed()), BagFields(data.bytes()));
+        add_connection(BagFields(Fields(peek(at, 4 + length)).prefixed()), BagFields(data.bytes()));
       }
       if (is_cut) break;
       at = data_at + data_bytes;

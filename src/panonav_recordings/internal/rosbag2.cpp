@@ -63,10 +63,10 @@ class DatabaseFile : public RecordingFile {
     constexpr std::size_t max_blob = 1U << 30U;
     sqlite3_limit(handle, SQLITE_LIMIT_LENGTH,
                   static_cast<int>(std::min(limits.chunk_bytes, max_blob)));
-    constexpr std::int64_t at_least = 10'000'000, for_each_byte = 12;
+    constexpr std::int64_t min_steps = 10'000'000, steps_per_byte = 12;
     std::error_code unknown;
     const auto bytes = fs::file_size(path, unknown);
-    steps_allowed_ = at_least + for_each_byte * static_cast<std::int64_t>(unknown ? 0 : bytes);
+    steps_allowed_ = min_steps + steps_per_byte * static_cast<std::int64_t>(unknown ? 0 : bytes);
     for (const char* pragma : {"PRAGMA cell_size_check=ON", "PRAGMA query_only=ON"}) {
       (void)step(prepare(pragma));
     }
@@ -74,29 +74,30 @@ class DatabaseFile : public RecordingFile {
     const Statement topics =
         prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
     while (step(topics)) {
-      numbers_.try_emplace(sqlite3_column_int64(topics.get(), 0),
-                           topic_of(text(topics, 1), text(topics, 2), text(topics, 3)));
+      topics_by_id_.try_emplace(
+          sqlite3_column_int64(topics.get(), 0),
+          get_or_create_topic(text(topics, 1), text(topics, 2), text(topics, 3)));
     }
     try {
       const Statement rows = prepare("SELECT id, topic_id, timestamp FROM messages");
       while (step(rows)) {
-        const auto place = read_place(rows);
-        if (!place) continue;
-        ++topics_[place->topic].messages;
-        if (!time_) time_ = TimeSpan{place->time_ns, place->time_ns};
-        time_->begin_ns = std::min(time_->begin_ns, place->time_ns);
-        time_->end_ns = std::max(time_->end_ns, place->time_ns);
+        const auto location = read_location(rows);
+        if (!location) continue;
+        ++topics_[location->topic].messages;
+        if (!time_) time_ = TimeSpan{location->time_ns, location->time_ns};
+        time_->begin_ns = std::min(time_->begin_ns, location->time_ns);
+        time_->end_ns = std::max(time_->end_ns, location->time_ns);
       }
     } catch (const FileError& error) {
       warn(error);  // messages before the damage are used
     }
-    find_ = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
+    find_statement_ = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id = ?");
   }
 
   [[nodiscard]] std::vector<std::optional<TimeSpan>> blocks() const override { return {time_}; }
 
   void list(std::size_t, const std::vector<bool>& chosen_topics, const TimeSpan& within,
-            std::size_t max_places, std::vector<MessageLocation>& places) const override {
+            std::size_t max_locations, std::vector<MessageLocation>& locations) const override {
     const std::lock_guard lock(mutex_);
     // The index of times is faster only if a part of the messages is read.
     const bool is_all = within.begin_ns <= time_->begin_ns && within.end_ns >= time_->end_ns;
@@ -109,25 +110,26 @@ class DatabaseFile : public RecordingFile {
       sqlite3_bind_int64(rows.get(), 2, within.end_ns);
     }
     while (step(rows)) {
-      const auto place = read_place(rows);
-      if (!place || !chosen_topics[place->topic]) continue;
-      places.push_back(*place);
-      check_message_limit(places.size(), max_places);
+      const auto location = read_location(rows);
+      if (!location || !chosen_topics[location->topic]) continue;
+      locations.push_back(*location);
+      check_message_limit(locations.size(), max_locations);
     }
   }
 
-  [[nodiscard]] RecordedMessage read(const MessageLocation& place) const override {
+  [[nodiscard]] RecordedMessage read(const MessageLocation& location) const override {
     const std::lock_guard lock(mutex_);
-    const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_reset)> rewind(find_.get(),
+    const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_reset)> rewind(find_statement_.get(),
                                                                          sqlite3_reset);
-    sqlite3_bind_int64(find_.get(), 1, static_cast<std::int64_t>(place.offset));
+    sqlite3_bind_int64(find_statement_.get(), 1, static_cast<std::int64_t>(location.offset));
     steps_left_ = steps_allowed_;
-    const auto found = step(find_) ? read_place(find_) : std::nullopt;
-    if (!found || sqlite3_column_type(find_.get(), 3) != SQLITE_BLOB) {
-      fail("is damaged: message " + std::to_string(place.offset) + " is missing or no blob");
+    const auto found = step(find_statement_) ? read_location(find_statement_) : std::nullopt;
+    if (!found || sqlite3_column_type(find_statement_.get(), 3) != SQLITE_BLOB) {
+      fail("is damaged: message " + std::to_string(location.offset) + " is missing or no blob");
     }
-    const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(find_.get(), 3));
-    Buffer buffer(static_cast<std::size_t>(sqlite3_column_bytes(find_.get(), 3)));
+    const auto* data =
+        static_cast<const std::uint8_t*>(sqlite3_column_blob(find_statement_.get(), 3));
+    Buffer buffer(static_cast<std::size_t>(sqlite3_column_bytes(find_statement_.get(), 3)));
     if (buffer.size > 0 && data == nullptr) fail("cannot be read: out of memory");
     std::copy_n(data, buffer.size, buffer.data.get());
     RecordedMessage message{found->time_ns, found->topic, {}, {}};
@@ -192,33 +194,33 @@ class DatabaseFile : public RecordingFile {
 
   // Reads the location of a message from a row that begins with id, topic and time; `nullopt` if
   // these are no integers or the topic is unknown.
-  [[nodiscard]] std::optional<MessageLocation> read_place(const Statement& row) const {
+  [[nodiscard]] std::optional<MessageLocation> read_location(const Statement& row) const {
     for (int column = 0; column < 3; ++column) {
       if (sqlite3_column_type(row.get(), column) != SQLITE_INTEGER) {
         warn("messages without a time or topic are left out");
         return std::nullopt;
       }
     }
-    const auto topic = numbers_.find(sqlite3_column_int64(row.get(), 1));
-    if (topic == numbers_.end()) {
+    const auto topic = topics_by_id_.find(sqlite3_column_int64(row.get(), 1));
+    if (topic == topics_by_id_.end()) {
       warn("messages of topic " + std::to_string(sqlite3_column_int64(row.get(), 1)) +
            " are left out: the topic is not described");
       return std::nullopt;
     }
-    MessageLocation place;
-    place.time_ns = sqlite3_column_int64(row.get(), 2);
-    place.topic = topic->second;
-    place.offset = static_cast<std::uint64_t>(sqlite3_column_int64(row.get(), 0));
-    return place;
+    MessageLocation location;
+    location.time_ns = sqlite3_column_int64(row.get(), 2);
+    location.topic = topic->second;
+    location.offset = static_cast<std::uint64_t>(sqlite3_column_int64(row.get(), 0));
+    return location;
   }
 
   mutable std::mutex mutex_;
   mutable std::int64_t steps_left_ = 0;
   std::int64_t steps_allowed_ = 0;
-  std::unordered_map<std::int64_t, std::uint32_t> numbers_;  // topics by their ids
+  std::unordered_map<std::int64_t, std::uint32_t> topics_by_id_;  // topics by their ids
   std::optional<TimeSpan> time_;
   std::unique_ptr<sqlite3, Close> handle_;
-  Statement find_;
+  Statement find_statement_;
 };
 
 }  // namespace

@@ -23,14 +23,14 @@ namespace panonav::recordings {
 namespace {
 
 /// Pixel formats in order of preference.
-constexpr std::array<std::uint32_t, 5> usable{
+constexpr std::array<std::uint32_t, 5> supported_formats{
     V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_GREY};
 
-bool is_usable(std::uint32_t pixels) {
-  return std::ranges::find(usable, pixels) != usable.end();
+bool is_supported(std::uint32_t pixels) {
+  return std::ranges::find(supported_formats, pixels) != supported_formats.end();
 }
 
-bool control(int descriptor, unsigned long request, void* argument) {
+bool try_ioctl(int descriptor, unsigned long request, void* argument) {
   int result = 0;
   do {
     result = ioctl(descriptor, request, argument);
@@ -43,11 +43,13 @@ int open_device(const std::string& device) {
   if (descriptor < 0) {
     throw FileError(device, std::string("cannot be opened: ") + std::strerror(errno));
   }
-  v4l2_capability able{};
-  const bool camera = control(descriptor, VIDIOC_QUERYCAP, &able);
-  const std::uint32_t can =
-      (able.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? able.device_caps : able.capabilities;
-  if (!camera || (can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0) {
+  v4l2_capability capability{};
+  const bool is_v4l2 = try_ioctl(descriptor, VIDIOC_QUERYCAP, &capability);
+  const std::uint32_t capabilities = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
+                                         ? capability.device_caps
+                                         : capability.capabilities;
+  if (!is_v4l2 || (capabilities & V4L2_CAP_VIDEO_CAPTURE) == 0 ||
+      (capabilities & V4L2_CAP_STREAMING) == 0) {
     close(descriptor);
     throw FileError(device, "is not a camera that streams images");
   }
@@ -59,7 +61,7 @@ std::vector<std::uint32_t> list_pixel_formats(int descriptor) {
   std::vector<std::uint32_t> formats;
   for (v4l2_fmtdesc format{}; format.index < max_formats; ++format.index) {
     format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    if (!control(descriptor, VIDIOC_ENUM_FMT, &format)) break;
+    if (!try_ioctl(descriptor, VIDIOC_ENUM_FMT, &format)) break;
     formats.push_back(format.pixelformat);
   }
   return formats;
@@ -94,11 +96,11 @@ std::vector<CameraFormat> list_camera_formats(const std::filesystem::path& devic
   const int descriptor = open_device(device.string());
   std::vector<CameraFormat> formats;
   for (const std::uint32_t pixels : list_pixel_formats(descriptor)) {
-    CameraFormat format{format_name(pixels), is_usable(pixels), {}};
+    CameraFormat format{format_name(pixels), is_supported(pixels), {}};
     constexpr std::uint32_t max_sizes = 256;
     for (v4l2_frmsizeenum size{}; size.index < max_sizes; ++size.index) {
       size.pixel_format = pixels;
-      if (!control(descriptor, VIDIOC_ENUM_FRAMESIZES, &size)) break;
+      if (!try_ioctl(descriptor, VIDIOC_ENUM_FRAMESIZES, &size)) break;
       if (size.type != V4L2_FRMSIZE_TYPE_DISCRETE) break;
       format.sizes.push_back(
           {static_cast<int>(size.discrete.width), static_cast<int>(size.discrete.height)});
@@ -122,10 +124,10 @@ V4l2Camera::V4l2Camera(std::string device, const std::optional<ImageSize>& size)
 
 void V4l2Camera::start(const std::optional<ImageSize>& size) {
   const auto offered = list_pixel_formats(descriptor_);
-  const auto* const chosen = std::ranges::find_if(usable, [&](std::uint32_t pixels) {
+  const auto* const chosen = std::ranges::find_if(supported_formats, [&](std::uint32_t pixels) {
     return std::ranges::find(offered, pixels) != offered.end();
   });
-  if (chosen == usable.end()) {
+  if (chosen == supported_formats.end()) {
     std::string names;
     for (const std::uint32_t pixels : offered)
       names += (names.empty() ? "" : ", ") + format_name(pixels);
@@ -134,19 +136,19 @@ void V4l2Camera::start(const std::optional<ImageSize>& size) {
   }
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  if (!control(descriptor_, VIDIOC_G_FMT, &format)) fail("does not say its format");
+  if (!try_ioctl(descriptor_, VIDIOC_G_FMT, &format)) fail("does not say its format");
   format.fmt.pix.pixelformat = *chosen;
   format.fmt.pix.field = V4L2_FIELD_ANY;
   if (size) {
     format.fmt.pix.width = static_cast<std::uint32_t>(size->width);
     format.fmt.pix.height = static_cast<std::uint32_t>(size->height);
   }
-  if (!control(descriptor_, VIDIOC_S_FMT, &format)) {
+  if (!try_ioctl(descriptor_, VIDIOC_S_FMT, &format)) {
     fail(std::string("does not support the format ") + format_name(*chosen) + ": " +
          std::strerror(errno));
   }
   const auto& pixels = format.fmt.pix;
-  if (!is_usable(pixels.pixelformat) || pixels.width < 1 || pixels.height < 1 ||
+  if (!is_supported(pixels.pixelformat) || pixels.width < 1 || pixels.height < 1 ||
       pixels.width > 65535 || pixels.height > 65535) {
     fail("gives images of " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) +
          " px as " + format_name(pixels.pixelformat));
@@ -160,7 +162,7 @@ void V4l2Camera::start(const std::optional<ImageSize>& size) {
   request.count = 4;
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
-  if (!control(descriptor_, VIDIOC_REQBUFS, &request) || request.count < 2) {
+  if (!try_ioctl(descriptor_, VIDIOC_REQBUFS, &request) || request.count < 2) {
     fail("is used by another program, or gives no buffers");
   }
   for (std::uint32_t i = 0; i < request.count; ++i) {
@@ -168,22 +170,22 @@ void V4l2Camera::start(const std::optional<ImageSize>& size) {
     buffer.type = request.type;
     buffer.memory = request.memory;
     buffer.index = i;
-    if (!control(descriptor_, VIDIOC_QUERYBUF, &buffer)) fail("gives no buffers");
+    if (!try_ioctl(descriptor_, VIDIOC_QUERYBUF, &buffer)) fail("gives no buffers");
     void* const data = mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor_,
                             static_cast<off_t>(buffer.m.offset));
     if (data == MAP_FAILED) fail("gives no buffers");
     buffers_.push_back({data, buffer.length});
-    if (!control(descriptor_, VIDIOC_QBUF, &buffer)) fail("takes no buffers");
+    if (!try_ioctl(descriptor_, VIDIOC_QBUF, &buffer)) fail("takes no buffers");
   }
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  if (!control(descriptor_, VIDIOC_STREAMON, &type)) {
+  if (!try_ioctl(descriptor_, VIDIOC_STREAMON, &type)) {
     fail(std::string("does not start: ") + std::strerror(errno));
   }
 }
 
 V4l2Camera::~V4l2Camera() {
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  control(descriptor_, VIDIOC_STREAMOFF, &type);
+  try_ioctl(descriptor_, VIDIOC_STREAMOFF, &type);
   for (const auto& [data, length] : buffers_) munmap(data, length);
   close(descriptor_);
 }
@@ -203,7 +205,7 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
     v4l2_buffer buffer{};
     buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     buffer.memory = V4L2_MEMORY_MMAP;
-    if (!control(descriptor_, VIDIOC_DQBUF, &buffer)) {
+    if (!try_ioctl(descriptor_, VIDIOC_DQBUF, &buffer)) {
       if (errno == EAGAIN && (waits[0].revents & (POLLERR | POLLHUP)) == 0) continue;
       fail(std::string("was disconnected: ") + std::strerror(errno));
     }
@@ -231,7 +233,7 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
       if (frame.lost > 1'000'000) frame.lost = 0;  // restarted counter of the driver
       sequence_ = buffer.sequence;
     }
-    if (!control(descriptor_, VIDIOC_QBUF, &buffer)) fail("has gone");
+    if (!try_ioctl(descriptor_, VIDIOC_QBUF, &buffer)) fail("has gone");
     if (!damaged) return frame;
   }
 }

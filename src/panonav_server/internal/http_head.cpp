@@ -23,7 +23,7 @@ class HeadReader {
   static MHD_Result read(void* self, MHD_ValueKind /*kind*/, const char* name, const char* value) {
     auto& head = *static_cast<HeadReader*>(self);
     if (value == nullptr) value = "";
-    head.check_adjacency(name, value);
+    head.check_line_ends(name, value);
     head.read_field(to_lower_case(name), value);
     return MHD_YES;
   }
@@ -48,7 +48,7 @@ class HeadReader {
   /// differently: folded lines, and lines that end in "\n" or "\r" alone. It parses in place and
   /// replaces the end of each line by as many zeros, so the distance to the next field shows the
   /// length of that end.
-  void check_adjacency(const char* name, const char* value) {
+  void check_line_ends(const char* name, const char* value) {
     has_whole_lines_ = has_whole_lines_ && line_end_ + 2 == name;
     line_end_ = value + std::strlen(value);
   }

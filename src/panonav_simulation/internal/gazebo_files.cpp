@@ -133,7 +133,7 @@ std::optional<FoundFile> GazeboFiles::resolve(std::string_view uri,
   return std::nullopt;
 }
 
-std::string GazeboFiles::places() const {
+std::string GazeboFiles::list_folders() const {
   std::string text;
   for (const fs::path& folder : folders_) text += (text.empty() ? "" : ", ") + folder.string();
   return text;

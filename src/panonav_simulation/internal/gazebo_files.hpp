@@ -40,7 +40,7 @@ class GazeboFiles {
                                                  const std::filesystem::path& directory) const;
 
   /// Returns the model folders as text for messages.
-  [[nodiscard]] std::string places() const;
+  [[nodiscard]] std::string list_folders() const;
 
   /// Returns the root element <sdf> or <gazebo> of a file, which is read once; valid as long as
   /// this object. Throws FileError.

@@ -96,7 +96,7 @@ constexpr double occlusion_spacings = 5.0;
 struct LightPoint {
   Float3 position;
   Float3 normal;
-  Float3 offset_to_triangles{};  ///< sum of vectors to the centres of adjacent triangles
+  Float3 centre_offset_sum{};  ///< sum of vectors to the centres of adjacent triangles
   float triangle_count = 0.0F;
   float light = 0.0F;
 };
@@ -296,7 +296,7 @@ void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, doubl
   };
   const auto add_triangle_centre = [&](std::uint32_t index, const Float3& centre) {
     LightPoint& point = points[index];
-    point.offset_to_triangles = point.offset_to_triangles + (centre - point.position);
+    point.centre_offset_sum = point.centre_offset_sum + (centre - point.position);
     point.triangle_count += 1.0F;
   };
   for (std::size_t t = 0; t < lit.triangles.size(); ++t) {
@@ -314,14 +314,14 @@ void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, doubl
     }
   }
   const LightProbe probe(scene, tracer, lit, shadows, spacing_m);
-  executor.for_chunks(points.size(), 256, [&](std::size_t begin, std::size_t end, std::size_t) {
+  executor.for_each_chunk(points.size(), 256, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
       // A point on the border of a surface is often inside an adjacent body, where it is dark. Move
       // it by a third of the mean vector to its triangles' centres; within a surface these vectors
       // cancel.
       const LightPoint& point = points[i];
       const Float3 position =
-          point.position + (0.33F / point.triangle_count) * point.offset_to_triangles;
+          point.position + (0.33F / point.triangle_count) * point.centre_offset_sum;
       points[i].light = probe.light_at(position, point.normal);
     }
   });

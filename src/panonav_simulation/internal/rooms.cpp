@@ -109,14 +109,14 @@ void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, do
 }
 
 // Materials of the walls of the periodic hall.
-struct PeriodicWallMaterials {
+struct PeriodicWallStyle {
   int plaster, poster, door, stone;
   double height_m;
 };
 
 // Adds a wall with the same picture and pillar every 2 m; wall 0 has a door instead of one picture.
-void add_periodic_wall(SceneBuilder& builder, const PeriodicWallMaterials& materials,
-                       std::size_t number, Point2 from, Point2 to) {
+void add_periodic_wall(SceneBuilder& builder, const PeriodicWallStyle& style, std::size_t number,
+                       Point2 from, Point2 to) {
   const std::string wall = "wall " + std::to_string(number);
   const double length = distance(from, to);
   const auto on_line = [&](double along) {
@@ -128,18 +128,18 @@ void add_periodic_wall(SceneBuilder& builder, const PeriodicWallMaterials& mater
   for (double along = 0.5; along + 1.0 < length; along += 2.0) {
     const bool is_door = number == 0 && std::abs(along - 4.5) < 1e-9;
     if (is_door) {
-      builder.add_on_wall("door", materials.door, from, to, along, 0.9, 0.0, 2.1);
+      builder.add_on_wall("door", style.door, from, to, along, 0.9, 0.0, 2.1);
     } else {
-      builder.add_on_wall(wall + " picture", materials.poster, from, to, along, 0.9, 0.6, 1.8);
+      builder.add_on_wall(wall + " picture", style.poster, from, to, along, 0.9, 0.6, 1.8);
     }
     const double pillar = along + 1.45;
-    builder.add_box(wall + " pillar", materials.stone, materials.stone, {on_line(pillar), 0.0},
-                    {0.0, 0.0, 0.0}, {pillar_width_m, pillar_width_m, materials.height_m}, 1.0);
-    builder.add_wall(wall, materials.plaster, on_line(wall_from),
-                     on_line(pillar - 0.5 * pillar_width_m), materials.height_m, 2.0);
+    builder.add_box(wall + " pillar", style.stone, style.stone, {on_line(pillar), 0.0},
+                    {0.0, 0.0, 0.0}, {pillar_width_m, pillar_width_m, style.height_m}, 1.0);
+    builder.add_wall(wall, style.plaster, on_line(wall_from),
+                     on_line(pillar - 0.5 * pillar_width_m), style.height_m, 2.0);
     wall_from = pillar + 0.5 * pillar_width_m;
   }
-  builder.add_wall(wall, materials.plaster, on_line(wall_from), to, materials.height_m, 2.0);
+  builder.add_wall(wall, style.plaster, on_line(wall_from), to, style.height_m, 2.0);
 }
 
 }  // namespace

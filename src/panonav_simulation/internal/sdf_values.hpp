@@ -30,19 +30,19 @@ struct UnusablePart {
 [[nodiscard]] double read_number(pugi::xml_node parent, const char* name, double otherwise);
 
 /// Reads `count` numbers from the child `name` of a shape; if it is missing or empty, returns
-/// `otherwise` for each. Throws Unusable.
+/// `otherwise` for each. Throws UnusablePart.
 [[nodiscard]] std::vector<double> read_size(pugi::xml_node shape, const char* name,
                                             std::size_t count,
                                             std::optional<double> otherwise = std::nullopt);
 
-/// Reads `count` numbers that must be above 0. Throws Unusable.
+/// Reads `count` numbers that must be above 0. Throws UnusablePart.
 [[nodiscard]] std::vector<double> read_positive_size(pugi::xml_node shape, const char* name,
                                                      std::size_t count);
 
 /// Returns the element with the pose of a part, <pose> or <origin>; a null node if there is none.
 [[nodiscard]] pugi::xml_node find_pose_element(pugi::xml_node part);
 
-/// Reads a <pose>: x y z, then roll pitch yaw or a quaternion x y z w. Throws Unusable.
+/// Reads a <pose>: x y z, then roll pitch yaw or a quaternion x y z w. Throws UnusablePart.
 [[nodiscard]] Affine3 read_pose(pugi::xml_node pose);
 
 /// Returns the name of the frame to which the pose of a part is relative; empty if it names none.

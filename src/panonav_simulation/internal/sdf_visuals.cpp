@@ -108,7 +108,8 @@ void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
   if (uri.empty()) uri = child_text(shape, "filename");
   const auto path = context_.find(uri, origin);
   if (!path)
-    throw UnusablePart{"its mesh " + quote(uri) + " was not found in " + context_.files.places()};
+    throw UnusablePart{"its mesh " + quote(uri) + " was not found in " +
+                       context_.files.list_folders()};
   const pugi::xml_node submesh = shape.child("submesh");
   const std::string name = child_text(submesh, "name");
   std::vector<const FileMesh*> shown;
@@ -175,15 +176,15 @@ void SdfVisuals::apply_script(Material& material, pugi::xml_node material_elemen
   std::string name = child_text(script, "name");
   if (name.empty()) name = child_text(material_element, "script");
   if (name.empty()) return;
-  std::vector<fs::path> places;
+  std::vector<fs::path> folders;
   for (const pugi::xml_node& uri : (script ? script : material_element).children("uri")) {
     if (const auto found = context_.files.resolve(element_text(uri), origin.directory))
-      places.push_back(found->path);
+      folders.push_back(found->path);
   }
   // Models list the folders of scripts and textures as separate <uri> elements; the usual scripts
   // folder is searched last.
-  places.push_back(origin.directory / "materials/scripts");
-  const auto known = find_script_material(name, places);
+  folders.push_back(origin.directory / "materials/scripts");
+  const auto known = find_script_material(name, folders);
   if (!known) {
     context_.warn(origin.object, "material script " + quote(name) +
                                      " was not found; a plain colour is shown instead");

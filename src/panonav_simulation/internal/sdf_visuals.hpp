@@ -14,7 +14,7 @@ class SdfVisuals {
   /// `context` must outlive this object.
   explicit SdfVisuals(SdfContext& context) : context_(context), meshes_(context.textures) {}
 
-  /// Adds the meshes and materials of a <visual>. Throws Unusable, Error.
+  /// Adds the meshes and materials of a <visual>. Throws UnusablePart, Error.
   void add(pugi::xml_node visual, const Affine3& world_from_visual, const SdfOrigin& origin);
 
   /// Returns the indices of the scene's meshes that are planes.

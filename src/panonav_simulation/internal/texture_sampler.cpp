@@ -44,15 +44,15 @@ MaterialSampler::MaterialSampler(const Material& material, int channels)
   levels_.push_back(std::move(base));
   while (levels_.back().width > 1 || levels_.back().height > 1) {
     const Level& finer = levels_.back();
-    Level coarse{std::max(1, finer.width / 2), std::max(1, finer.height / 2), {}};
-    coarse.texels.resize(static_cast<std::size_t>(coarse.width) * coarse.height * channels);
-    for (int y = 0; y < coarse.height; ++y) {
+    Level coarser{std::max(1, finer.width / 2), std::max(1, finer.height / 2), {}};
+    coarser.texels.resize(static_cast<std::size_t>(coarser.width) * coarser.height * channels);
+    for (int y = 0; y < coarser.height; ++y) {
       // With an odd size the last texel is averaged with its neighbour.
-      const int y0 = y * finer.height / coarse.height;
-      const int y1 = (y + 1) * finer.height / coarse.height;
-      for (int x = 0; x < coarse.width; ++x) {
-        const int x0 = x * finer.width / coarse.width;
-        const int x1 = (x + 1) * finer.width / coarse.width;
+      const int y0 = y * finer.height / coarser.height;
+      const int y1 = (y + 1) * finer.height / coarser.height;
+      for (int x = 0; x < coarser.width; ++x) {
+        const int x0 = x * finer.width / coarser.width;
+        const int x1 = (x + 1) * finer.width / coarser.width;
         const unsigned count = static_cast<unsigned>((y1 - y0) * (x1 - x0));
         for (int c = 0; c < channels; ++c) {
           unsigned sum = 0;
@@ -61,12 +61,12 @@ MaterialSampler::MaterialSampler(const Material& material, int channels)
               sum += finer.texels[(static_cast<std::size_t>(v) * finer.width + u) * channels + c];
             }
           }
-          coarse.texels[(static_cast<std::size_t>(y) * coarse.width + x) * channels + c] =
+          coarser.texels[(static_cast<std::size_t>(y) * coarser.width + x) * channels + c] =
               static_cast<std::uint8_t>((sum + count / 2) / count);
         }
       }
     }
-    levels_.push_back(std::move(coarse));
+    levels_.push_back(std::move(coarser));
   }
 }
 
@@ -114,10 +114,10 @@ void MaterialSampler::sample(float u, float v, float footprint, float* values) c
   } else if (level >= last) {
     add_bilinear_sample(levels_.back(), u, v, 1.0F, values);
   } else {
-    const auto finer = static_cast<std::size_t>(level);
-    const float fraction = level - static_cast<float>(finer);
-    add_bilinear_sample(levels_[finer], u, v, 1.0F - fraction, values);
-    add_bilinear_sample(levels_[finer + 1], u, v, fraction, values);
+    const auto finer_level = static_cast<std::size_t>(level);
+    const float fraction = level - static_cast<float>(finer_level);
+    add_bilinear_sample(levels_[finer_level], u, v, 1.0F - fraction, values);
+    add_bilinear_sample(levels_[finer_level + 1], u, v, fraction, values);
   }
 }
 

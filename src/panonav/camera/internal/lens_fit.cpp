@@ -119,7 +119,7 @@ MatrixXd LensFit::compute_normal_equations(const State& state, const std::vector
   };
   constexpr std::size_t chunk = 256;
   std::vector<Part> parts((matches.size() + chunk - 1) / chunk);
-  executor_.for_chunks(
+  executor_.for_each_chunk(
       matches.size(), chunk, [&](std::size_t begin, std::size_t end, std::size_t number) {
         Part& part = parts[number];
         part.matrix = MatrixXd::Zero(current_.offset.size(), current_.offset.size());

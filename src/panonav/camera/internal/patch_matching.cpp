@@ -197,7 +197,7 @@ int Matching::count_near_expected() const {
 }
 
 void PatchMatcher::estimate_yaws(State& state, double step_rad, double left_azimuth_rad) {
-  static_cast<void>(get_or_make_planes(state, step_rad));
+  static_cast<void>(get_or_create_planes(state, step_rad));
   // Uses the first reduction for all fields of view, which differ little.
   const int reduction = planes_.front().first;
   const std::vector<SmoothPlanes>& smooth_pictures = planes_.front().second;
@@ -259,7 +259,7 @@ class PatchMatcher::Search {
   void add_match(int a, int b, Matching& found) {
     const auto pixel = views_[a].pixel(direction_.middle);
     if (!pixel || !views_[b].pixel(direction_.middle)) return;
-    const auto whitener = compute_whitener(get_or_cut_area(a));
+    const auto whitener = compute_whitener(get_or_create_area(a));
     if (!whitener) return;
     const std::vector<Correlation> at = correlate_all_offsets(a, b);
     const auto best =
@@ -294,7 +294,7 @@ class PatchMatcher::Search {
 
  private:
   /// Returns the search area of a view, cut from the image at the first call.
-  [[nodiscard]] const Patch& get_or_cut_area(int view) {
+  [[nodiscard]] const Patch& get_or_create_area(int view) {
     if (!search_areas_[view]) {
       search_areas_[view] = cut_patch(views_[view], direction_.middle, direction_.east,
                                       direction_.north, step_rad_, patch_radius + search_steps_);
@@ -307,8 +307,8 @@ class PatchMatcher::Search {
     std::vector<Correlation> at;
     const int width = 2 * search_steps_ + 1;
     for (int i = 0; i < width * width; ++i) {
-      at.push_back(correlate(get_or_cut_area(a), get_or_cut_area(b), i % width - search_steps_,
-                             i / width - search_steps_));
+      at.push_back(correlate(get_or_create_area(a), get_or_create_area(b),
+                             i % width - search_steps_, i / width - search_steps_));
     }
     return at;
   }
@@ -322,7 +322,7 @@ class PatchMatcher::Search {
 
 Matching PatchMatcher::match(const State& state, double step_rad, int search_steps,
                              int directions) {
-  const auto& [reduction, smooth] = get_or_make_planes(state, step_rad);
+  const auto& [reduction, smooth] = get_or_create_planes(state, step_rad);
   const int count = static_cast<int>(grey_.size());
   std::vector<View> views;
   for (int p = 0; p < count; ++p) {
@@ -332,7 +332,7 @@ Matching PatchMatcher::match(const State& state, double step_rad, int search_ste
   const auto pairs = list_view_pairs(count);
   const auto directions_size = static_cast<std::size_t>(directions);
   std::vector<Matching> found(directions_size);
-  executor_.for_chunks(directions_size, 1, [&](std::size_t begin, std::size_t, std::size_t) {
+  executor_.for_each_chunk(directions_size, 1, [&](std::size_t begin, std::size_t, std::size_t) {
     Search here(views, make_direction(begin, directions), step_rad, search_steps);
     for (const auto& [a, b] : pairs) here.add_match(a, b, found[begin]);
   });
@@ -344,7 +344,7 @@ Matching PatchMatcher::match(const State& state, double step_rad, int search_ste
   return all;
 }
 
-const std::pair<int, std::vector<SmoothPlanes>>& PatchMatcher::get_or_make_planes(
+const std::pair<int, std::vector<SmoothPlanes>>& PatchMatcher::get_or_create_planes(
     const State& state, double step_rad) {
   const int reduction =
       std::max(1, static_cast<int>(std::lround(state.lenses[0].focal_length_px * step_rad)));

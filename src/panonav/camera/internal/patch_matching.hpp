@@ -65,7 +65,7 @@ class PatchMatcher {
   class Search;
   /// Returns the pictures reduced to samples about `step_rad` apart, with the reduction; computes
   /// each reduction only once.
-  [[nodiscard]] const std::pair<int, std::vector<SmoothPlanes>>& get_or_make_planes(
+  [[nodiscard]] const std::pair<int, std::vector<SmoothPlanes>>& get_or_create_planes(
       const State& state, double step_rad);
 
   std::span<const Image> grey_;

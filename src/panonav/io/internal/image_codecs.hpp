@@ -17,9 +17,9 @@ void check_image_size(ImageSize size, std::string_view name, const ImageLimits& 
 
 /// Returns the orientation, 1 .. 8, of an EXIF block that begins with its byte order; 1, which is
 /// upright, if it has none that can be read.
-[[nodiscard]] int exif_orientation(std::span<const std::uint8_t> exif);
+[[nodiscard]] int read_exif_orientation(std::span<const std::uint8_t> exif);
 [[nodiscard]] ImageSize upright_size(ImageSize stored, int orientation);
-[[nodiscard]] Image upright(Image stored, int orientation);
+[[nodiscard]] Image apply_exif_orientation(Image stored, int orientation);
 
 [[nodiscard]] Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
                                const ImageLimits& limits);

@@ -208,7 +208,7 @@ ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name,
                     const ImageLimits& limits) {
   Reader reader;
   const ImageSize stored = open(reader, bytes, name, limits);
-  return upright_size(stored, exif_orientation(find_exif(bytes)));
+  return upright_size(stored, read_exif_orientation(find_exif(bytes)));
 }
 
 Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
@@ -230,7 +230,7 @@ Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
                    static_cast<std::size_t>(size.width) * channels)) {
     fail(reader, name);
   }
-  return upright(std::move(image), exif_orientation(find_exif(bytes)));
+  return apply_exif_orientation(std::move(image), read_exif_orientation(find_exif(bytes)));
 }
 
 }  // namespace panonav::detail

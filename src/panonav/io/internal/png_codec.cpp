@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t message_size = 160;
 
-void keep_message(char* message, const char* text) {
+void copy_message(char* message, const char* text) {
   std::strncpy(message, text, message_size - 1);
 }
 
@@ -32,7 +32,7 @@ struct Reader {
 };
 
 [[noreturn]] void on_read_error(png_structp png, png_const_charp text) {
-  keep_message(static_cast<Reader*>(png_get_error_ptr(png))->message, text);
+  copy_message(static_cast<Reader*>(png_get_error_ptr(png))->message, text);
   png_longjmp(png, 1);
 }
 
@@ -94,14 +94,14 @@ bool read_pixels(Reader& reader, png_bytepp rows) {
 // True if no chunk is longer than the file. libpng allocates memory for some chunks before it reads
 // them, up to 2 GB whatever its limits are.
 bool has_complete_chunks(std::span<const std::uint8_t> bytes) {
-  constexpr std::size_t around = 12;  // length, name and checksum
+  constexpr std::size_t chunk_overhead_bytes = 12;  // length, name and checksum
   std::size_t at = 8;
-  while (at + around <= bytes.size()) {
+  while (at + chunk_overhead_bytes <= bytes.size()) {
     std::size_t length = 0;
     for (std::size_t i = 0; i < 4; ++i) length = length << 8U | bytes[at + i];
-    if (length > bytes.size() - at - around) return false;
+    if (length > bytes.size() - at - chunk_overhead_bytes) return false;
     if (std::memcmp(&bytes[at + 4], "IEND", 4) == 0) return true;
-    at += around + length;
+    at += chunk_overhead_bytes + length;
   }
   return false;
 }
@@ -129,12 +129,12 @@ struct Writer {
 };
 
 [[noreturn]] void on_write_error(png_structp png, png_const_charp text) {
-  keep_message(static_cast<Writer*>(png_get_error_ptr(png))->message, text);
+  copy_message(static_cast<Writer*>(png_get_error_ptr(png))->message, text);
   png_longjmp(png, 1);
 }
 
 // Returns false if memory ran out, because no exception may pass through libpng.
-bool keep_bytes(Writer& writer, const std::uint8_t* from, std::size_t count) noexcept {
+bool append_bytes(Writer& writer, const std::uint8_t* from, std::size_t count) noexcept {
   try {
     writer.bytes.insert(writer.bytes.end(), from, from + count);
     return true;
@@ -144,7 +144,7 @@ bool keep_bytes(Writer& writer, const std::uint8_t* from, std::size_t count) noe
 }
 
 void on_write(png_structp png, png_bytep from, png_size_t count) {
-  if (!keep_bytes(*static_cast<Writer*>(png_get_io_ptr(png)), from, count)) {
+  if (!append_bytes(*static_cast<Writer*>(png_get_io_ptr(png)), from, count)) {
     png_error(png, "out of memory");
   }
 }
@@ -172,7 +172,7 @@ ImageSize png_size(std::span<const std::uint8_t> bytes, std::string_view name,
                    const ImageLimits& limits) {
   Reader reader;
   const ImageSize stored = open(reader, bytes, name, limits);
-  return upright_size(stored, exif_orientation(reader.exif));
+  return upright_size(stored, read_exif_orientation(reader.exif));
 }
 
 Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
@@ -193,7 +193,7 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
   std::vector<png_bytep> rows(static_cast<std::size_t>(size.height));
   for (int v = 0; v < size.height; ++v) rows[v] = &image.at(0, v);
   if (!read_pixels(reader, rows.data())) fail(reader, name);
-  return upright(std::move(image), exif_orientation(reader.exif));
+  return apply_exif_orientation(std::move(image), read_exif_orientation(reader.exif));
 }
 
 std::vector<std::uint8_t> encode_png(ImageView image) {

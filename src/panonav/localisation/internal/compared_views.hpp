@@ -15,7 +15,7 @@ namespace panonav {
 class ComparedViews {
  public:
   /// Callback that receives the profiles of a view and its index in the list of requested views.
-  using TakeProfiles = std::function<void(std::size_t, ColumnProfiles&&)>;
+  using ProfileCallback = std::function<void(std::size_t, ColumnProfiles&&)>;
 
   virtual ~ComparedViews() = default;
   [[nodiscard]] virtual SignatureShape shape() const = 0;
@@ -26,7 +26,7 @@ class ComparedViews {
   /// Returns the most similar views, at most `count`.
   [[nodiscard]] virtual std::vector<Match> search(const PackedSignature& view, int count) = 0;
   /// Passes the column profiles of each of these views that exists to `take`.
-  virtual void load(std::span<const ViewId> views, const TakeProfiles& take) = 0;
+  virtual void load(std::span<const ViewId> views, const ProfileCallback& take) = 0;
   /// Ends the work with one image; changes by other users become visible at the next image.
   virtual void release() {}
 };

@@ -50,18 +50,18 @@ ExplainedInjection::ExplainedInjection(ViewLikelihood& likelihood, const PoseSam
       sampler_(&sampler),
       heading_share_(compass ? model.heading_width_rad / std::numbers::pi : 1.0) {}
 
-bool ExplainedInjection::find_places(const Particles& particles, Random& random) {
+bool ExplainedInjection::collect_candidates(const Particles& particles, Random& random) {
   Particles poses;
-  const auto add = [&](PoseSampler::Candidate place) {
-    places_.push_back(place);
-    poses.add(sampler_->make_pose_at(place, particles, random), 0.0);
+  const auto add = [&](PoseSampler::Candidate candidate) {
+    candidates_.push_back(candidate);
+    poses.add(sampler_->make_pose_at(candidate, particles, random), 0.0);
   };
   const auto sites = likelihood_->sites();
   for (const std::uint32_t site : likelihood_->compared_sites()) {
     add({site, false});
     if (sampler_->has_heading(site) && sites[site].other_similarity > 0.0F) add({site, true});
   }
-  if (places_.empty()) return false;
+  if (candidates_.empty()) return false;
   likelihoods_.resize(poses.size());
   likelihood_->compute_log_ratios(poses, likelihoods_);
   log_largest_ = std::max(0.0, *std::ranges::max_element(likelihoods_));
@@ -79,7 +79,7 @@ Particles ExplainedInjection::sample_particles(const Particles& particles, std::
   const std::vector<std::size_t> drawn = resample_systematically(likelihoods_, count, random);
   Particles fresh;
   for (const std::size_t d : drawn) {
-    fresh.add(sampler_->sample_around(places_[d], particles, random), 0.0);
+    fresh.add(sampler_->sample_around(candidates_[d], particles, random), 0.0);
   }
   std::vector<double> log_ratios(fresh.size());
   likelihood_->compute_log_ratios(fresh, log_ratios);

@@ -19,9 +19,9 @@ class ExplainedInjection {
 
   /// Collects the poses at the compared references and their likelihoods. Returns false if no
   /// reference was compared.
-  bool find_places(const Particles& particles, Random& random);
+  bool collect_candidates(const Particles& particles, Random& random);
   /// Logarithm of the view's mean likelihood over all places and headings of the memory, relative
-  /// to an unexplained view. Valid after `find_places`.
+  /// to an unexplained view. Valid after `collect_candidates`.
   [[nodiscard]] double log_evidence() const { return log_evidence_; }
 
   /// Replaces the lightest particles by new ones at the candidates, which together get the weight
@@ -38,7 +38,7 @@ class ExplainedInjection {
   ViewLikelihood* likelihood_;
   const PoseSampler* sampler_;
   double heading_share_;  // share of the circle that explains a view at a reference
-  std::vector<PoseSampler::Candidate> places_;
+  std::vector<PoseSampler::Candidate> candidates_;
   std::vector<double> likelihoods_;  // at the candidates, relative to the largest
   double log_largest_ = 0.0;
   double log_evidence_ = 0.0;

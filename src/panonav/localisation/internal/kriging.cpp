@@ -14,7 +14,7 @@ namespace panonav {
 namespace {
 
 /// Largest distance of neighbours on a grid in spacings, diagonal ones included.
-constexpr double adjacent_spacings = 1.5;
+constexpr double max_adjacent_spacings = 1.5;
 /// Tolerance for rounding: a reference on a straight edge of the map has an empty half circle.
 constexpr double edge_tolerance_rad = radians(1.0);
 
@@ -28,27 +28,29 @@ double squared(double difference) {
 ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
                                         std::span<const RankedMatch> matches) {
   ResemblingViews near;
-  std::vector<double> to_query;
+  std::vector<double> squared_query_differences;
   std::vector<ColumnProfiles> profiles;
   for (const RankedMatch& ranked : matches) {
-    if (near.views.size() == PositionModel::candidates) break;
+    if (near.views.size() == PositionModel::max_candidates) break;
     const ViewId view = ranked.match.view;
     const auto& pose = ranking.memory().info(view).pose;
     if (!pose) continue;
     near.views.push_back(view);
     near.positions.push_back(pose->position());
-    to_query.push_back(squared(ranked.columns.difference));
+    squared_query_differences.push_back(squared(ranked.columns.difference));
     profiles.push_back(ranking.profiles(view));
   }
   const auto size = static_cast<Eigen::Index>(near.views.size());
-  near.to_query = Eigen::Map<const Eigen::VectorXd>(to_query.data(), size);
-  near.between = Eigen::MatrixXd::Zero(size, size);
+  near.squared_query_differences =
+      Eigen::Map<const Eigen::VectorXd>(squared_query_differences.data(), size);
+  near.squared_mutual_differences = Eigen::MatrixXd::Zero(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
     for (Eigen::Index j = 0; j < size; ++j) {
       if (i == j) continue;
-      near.between(i, j) = squared(match_columns(profiles[static_cast<std::size_t>(j)],
-                                                 profiles[static_cast<std::size_t>(i)])
-                                       .difference);
+      near.squared_mutual_differences(i, j) =
+          squared(match_columns(profiles[static_cast<std::size_t>(j)],
+                                profiles[static_cast<std::size_t>(i)])
+                      .difference);
     }
   }
   return near;
@@ -58,17 +60,18 @@ double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m) {
   double min_elsewhere = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < near.views.size(); ++i) {
     if (distance(near.positions[i], near.positions[0]) <= elsewhere_spacings * spacing_m) continue;
-    min_elsewhere = std::min(min_elsewhere, near.to_query(static_cast<Eigen::Index>(i)));
+    min_elsewhere =
+        std::min(min_elsewhere, near.squared_query_differences(static_cast<Eigen::Index>(i)));
   }
   if (!(min_elsewhere < std::numeric_limits<double>::infinity())) return 0.0;
-  return min_elsewhere > 0.0 ? std::sqrt(near.to_query(0) / min_elsewhere) : 1.0;
+  return min_elsewhere > 0.0 ? std::sqrt(near.squared_query_differences(0) / min_elsewhere) : 1.0;
 }
 
 bool is_surrounded(const ResemblingViews& near, double spacing_m) {
   std::vector<double> directions;
   for (const Point2& position : near.positions) {
     const double distance_m = distance(position, near.positions[0]);
-    if (distance_m == 0.0 || distance_m > adjacent_spacings * spacing_m) continue;
+    if (distance_m == 0.0 || distance_m > max_adjacent_spacings * spacing_m) continue;
     directions.push_back(
         std::atan2(position.y_m - near.positions[0].y_m, position.x_m - near.positions[0].x_m));
   }
@@ -97,9 +100,10 @@ KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double
   matrix(size, size) = 0.0;
   for (Eigen::Index i = 0; i < size; ++i) {
     const auto a = static_cast<Eigen::Index>(result.used[i]);
-    right(i) = variogram(near.to_query(a));
+    right(i) = variogram(near.squared_query_differences(a));
     for (Eigen::Index j = 0; j < size; ++j) {
-      matrix(i, j) = variogram(near.between(a, static_cast<Eigen::Index>(result.used[j])));
+      matrix(i, j) =
+          variogram(near.squared_mutual_differences(a, static_cast<Eigen::Index>(result.used[j])));
     }
   }
   // Takes the solution of smallest norm, so that references with equal signatures share their

@@ -22,11 +22,12 @@ inline constexpr double elsewhere_spacings = 3.0;
 struct ResemblingViews {
   std::vector<ViewId> views;
   std::vector<Point2> positions;
-  Eigen::VectorXd to_query;  ///< squared column differences between the query and each view
+  Eigen::VectorXd
+      squared_query_differences;  ///< squared column differences between the query and each view
   /// Squared column differences between the views: (i, j) compares view j as query with reference
   /// i. The comparison is not quite symmetric; in this order, a query equal to view j gets the
   /// position of view j.
-  Eigen::MatrixXd between;
+  Eigen::MatrixXd squared_mutual_differences;
 };
 /// Compares the first `PositionModel::candidates` posed views of the matches with each other.
 [[nodiscard]] ResemblingViews compare_with_each_other(const ColumnRanking& ranking,

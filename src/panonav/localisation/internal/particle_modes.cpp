@@ -19,7 +19,7 @@ namespace {
 constexpr int mode_reach = 2;
 
 struct Bin {
-  GridCell place;
+  GridCell grid_cell;
   std::int32_t heading;
   double weight;
   int mode;
@@ -81,22 +81,22 @@ class BinTable {
   explicit BinTable(int headings) : headings_(static_cast<std::size_t>(headings)) {}
 
   [[nodiscard]] std::span<Bin> bins() { return bins_; }
-  [[nodiscard]] std::optional<std::uint32_t> find(GridCell place, std::int32_t heading) const {
-    const auto cell = cells_.find(place);
+  [[nodiscard]] std::optional<std::uint32_t> find(GridCell grid_cell, std::int32_t heading) const {
+    const auto cell = cells_.find(grid_cell);
     if (!cell) return std::nullopt;
     const std::uint32_t bin = bin_of_[*cell * headings_ + static_cast<std::size_t>(heading)];
     return bin == none ? std::nullopt : std::optional(bin);
   }
-  std::uint32_t find_or_add(GridCell place, std::int32_t heading) {
+  std::uint32_t find_or_add(GridCell grid_cell, std::int32_t heading) {
     // Successive particles are usually in the same cell, so the last cell is tried first.
-    if (cells_.size() == 0 || cells_[last_] != place) {
-      last_ = cells_.find_or_add(place);
+    if (cells_.size() == 0 || cells_[last_] != grid_cell) {
+      last_ = cells_.find_or_add(grid_cell);
       bin_of_.resize(cells_.size() * headings_, none);
     }
     std::uint32_t& bin = bin_of_[last_ * headings_ + static_cast<std::size_t>(heading)];
     if (bin == none) {
       bin = static_cast<std::uint32_t>(bins_.size());
-      bins_.push_back({place, heading, 0.0, -1});
+      bins_.push_back({grid_cell, heading, 0.0, -1});
     }
     return bin;
   }
@@ -125,12 +125,12 @@ std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins&
   const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
   sum = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const GridCell place{bin_index(particles.x_m[i] * cells_per_metre),
-                         bin_index(particles.y_m[i] * cells_per_metre)};
+    const GridCell grid_cell{bin_index(particles.x_m[i] * cells_per_metre),
+                             bin_index(particles.y_m[i] * cells_per_metre)};
     const auto sector =
         bin_index((particles.heading_rad[i] + std::numbers::pi) * sectors_per_radian);
     const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
-    bin_of[i] = table.find_or_add(place, heading);
+    bin_of[i] = table.find_or_add(grid_cell, heading);
     table.bins()[bin_of[i]].weight += particles.weight[i];
     sum += particles.weight[i];
   }
@@ -138,16 +138,16 @@ std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins&
 }
 
 /// Assigns the bins around `seed` that do not yet belong to a mode to `mode`; returns their weight.
-double gather_mode(BinTable& table, const PoseBins& bins, std::uint32_t seed, int mode) {
+double assign_nearby_bins(BinTable& table, const PoseBins& bins, std::uint32_t seed, int mode) {
   const std::span<Bin> cells = table.bins();
   double weight = 0.0;
-  const std::int32_t turn_reach = bins.headings > 2 * mode_reach ? mode_reach : 0;
+  const std::int32_t heading_reach = bins.headings > 2 * mode_reach ? mode_reach : 0;
   for (std::int32_t dx = -mode_reach; dx <= mode_reach; ++dx) {
     for (std::int32_t dy = -mode_reach; dy <= mode_reach; ++dy) {
-      for (std::int32_t dh = -turn_reach; dh <= turn_reach; ++dh) {
+      for (std::int32_t dh = -heading_reach; dh <= heading_reach; ++dh) {
         const std::int32_t heading = (cells[seed].heading + dh + bins.headings) % bins.headings;
-        const GridCell place{cells[seed].place.x + dx, cells[seed].place.y + dy};
-        const auto found = table.find(place, heading);
+        const GridCell grid_cell{cells[seed].grid_cell.x + dx, cells[seed].grid_cell.y + dy};
+        const auto found = table.find(grid_cell, heading);
         if (!found || cells[*found].mode >= 0) continue;
         cells[*found].mode = mode;
         weight += cells[*found].weight;
@@ -159,7 +159,7 @@ double gather_mode(BinTable& table, const PoseBins& bins, std::uint32_t seed, in
 
 /// Gathers modes around the bins in descending order of weight, until no further mode can have the
 /// weight `min_weight`. Returns the modes' weights.
-std::vector<double> gather_modes(BinTable& table, const PoseBins& bins, double min_weight) {
+std::vector<double> assign_bins_to_modes(BinTable& table, const PoseBins& bins, double min_weight) {
   const std::span<Bin> cells = table.bins();
   std::vector<std::uint32_t> order(cells.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -174,7 +174,7 @@ std::vector<double> gather_modes(BinTable& table, const PoseBins& bins, double m
     // this one.
     constexpr double max_bins = (2 * mode_reach + 1) * (2 * mode_reach + 1) * (2 * mode_reach + 1);
     if (cells[seed].weight * max_bins < min_weight) break;
-    weights.push_back(gather_mode(table, bins, seed, static_cast<int>(weights.size())));
+    weights.push_back(assign_nearby_bins(table, bins, seed, static_cast<int>(weights.size())));
   }
   return weights;
 }
@@ -213,7 +213,7 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
   const std::span<Bin> cells = table.bins();
   const double share = sum / static_cast<double>(particles.size());
   for (const Bin& bin : cells) result.occupied_bins += bin.weight >= 0.5 * share ? 1 : 0;
-  const std::vector<double> weights = gather_modes(table, bins, min_weight * sum);
+  const std::vector<double> weights = assign_bins_to_modes(table, bins, min_weight * sum);
   std::vector<Moments> moments(renumber_by_weight(cells, weights, min_weight * sum));
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const int mode = cells[bin_of[i]].mode;

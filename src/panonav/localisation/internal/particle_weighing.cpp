@@ -78,8 +78,8 @@ ParticleWeighing::WeightSums ParticleWeighing::temper_to_min_effective_sample_si
   return update_factors(particles, exponent);
 }
 
-double ParticleWeighing::weigh(Particles& particles, ViewLikelihood& likelihood, double exponent,
-                               const PoseBins& bins, Random& random) {
+double ParticleWeighing::update_weights(Particles& particles, ViewLikelihood& likelihood,
+                                        double exponent, const PoseBins& bins, Random& random) {
   double evidence = 0.0;
   double evidence_of_first = 0.0;
   double left = exponent;
@@ -104,7 +104,7 @@ double ParticleWeighing::weigh(Particles& particles, ViewLikelihood& likelihood,
     left -= part;
     if (!(left > exponent_tolerance)) break;
     resample_and_spread(particles, bins, random);
-    likelihood.arrange(particles);
+    likelihood.reorder_by_cell(particles);
   }
   return exponent >= min_evidence_exponent ? std::max(evidence_of_first, evidence / exponent)
                                            : evidence_of_first;

@@ -19,8 +19,8 @@ class ParticleWeighing {
   /// relative to an unexplained view. The particles must be ordered by
   /// `ViewLikelihood::arrange`. `bins`: grid of the modes within which particles are
   /// spread.
-  double weigh(Particles& particles, ViewLikelihood& likelihood, double exponent,
-               const PoseBins& bins, Random& random);
+  double update_weights(Particles& particles, ViewLikelihood& likelihood, double exponent,
+                        const PoseBins& bins, Random& random);
 
  private:
   /// Sums over the particles with multiplied weights.

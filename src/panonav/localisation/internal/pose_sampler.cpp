@@ -17,7 +17,7 @@ constexpr double position_deviation_spacings = 0.4;
 constexpr double heading_deviation_widths = 0.25;
 
 /// Returns the heading of a random particle, for new particles without a heading by the compass.
-double borrow_heading(const Particles& particles, Random& random) {
+double sample_heading(const Particles& particles, Random& random) {
   return particles.heading_rad[random.index(particles.size())];
 }
 
@@ -34,7 +34,7 @@ Pose2 PoseSampler::make_pose_at(Candidate candidate, const Particles& particles,
       has_heading(candidate.site)
           ? static_cast<double>(candidate.second_heading ? site.other_heading_rad
                                                          : site.heading_rad)
-          : borrow_heading(particles, random);
+          : sample_heading(particles, random);
   return {site.position.x_m, site.position.y_m, wrap_angle(heading_rad)};
 }
 
@@ -62,7 +62,7 @@ Pose2 PoseSampler::sample_in_square(std::size_t site, std::optional<double> head
 }
 
 Pose2 PoseSampler::sample_anywhere(const Particles& particles, Random& random) const {
-  const double borrowed_rad = borrow_heading(particles, random);
+  const double borrowed_rad = sample_heading(particles, random);
   const std::size_t site = random.index(likelihood_->sites().size());
   return sample_in_square(site, compass_ ? std::nullopt : std::optional(borrowed_rad), random);
 }

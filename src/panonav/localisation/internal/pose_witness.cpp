@@ -15,12 +15,12 @@ namespace {
 constexpr std::size_t min_witnesses = 3;
 /// Smallest share of witnesses that agree; 99 % of sure localisations are right
 /// (docs/decisions.md).
-constexpr double agreeing_share = 0.8;
+constexpr double min_agreeing_share = 0.8;
 /// Smallest extent of the witnesses' images in spacings; nearer images would all be matched to the
 /// same references.
 constexpr double min_spread_spacings = 2.0;
 /// Odometry error as a share of the distance travelled, due to slipping wheels.
-constexpr double travel_error = 0.05;
+constexpr double odometry_error_share = 0.05;
 
 Pose2 predict_pose(const Pose2& odometry, const PoseWitness& witness) {
   return witness.pose * (inverse(witness.odometry) * odometry);
@@ -37,9 +37,9 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
   const auto agree = [&](std::size_t a, std::size_t b) {
     const double travelled_m = witnesses[a].travelled_m + witnesses[b].travelled_m;
     return distance(poses[a].position(), poses[b].position()) <=
-               0.5 * spacing_m + travel_error * travelled_m &&
+               0.5 * spacing_m + odometry_error_share * travelled_m &&
            std::abs(angle_difference(poses[a].heading_rad, poses[b].heading_rad)) <=
-               agreeing_heading_rad;
+               agreeing_heading_tolerance_rad;
   };
   std::vector<std::size_t> best;
   for (std::size_t a = 0; a < poses.size(); ++a) {
@@ -50,7 +50,7 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
     if (agreeing.size() > best.size()) best = std::move(agreeing);
   }
   if (best.size() < min_witnesses ||
-      static_cast<double>(best.size()) < agreeing_share * static_cast<double>(poses.size())) {
+      static_cast<double>(best.size()) < min_agreeing_share * static_cast<double>(poses.size())) {
     return std::nullopt;
   }
   double spread_m = 0.0;
@@ -68,7 +68,7 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
   const double middle_rad = poses[best.front()].heading_rad;
   const auto add = [&](const Pose2& pose, const PoseWitness& witness) {
     const double deviation_m = std::hypot(std::max(0.5 * witness.radius_m, 0.05 * spacing_m),
-                                          travel_error * witness.travelled_m);
+                                          odometry_error_share * witness.travelled_m);
     const double weight = 1.0 / (deviation_m * deviation_m);
     weights += weight;
     mean.x_m += weight * pose.x_m;
@@ -79,7 +79,8 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
   if (own) {
     const Point2 middle{mean.x_m / weights, mean.y_m / weights};
     if (distance(own->pose.position(), middle) <= 0.5 * spacing_m &&
-        std::abs(angle_difference(own->pose.heading_rad, middle_rad)) <= agreeing_heading_rad) {
+        std::abs(angle_difference(own->pose.heading_rad, middle_rad)) <=
+            agreeing_heading_tolerance_rad) {
       add(own->pose, *own);
     }
   }

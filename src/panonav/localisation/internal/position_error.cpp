@@ -6,19 +6,19 @@
 namespace panonav {
 
 void PositionError::move(const Pose2& step) {
-  const double x = per_scale_m_.x_m + step.x_m;
-  const double y = per_scale_m_.y_m + step.y_m;
+  const double x = error_per_scale_m_.x_m + step.x_m;
+  const double y = error_per_scale_m_.y_m + step.y_m;
   const double cosine = std::cos(step.heading_rad);
   const double sine = std::sin(step.heading_rad);
-  per_scale_m_ = {cosine * x + sine * y, cosine * y - sine * x};
+  error_per_scale_m_ = {cosine * x + sine * y, cosine * y - sine * x};
 }
 
 void PositionError::begin(double variance_after_m2) {
   last_ = {variance_after_m2, variance_after_m2, variance_after_m2};
-  per_scale_m_ = {};
+  error_per_scale_m_ = {};
 }
 
-void PositionError::observe(double variance_before_m2, double variance_after_m2, double share,
+void PositionError::observe(double variance_before_m2, double variance_after_m2, double exponent,
                             double correlation, double effective) {
   const double ratio = variance_before_m2 > 0.0 ? variance_after_m2 / variance_before_m2 : 1.0;
   const double kept = std::min(1.0, ratio);
@@ -30,10 +30,10 @@ void PositionError::observe(double variance_before_m2, double variance_after_m2,
   // The particles imply the variance after / gain for the weakened view, so the whole view has the
   // variance exponent * after / gain.
   last_ = {variance_after_m2,
-           kept * kept * error_m2 + gain * share * variance_after_m2 +
+           kept * kept * error_m2 + gain * exponent * variance_after_m2 +
                2.0 * kept * gain * with_view_m2 + variance_after_m2 / effective,
-           kept * with_view_m2 + share * variance_after_m2};
-  per_scale_m_ = {kept * per_scale_m_.x_m, kept * per_scale_m_.y_m};
+           kept * with_view_m2 + exponent * variance_after_m2};
+  error_per_scale_m_ = {kept * error_per_scale_m_.x_m, kept * error_per_scale_m_.y_m};
 }
 
 double PositionError::variance_at(double particle_variance_m2) const {
@@ -57,8 +57,8 @@ std::array<double, 9> PositionError::corrected_covariance(std::array<double, 9> 
   }
   const double cosine = std::cos(heading_rad) * translation_scale_error;
   const double sine = std::sin(heading_rad) * translation_scale_error;
-  const double x = cosine * per_scale_m_.x_m - sine * per_scale_m_.y_m;
-  const double y = sine * per_scale_m_.x_m + cosine * per_scale_m_.y_m;
+  const double x = cosine * error_per_scale_m_.x_m - sine * error_per_scale_m_.y_m;
+  const double y = sine * error_per_scale_m_.x_m + cosine * error_per_scale_m_.y_m;
   covariance[0] += x * x;
   covariance[1] += x * y;
   covariance[3] += x * y;

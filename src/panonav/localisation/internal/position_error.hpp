@@ -25,7 +25,7 @@ class PositionError {
   /// Adds a view whose likelihood was raised to the power of `exponent`. `correlation`: of its
   /// error with that of the previous view. Variances of the particles before and after the view, >
   /// 0; `effective`: effective sample size, > 0.
-  void observe(double variance_before_m2, double variance_after_m2, double share,
+  void observe(double variance_before_m2, double variance_after_m2, double exponent,
                double correlation, double effective);
 
   /// Returns the covariance of x, y (m) and heading (rad), row by row, of the robot's pose error.
@@ -46,7 +46,7 @@ class PositionError {
   };
   std::optional<Variances> last_;  // after the last view; nullopt before the first
   // Position error per unit of relative scale error of odometry, in the robot's frame.
-  Point2 per_scale_m_;
+  Point2 error_per_scale_m_;
 };
 
 }  // namespace panonav

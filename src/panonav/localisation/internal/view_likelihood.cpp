@@ -16,19 +16,19 @@ namespace {
 
 /// Distance in spacings within which references are near a cell: contains twelve even slightly
 /// outside the area of the references.
-constexpr double near_spacings = 2.0;
+constexpr double reach_spacings = 2.0;
 /// Mean distance of a position in a square of a grid from the nearest corner, in spacings.
-constexpr double nearest_spacings = 0.3826;
+constexpr double mean_corner_distance_spacings = 0.3826;
 /// Largest number of references near a cell: the corners of a grid square and the ring around them,
 /// without its corners.
-constexpr std::size_t max_near = 12;
+constexpr std::size_t max_near_sites = 12;
 /// Largest number of cached column profiles (2.5 kB each, 50 MB in all): more than a robot passes
 /// in an hour.
 constexpr std::size_t max_cached_profiles = 20'000;
 /// Number of sites whose profiles are loaded together: 2.4 MB of signatures.
 constexpr std::size_t sites_per_load = 1000;
 constexpr auto lane_count = static_cast<std::size_t>(kernels::similarity_lanes);
-static_assert(max_near <= lane_count);
+static_assert(max_near_sites <= lane_count);
 
 }  // namespace
 
@@ -37,7 +37,7 @@ ViewLikelihood::ViewLikelihood(std::unique_ptr<ComparedViews> views, const Obser
     : views_(std::move(views)), model_(model), compass_(compass) {
   require(model.spacing_m > 0.0, "spacing of the references", model.spacing_m, "> 0 m");
   require(model.range_m > 0.0, "range of similarity", model.range_m, "> 0 m");
-  fall_.per_metre = static_cast<float>(1.0 / model.range_m);
+  decay_.per_metre = static_cast<float>(1.0 / model.range_m);
   update_sites();
 }
 
@@ -78,11 +78,11 @@ void ViewLikelihood::index_sites() {
   cell_m_ = model_.spacing_m;
   cells_per_metre_ = 1.0 / cell_m_;
   const double reach_m =
-      std::max(near_spacings * model_.spacing_m, std::min(model_.range_m, 4 * model_.spacing_m));
+      std::max(reach_spacings * model_.spacing_m, std::min(model_.range_m, 4 * model_.spacing_m));
   const auto around = static_cast<std::int32_t>(std::ceil(reach_m / cell_m_));
   table_ = {};
   cells_.clear();
-  near_.clear();
+  near_sites_.clear();
   lanes_.clear();
   // (cell, distance from the cell's centre, site)
   std::vector<std::tuple<std::int32_t, std::int32_t, float, std::uint32_t>> entries;
@@ -98,16 +98,16 @@ void ViewLikelihood::index_sites() {
   }
   std::ranges::sort(entries);
   for (std::size_t i = 0; i < entries.size();) {
-    const GridCell place{std::get<0>(entries[i]), std::get<1>(entries[i])};
-    Cell cell{place, static_cast<std::uint32_t>(near_.size()), 0, 0, 0};
+    const GridCell grid_cell{std::get<0>(entries[i]), std::get<1>(entries[i])};
+    Cell cell{grid_cell, static_cast<std::uint32_t>(near_sites_.size()), 0, 0, 0};
     std::size_t count = 0;
-    for (; i < entries.size() && std::get<0>(entries[i]) == place.x &&
-           std::get<1>(entries[i]) == place.y;
+    for (; i < entries.size() && std::get<0>(entries[i]) == grid_cell.x &&
+           std::get<1>(entries[i]) == grid_cell.y;
          ++i) {
-      if (count++ < max_near) near_.push_back(std::get<3>(entries[i]));
+      if (count++ < max_near_sites) near_sites_.push_back(std::get<3>(entries[i]));
     }
-    cell.end = static_cast<std::uint32_t>(near_.size());
-    table_.find_or_add(place);
+    cell.end = static_cast<std::uint32_t>(near_sites_.size());
+    table_.find_or_add(grid_cell);
     cells_.push_back(cell);
   }
   group_of_cell_.assign(cells_.size() + 1, 0);
@@ -133,10 +133,10 @@ void ViewLikelihood::set_view(const PackedSignature& view) {
   view_.emplace(view, views_->components());
   compared_sites_.clear();
   max_similarity_ = 0.0;
-  fall_.blur_square_m2 = 0.0F;
+  decay_.blur_square_m2 = 0.0F;
   lanes_.clear();
   ++revision_;
-  ++number_;
+  ++view_number_;
 }
 
 std::vector<std::uint32_t> ViewLikelihood::search(int count) {
@@ -178,9 +178,9 @@ void ViewLikelihood::load_profiles(std::span<const std::uint32_t> sites) {
 
 void ViewLikelihood::compare_loaded(std::uint32_t site) {
   Site& s = sites_[site];
-  const auto [match, other] = match_columns_two_best(*view_, *profiles_[site]);
+  const auto [match, other] = find_two_best_column_matches(*view_, *profiles_[site]);
   const double far = model_.far_difference;
-  s.compared_at = number_;
+  s.compared_view_number = view_number_;
   const auto to_similarity = [far](const ColumnMatch& m) {
     return static_cast<float>(std::max(0.0, far * far - m.difference * m.difference));
   };
@@ -191,8 +191,8 @@ void ViewLikelihood::compare_loaded(std::uint32_t site) {
   if (static_cast<double>(s.similarity) > max_similarity_) {
     max_similarity_ = static_cast<double>(s.similarity);
     const double apart_m = model_.range_m * std::log(far * far / max_similarity_);
-    const double nearest_m = nearest_spacings * model_.spacing_m;
-    fall_.blur_square_m2 =
+    const double nearest_m = mean_corner_distance_spacings * model_.spacing_m;
+    decay_.blur_square_m2 =
         static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
   }
   s.heading_rad = s.reference_heading_rad + static_cast<float>(match.heading_rad);
@@ -219,21 +219,21 @@ const kernels::SimilarityLanes& ViewLikelihood::get_or_create_lanes(Cell& cell) 
   cell.lanes = static_cast<std::uint32_t>(lanes_.size());
   kernels::SimilarityLanes& lanes = lanes_.emplace_back();
   for (std::size_t i = 0; i < lane_count; ++i) {
-    lanes.x_m[i] = 1e6F / fall_.per_metre;
+    lanes.x_m[i] = 1e6F / decay_.per_metre;
     lanes.y_m[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
     lanes.other_heading_rad[i] = 0.0F;
     lanes.log_similarity[i] = lanes.other_log_similarity[i] =
         -std::numeric_limits<float>::infinity();
   }
   // Positions are relative to the cell, so that floats keep their precision far from the origin.
-  const Point2 centre = centre_of(cell.place);
+  const Point2 centre = centre_of(cell.grid_cell);
   const auto per_square_turn =
       static_cast<float>(-0.5 / (model_.heading_width_rad * model_.heading_width_rad));
   for (std::size_t i = 0; i < cell.end - cell.begin; ++i) {
-    const Site& s = sites_[near_[cell.begin + i]];
+    const Site& s = sites_[near_sites_[cell.begin + i]];
     lanes.x_m[i] = static_cast<float>(s.position.x_m - centre.x_m);
     lanes.y_m[i] = static_cast<float>(s.position.y_m - centre.y_m);
-    if (s.compared_at != number_) continue;
+    if (s.compared_view_number != view_number_) continue;
     lanes.log_similarity[i] = s.log_similarity;
     if (!compass_ || std::isnan(s.heading_rad)) continue;
     lanes.heading_rad[i] = s.heading_rad;
@@ -252,8 +252,8 @@ void ViewLikelihood::compute_log_ratios(const Particles& particles, std::span<do
   std::size_t begin = 0;
   auto next = cell_of(particles.position(0));
   while (begin < particles.size()) {
-    const auto place = next;
-    const Point2 centre = centre_of(place);
+    const auto grid_cell = next;
+    const Point2 centre = centre_of(grid_cell);
     std::size_t count = 0;
     do {
       x_m[count] = static_cast<float>(particles.x_m[begin + count] - centre.x_m);
@@ -262,10 +262,10 @@ void ViewLikelihood::compute_log_ratios(const Particles& particles, std::span<do
       ++count;
       if (begin + count == particles.size()) break;
       next = cell_of(particles.position(begin + count));
-    } while (count < block_size && next == place);
-    if (const auto cell = table_.find(place)) {
+    } while (count < block_size && next == grid_cell);
+    if (const auto cell = table_.find(grid_cell)) {
       kernels::explain_similarity(
-          get_or_create_lanes(cells_[*cell]), fall_, std::span(x_m).first(count),
+          get_or_create_lanes(cells_[*cell]), decay_, std::span(x_m).first(count),
           std::span(y_m).first(count), std::span(heading_rad).first(count),
           std::span(explained).first(count), kernels::chosen_instructions());
     } else {
@@ -281,7 +281,8 @@ void ViewLikelihood::compute_log_ratios(const Particles& particles, std::span<do
 std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const noexcept {
   const auto cell = table_.find(cell_of(position));
   if (!cell) return {};
-  return std::span(near_).subspan(cells_[*cell].begin, cells_[*cell].end - cells_[*cell].begin);
+  return std::span(near_sites_)
+      .subspan(cells_[*cell].begin, cells_[*cell].end - cells_[*cell].begin);
 }
 
 void ViewLikelihood::group_particles(const Particles& particles) {
@@ -290,11 +291,11 @@ void ViewLikelihood::group_particles(const Particles& particles) {
   GridCell last;
   std::uint32_t at = 0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const GridCell place = cell_of(particles.position(i));
-    if (i == 0 || place != last) {
-      last = place;
+    const GridCell grid_cell = cell_of(particles.position(i));
+    if (i == 0 || grid_cell != last) {
+      last = grid_cell;
       const auto none = static_cast<std::uint32_t>(cells_.size());
-      const std::uint32_t cell = table_.find(place).value_or(none);
+      const std::uint32_t cell = table_.find(grid_cell).value_or(none);
       at = group_of_cell_[cell];
       if (at >= groups_.size() || groups_[at].cell != cell) {
         at = group_of_cell_[cell] = static_cast<std::uint32_t>(groups_.size());
@@ -307,7 +308,7 @@ void ViewLikelihood::group_particles(const Particles& particles) {
   }
 }
 
-void ViewLikelihood::arrange(Particles& particles) {
+void ViewLikelihood::reorder_by_cell(Particles& particles) {
   group_particles(particles);
   std::uint32_t begin = 0;
   for (Group& group : groups_) {
@@ -332,8 +333,8 @@ std::vector<std::uint32_t> ViewLikelihood::heaviest_sites(const Particles& parti
     if (group.cell == cells_.size()) continue;
     const Cell& cell = cells_[group.cell];
     for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
-      if (mass[near_[i]] == 0.0) found.push_back(near_[i]);
-      mass[near_[i]] += group.weight;
+      if (mass[near_sites_[i]] == 0.0) found.push_back(near_sites_[i]);
+      mass[near_sites_[i]] += group.weight;
     }
   }
   std::erase_if(found, [&](std::uint32_t site) { return mass[site] < min_weight; });

@@ -41,7 +41,7 @@ class ViewLikelihood {
     float other_heading_rad;  ///< the second heading that fits (`match_columns_two_best`)
     float other_similarity;   ///< in the second heading
     float other_log_similarity;
-    std::uint32_t compared_at;  ///< number of the view last compared to it
+    std::uint32_t compared_view_number;  ///< number of the view last compared to it
   };
 
   /// Sets the view to compare. Throws ContractError on a signature of another shape.
@@ -56,17 +56,17 @@ class ViewLikelihood {
   /// view.
   void release() { views_->release(); }
   [[nodiscard]] bool is_compared(std::uint32_t site) const noexcept {
-    return sites_[site].compared_at == number_;
+    return sites_[site].compared_view_number == view_number_;
   }
   /// Returns the smallest difference between the view and the compared ones of these sites; nullopt
   /// if none was compared.
   [[nodiscard]] std::optional<double> min_difference(std::span<const std::uint32_t> sites) const;
 
   /// Computes the log-likelihood of the view at each pose relative to an unexplained view; >= 0.
-  /// Cost: 15 ns a pose if particles are ordered by cell (`arrange`).
+  /// Cost: 15 ns a pose if particles are ordered by cell (`reorder_by_cell`).
   void compute_log_ratios(const Particles& particles, std::span<double> ratios);
   /// Reorders particles so that those of one cell are adjacent. Cost: 10 ns each.
-  void arrange(Particles& particles);
+  void reorder_by_cell(Particles& particles);
 
   [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
   /// Returns at most 12 nearest sites of a position; none if all references are far away.
@@ -84,8 +84,8 @@ class ViewLikelihood {
  private:
   /// A cell with references near.
   struct Cell {
-    GridCell place;
-    std::uint32_t begin, end;      ///< in `near_`
+    GridCell grid_cell;
+    std::uint32_t begin, end;      ///< in `near_sites_`
     std::uint32_t lanes_revision;  ///< value of `revision_` when `lanes` was made
     std::uint32_t lanes;
   };
@@ -115,7 +115,7 @@ class ViewLikelihood {
   std::size_t cached_profiles_ = 0;
   CellTable table_;          ///< of the cells with references near
   std::vector<Cell> cells_;  ///< in the order of the numbers of `table_`
-  std::vector<std::uint32_t> near_;
+  std::vector<std::uint32_t> near_sites_;
   std::vector<kernels::SimilarityLanes> lanes_;  ///< made since the last comparison
   std::vector<Group> groups_;
   std::vector<std::uint32_t> group_of_;       ///< group of each particle
@@ -126,8 +126,8 @@ class ViewLikelihood {
   std::optional<PackedSignature> signature_;  ///< of the view
   std::optional<ColumnProfiles> view_;
   double max_similarity_ = 0.0;
-  kernels::SimilarityLanes::Fall fall_{1.0F, 0.0F};
-  std::uint32_t number_ = 0;
+  kernels::SimilarityLanes::Fall decay_{1.0F, 0.0F};
+  std::uint32_t view_number_ = 0;
   double cell_m_ = 1.0;
   double cells_per_metre_ = 1.0;
 };

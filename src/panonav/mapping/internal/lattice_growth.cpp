@@ -35,8 +35,8 @@ constexpr double length_tolerance_factor = 3.0;
 class Grower {
  public:
   Grower(std::size_t nodes, std::span<const Lattice::Spring> springs, double unit,
-         const LatticeLayout& start, const LatticeStepCallback& watch)
-      : watch_(watch), layout_(nodes, make_links(nodes, springs, unit), start) {}
+         const LatticeLayout& start, const LatticeStepCallback& step_callback)
+      : step_callback_(step_callback), layout_(nodes, make_links(nodes, springs, unit), start) {}
 
   GrownLayout grow() {
     push_all_joins();
@@ -96,7 +96,7 @@ class Grower {
         continue;
       }
       const auto changed = layout_.join(found->p, found->q, found->p_from_q);
-      if (watch_) watch_(layout_.poses(), layout_.components());
+      if (step_callback_) step_callback_(layout_.poses(), layout_.components());
       for (const std::size_t other : changed) push_join_if_likely(found->p, other);
     }
   }
@@ -180,7 +180,7 @@ class Grower {
     for (const GraphEdge& edge : edges) start.handedness_known[start.components[edge.a]] = 1;
   }
 
-  const LatticeStepCallback& watch_;
+  const LatticeStepCallback& step_callback_;
   ComponentLayout layout_;
   std::priority_queue<Join> open_;
 };
@@ -205,8 +205,8 @@ bool fits_layout(const Lattice::Spring& spring, double unit, const Pose2& a, con
 
 GrownLayout grow_components(std::size_t nodes, std::span<const Lattice::Spring> springs,
                             double unit, const LatticeLayout& start,
-                            const LatticeStepCallback& watch) {
-  return Grower(nodes, springs, unit, start, watch).grow();
+                            const LatticeStepCallback& step_callback) {
+  return Grower(nodes, springs, unit, start, step_callback).grow();
 }
 
 }  // namespace panonav

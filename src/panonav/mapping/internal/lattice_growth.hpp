@@ -30,13 +30,13 @@ struct GrownLayout {
 /// 3. Whenever a component has grown by a quarter, it is averaged over its springs
 ///    (component_layout.hpp).
 ///
-/// `watch`: called after each join. `start`: initial components; empty for single views. Lengths in
-/// the layout are `unit` times those of the phases. Deterministic. Cost: 1 s for 1,000 views of 12
-/// springs.
+/// `step_callback`: called after each join. `start`: initial components; empty for single views.
+/// Lengths in the layout are `unit` times those of the phases. Deterministic. Cost: 1 s for 1,000
+/// views of 12 springs.
 [[nodiscard]] GrownLayout grow_components(std::size_t nodes,
                                           std::span<const Lattice::Spring> springs, double unit,
                                           const LatticeLayout& start = {},
-                                          const LatticeStepCallback& watch = {});
+                                          const LatticeStepCallback& step_callback = {});
 
 /// True if the poses of two views in the final layout agree with the phases of their spring: turn
 /// within 15 degrees, direction within 45, length within a factor of three.

@@ -58,7 +58,7 @@ std::vector<NodePair> SpringViews::find_most_similar_pairs(const LatticeOptions&
                                                            Executor& executor) const {
   const auto views = memory_->views();
   std::vector<std::vector<NodePair>> found(views.size());
-  executor.for_chunks(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
+  executor.for_each_chunk(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto answer = memory_->search(packed_[i], {options.neighbours, components_},
                                           {.excluded_views = views.subspan(i, 1)});

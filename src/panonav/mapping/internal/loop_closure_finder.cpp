@@ -31,20 +31,24 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
   using T = LoopClosureOptions;
   constexpr OptionTable table{
       option<&T::candidates>("number of places that are tested for each view", 1, 1000),
-      option<&T::min_loop_m>("length of the shortest loop along the path", above(0), 1e6),
+      option<&T::min_loop_m>("shortest length of a loop, measured along the path", above(0), 1e6),
       option<&T::max_residual>(
           "largest share of the views' energy that a loop closure does not explain", 0, 1),
-      option<&T::max_length>("largest distance between the views of a loop closure in units of R",
+      option<&T::max_length>("largest distance between the views of a loop closure, in units of R "
+                             "(the typical distance of objects)",
                              0, 2),
-      option<&T::heading_tolerance_rad>(
-          "largest difference between the visual compass and the home vectors in both directions",
-          0, 3.2),
-      option<&T::return_tolerance>(
-          "largest length of the sum of the home vectors in both directions, in units of R", 0, 2),
+      option<&T::heading_tolerance_rad>("largest difference between the headings from the visual "
+                                        "compass and from the home vectors in both directions",
+                                        0, 3.2),
+      option<&T::return_tolerance>("largest length of the sum of the two home vectors between two "
+                                   "views, in units of R (the typical distance of objects)",
+                                   0, 2),
       option<&T::distinctness>(
-          "factor by which other places must match the view worse than the candidate", 1, 1000),
+          "factor by which all other places must match the view worse than the candidate does", 1,
+          1000),
       option<&T::reciprocal_rank>(
-          "the search from the candidate must find the view among this number of matches", 1, 1000),
+          "A search for the candidate must find the view among this number of best matches", 1,
+          1000),
       option<&T::sequence>("number of successive views whose loop closures must agree", 1, 1000),
       option<&T::spacing_m>("shortest path between two reported loop closures", 0, 1e6),
       option<&T::max_drift>("assumed drift of the odometry per metre since the last loop closure",

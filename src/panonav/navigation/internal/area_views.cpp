@@ -19,8 +19,8 @@ QueryView::QueryView(const FourierSignature& signature, float full_scale, int co
   if (components_ != 0) view = first_components(view, components_);
 }
 
-AreaViews::LoadedArea AreaViews::list_area(const NavigationGraph& graph, const SubAreas& areas,
-                                           std::size_t area) const {
+AreaViews::LoadedArea AreaViews::make_unloaded_area(const NavigationGraph& graph,
+                                                    const SubAreas& areas, std::size_t area) const {
   LoadedArea listed{.area = area};
   for (const std::size_t node : nodes_around(graph, areas.nodes.at(area), links_)) {
     listed.views.push_back(graph.view(node));
@@ -38,23 +38,24 @@ void AreaViews::load(LoadedArea& area, std::size_t max_views) const {
 }
 
 void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area) {
-  if (here_.area == area) return;
-  here_ = ahead_.area == area ? std::move(ahead_) : list_area(graph, areas, area);
-  ahead_ = {};
-  load(here_, here_.views.size());
+  if (current_.area == area) return;
+  current_ =
+      prefetched_.area == area ? std::move(prefetched_) : make_unloaded_area(graph, areas, area);
+  prefetched_ = {};
+  load(current_, current_.views.size());
 }
 
 void AreaViews::prefetch(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
                          int max_views) {
-  if (here_.area == area) return;
-  if (ahead_.area != area) ahead_ = list_area(graph, areas, area);
-  load(ahead_, static_cast<std::size_t>(max_views));
+  if (current_.area == area) return;
+  if (prefetched_.area != area) prefetched_ = make_unloaded_area(graph, areas, area);
+  load(prefetched_, static_cast<std::size_t>(max_views));
 }
 
 const VisualMemory* AreaViews::find_part(ViewId view) const {
   const auto after = std::ranges::upper_bound(
-      here_.parts, view, {}, [](const VisualMemory& part) { return part.views().front(); });
-  if (after == here_.parts.begin()) return nullptr;
+      current_.parts, view, {}, [](const VisualMemory& part) { return part.views().front(); });
+  if (after == current_.parts.begin()) return nullptr;
   const VisualMemory& part = *std::prev(after);
   return part.contains(view) ? &part : nullptr;
 }
@@ -72,8 +73,8 @@ std::optional<CompassReading> AreaViews::read_compass(ViewId view, const QueryVi
 }
 
 const HomingView& AreaViews::read_coefficients(ViewId view, int components) {
-  const auto held = here_.coefficients.find(view);
-  require(held != here_.coefficients.end(), "view", static_cast<double>(view.value),
+  const auto held = current_.coefficients.find(view);
+  require(held != current_.coefficients.end(), "view", static_cast<double>(view.value),
           "one that is loaded");
   // Magnitudes and phases, a byte each.
   bytes_read_ += 2 * static_cast<std::uint64_t>(held->second.rows()) *
@@ -105,7 +106,7 @@ std::optional<FoundView> AreaViews::find_nearest(const NavigationGraph& graph,
 std::optional<FoundView> AreaViews::find_nearest(const NavigationGraph& graph,
                                                  const QueryView& query) {
   std::optional<Match> best;
-  for (const VisualMemory& part : here_.parts) {
+  for (const VisualMemory& part : current_.parts) {
     const SearchResult found =
         part.search(query.packed, {.top = 1, .components = query.components});
     bytes_read_ += found.bytes_read;
@@ -122,7 +123,7 @@ std::vector<PackedSignature> AreaViews::most_similar_signatures(ViewId view, con
                                                                 int count) const {
   std::vector<PackedSignature> signatures{part_of(view).packed(view)};
   std::vector<Match> others;
-  for (const VisualMemory& part : here_.parts) {
+  for (const VisualMemory& part : current_.parts) {
     const SearchResult found =
         part.search(query.packed, {.top = count, .components = query.components},
                     {.excluded_views = std::span(&view, part.contains(view) ? 1 : 0)});

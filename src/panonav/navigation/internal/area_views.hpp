@@ -41,9 +41,9 @@ class AreaViews {
   void prefetch(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
                 int max_views);
   /// Current area; nullopt before the first `enter`.
-  [[nodiscard]] std::optional<std::size_t> area() const noexcept { return here_.area; }
+  [[nodiscard]] std::optional<std::size_t> area() const noexcept { return current_.area; }
   /// Number of views held, prefetched ones included.
-  [[nodiscard]] std::size_t size() const noexcept { return here_.loaded + ahead_.loaded; }
+  [[nodiscard]] std::size_t size() const noexcept { return current_.loaded + prefetched_.loaded; }
   /// True if the view was loaded with the current area.
   [[nodiscard]] bool holds(ViewId view) const { return find_part(view) != nullptr; }
 
@@ -80,16 +80,16 @@ class AreaViews {
     std::vector<VisualMemory> parts;            // ascending
     std::map<ViewId, HomingView> coefficients;  // of all parts
   };
-  [[nodiscard]] LoadedArea list_area(const NavigationGraph& graph, const SubAreas& areas,
-                                     std::size_t area) const;
+  [[nodiscard]] LoadedArea make_unloaded_area(const NavigationGraph& graph, const SubAreas& areas,
+                                              std::size_t area) const;
   void load(LoadedArea& area, std::size_t max_views) const;
   [[nodiscard]] const VisualMemory* find_part(ViewId view) const;
   [[nodiscard]] const VisualMemory& part_of(ViewId view) const;
 
   const ViewSource* source_;
   int links_;
-  LoadedArea here_;
-  LoadedArea ahead_;
+  LoadedArea current_;
+  LoadedArea prefetched_;
   std::uint64_t bytes_read_ = 0;
 };
 

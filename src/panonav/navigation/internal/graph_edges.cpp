@@ -20,7 +20,7 @@ void read_edge_batch(const ViewSource& source, std::span<const Link> links,
   for (const Link& link : links) ids.insert({link.a, link.b});
   const VisualMemory memory = source.load(std::vector<ViewId>(ids.begin(), ids.end()));
   constexpr std::size_t links_per_chunk = 64;
-  executor.for_chunks(
+  executor.for_each_chunk(
       links.size(), links_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
         for (std::size_t i = begin; i < end; ++i) {
           edges[i] = {links[i].a, links[i].b, 0.0, std::nullopt};

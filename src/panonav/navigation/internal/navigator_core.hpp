@@ -24,7 +24,7 @@ struct MemoryScales {
   float full_scale = 1.0F;
   int components = 0;
   int coarse_components = 0;            ///< 0: all
-  double typical_length = 1.0;          ///< median length of an edge
+  double median_edge_length = 1.0;      ///< median length of an edge
   std::vector<std::uint8_t> is_narrow;  ///< by node: not 0 near a narrow gate
 
   /// Largest difference between a view and a reference of the same place.
@@ -164,9 +164,9 @@ struct Navigator::Core {
   [[nodiscard]] PlaceCandidates find_candidates(const QueryView& view);
   void locate(Step& step);
   void search_place(Step& step);
-  void update_known_place(Step& step);
+  void update_place_doubt(Step& step);
   [[nodiscard]] bool is_localised_on_route() const;
-  [[nodiscard]] double place_probability_of(const Step& step) const;
+  [[nodiscard]] double compute_place_probability(const Step& step) const;
   void update_probability(Step& step);
   void choose_place(const PlaceCandidates& candidates, Step& step);
   void relocalise(Step& step);

@@ -16,7 +16,7 @@ namespace {
 constexpr int max_search_rounds = 2;
 /// Number of other views compared for the evidence of a place; enough to include the tenth best
 /// match.
-constexpr int compared_views = 15;
+constexpr int compared_view_count = 15;
 
 }  // namespace
 
@@ -130,7 +130,7 @@ void Navigator::Core::locate(Step& step) {
   } else {
     relocalise(step);
   }
-  update_known_place(step);
+  update_place_doubt(step);
 }
 
 // Searches around the last place; uses all components if the first ones are inconclusive.
@@ -147,7 +147,7 @@ void Navigator::Core::search_place(Step& step) {
 
 // Counts successive steps at which the place does not match. Searches the whole memory every
 // `min_agreeing_steps` of them; after `lost_patience` of them the robot is lost.
-void Navigator::Core::update_known_place(Step& step) {
+void Navigator::Core::update_place_doubt(Step& step) {
   const auto matches = [&] { return step.decision.difference <= scales.max_difference(step.view); };
   if (plan.committed) {
     const bool is_beyond = matches() && guide().path_length < plan.committed->guide.path_length;
@@ -171,16 +171,16 @@ void Navigator::Core::update_known_place(Step& step) {
   }
 }
 
-double Navigator::Core::place_probability_of(const Step& step) const {
+double Navigator::Core::compute_place_probability(const Step& step) const {
   return place_probability(criterion.evidence_for_first(
       step.view.packed,
-      views.most_similar_signatures(graph().view(*place.node), step.view, compared_views)));
+      views.most_similar_signatures(graph().view(*place.node), step.view, compared_view_count)));
 }
 
 // Updates the probability of the place, because a matching reference must also match better than by
 // chance: in another building, a robot would find matching views and drive endlessly.
 void Navigator::Core::update_probability(Step& step) {
-  step.decision.probability = place_probability_of(step);
+  step.decision.probability = compute_place_probability(step);
   int& improbable_steps = place.doubt.improbable_steps;
   // Between distant references, and with an obstacle in view, no place is probable. These steps are
   // not counted; an obstructed run ends after all paths were tried.
@@ -194,7 +194,7 @@ void Navigator::Core::update_probability(Step& step) {
   if (state == NavigationDecision::State::moving && improbable_steps > 0 && !has_relocalised &&
       improbable_steps % options.min_agreeing_steps == 0) {
     relocalise(step);
-    step.decision.probability = place_probability_of(step);
+    step.decision.probability = compute_place_probability(step);
   }
   if (step.decision.probability >= 0.5) {
     improbable_steps = 0;
@@ -210,7 +210,7 @@ void Navigator::Core::prefetch_next_area() {
   const std::size_t here = *views.area();
   std::size_t node = *place.node;
   while (areas.area_of[node] == here) {
-    const std::size_t next = plan.field[areas.place_of[node]].next;
+    const std::size_t next = plan.field[areas.index_in_area[node]].next;
     if (next == node) return;  // the goal
     node = next;
   }

@@ -19,7 +19,7 @@ namespace {
 constexpr std::array<double, 5> detours_rad{0.0, 0.7, -0.7, 1.3, -1.3};
 /// Distance in edges from an obstacle within which edges may cross it: its width (two typical
 /// edges) and one more.
-constexpr int obstacle_links = 3;
+constexpr int max_obstacle_links = 3;
 /// Number of last steps whose median is the typical reduction of path length by a step.
 constexpr std::size_t max_path_reductions = 5;
 /// Angle between successive search directions; multiples of the golden angle cover the circle
@@ -48,8 +48,8 @@ void Navigator::Core::block_edge(std::size_t edge, Step& step) {
     const double half = 0.5 * std::hypot(motion->x_m, motion->y_m);
     const auto crossed = find_crossed_edges(graph(),
                                             {tried.node, std::atan2(motion->y_m, motion->x_m), half,
-                                             std::max(half, scales.typical_length)},
-                                            obstacle_links);
+                                             std::max(half, scales.median_edge_length)},
+                                            max_obstacle_links);
     blocked.insert(blocked.end(), crossed.begin(), crossed.end());
   }
   // If an edge blocked in an earlier attempt fails again, blocks all edges of earlier attempts
@@ -73,7 +73,7 @@ void Navigator::Core::unblock_edges_or_end(Step& step, NavigationDecision::State
     return;
   }
   homing.reset();
-  if (planner.blocked_edges() == 0) return;
+  if (planner.blocked_edge_count() == 0) return;
   for (std::size_t edge = 0; edge < graph().edges().size(); ++edge) {
     if (planner.is_blocked(edge)) progress.suspect_edges.insert(edge);
   }
@@ -194,7 +194,7 @@ void Navigator::Core::update_progress(Step& step) {
 double Navigator::Core::relative_length(const Guide& ahead) const {
   if (!ahead.is_reachable()) return 0.0;
   const NavigationGraph::Edge& edge = graph().edges()[ahead.edge];
-  return edge.a_from_b ? edge.length / scales.typical_length : 0.0;
+  return edge.a_from_b ? edge.length / scales.median_edge_length : 0.0;
 }
 
 // Returns `edge_patience`, multiplied by the relative length on a long edge, along which there are

@@ -57,7 +57,8 @@ PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& gr
     const std::size_t first = i * half / std::min(max_pairs, half);
     strange.emplace_back(graph.view(first), graph.view(first + half));
   }
-  if (!strange.empty()) scale.stranger_difference = median_difference(source, strange, components);
+  if (!strange.empty())
+    scale.random_pair_difference = median_difference(source, strange, components);
   return scale;
 }
 

@@ -14,12 +14,12 @@ namespace {
 
 /// Largest ratio of the route's length to the straight line between two views; a right-angled
 /// corner has 1.41.
-constexpr double max_winding = 1.5;
+constexpr double max_detour_ratio = 1.5;
 
 // Finds how far the path follows the route from one position in one direction: 1 as recorded, -1
 // backwards.
-std::optional<RouteSection> follow_path(const KnownRoute& route, double start_m, double direction,
-                                        std::span<const ViewId> path) {
+std::optional<RouteSection> find_followed_section(const KnownRoute& route, double start_m,
+                                                  double direction, std::span<const ViewId> path) {
   const auto poses = route.tracker.lines().poses();
   std::optional<RouteSection> found;
   double at_m = start_m;
@@ -30,7 +30,7 @@ std::optional<RouteSection> follow_path(const KnownRoute& route, double start_m,
       const double ahead_m = direction * (along_m - at_m);
       if (ahead_m < 0.0 || (next_m && ahead_m >= direction * (*next_m - at_m))) continue;
       const double straight_m = distance(here, point_on_route(poses, along_m));
-      if (ahead_m <= max_winding * straight_m) next_m = along_m;
+      if (ahead_m <= max_detour_ratio * straight_m) next_m = along_m;
     }
     if (!next_m) continue;
     at_m = *next_m;
@@ -50,7 +50,7 @@ std::optional<RouteSection> find_section(const KnownRoute& route, std::span<cons
   std::optional<RouteSection> best;
   for (const double start_m : starts_m) {
     for (const double direction : {1.0, -1.0}) {
-      const auto found = follow_path(route, start_m, direction, path);
+      const auto found = find_followed_section(route, start_m, direction, path);
       if (!found) continue;
       const bool is_better = !best || found->last > best->last ||
                              (found->last == best->last && found->length_m() < best->length_m());
@@ -67,7 +67,7 @@ bool RoutePilot::begin_leg(std::span<const ViewId> path, std::span<const float> 
   std::optional<RouteSection> planned;
   std::size_t chosen = 0;
   for (std::size_t i = 0; i < routes_.size(); ++i) {
-    if (abandoned_.contains(i)) continue;
+    if (abandoned_routes_.contains(i)) continue;
     const auto found = find_section(routes_[i], routes_[i].along_m(path.front()), path);
     if (!found || found->length_m() < min_length_m) continue;
     if (planned && found->last <= planned->last) continue;
@@ -138,7 +138,7 @@ void RoutePilot::update_target() {
 }
 
 void RoutePilot::abandon_leg() {
-  if (leg_) abandoned_.insert(leg_->route);
+  if (leg_) abandoned_routes_.insert(leg_->route);
   end_leg();
 }
 

@@ -69,7 +69,7 @@ class RoutePilot {
   void end_leg() noexcept { leg_.reset(); }
   /// Ends the leg and excludes its route until `allow_all_routes`.
   void abandon_leg();
-  void allow_all_routes() noexcept { abandoned_.clear(); }
+  void allow_all_routes() noexcept { abandoned_routes_.clear(); }
 
  private:
   struct Leg {
@@ -84,7 +84,7 @@ class RoutePilot {
   void update_target();
 
   std::span<const KnownRoute> routes_;
-  std::set<std::size_t> abandoned_;
+  std::set<std::size_t> abandoned_routes_;
   std::optional<Leg> leg_;
 };
 

@@ -29,7 +29,7 @@ std::optional<LocalFeatures> FeatureCache::features(ViewId view) {
     is_lost_ = true;
     throw;
   }
-  if (views_.size() >= max_kept_views) views_.clear();
+  if (views_.size() >= max_cached_views) views_.clear();
   return views_.emplace(view, std::move(features)).first->second;
 }
 

@@ -10,7 +10,7 @@
 
 namespace panonav {
 
-/// Caches the local features of up to `max_kept_views` views; reads them on first use through a
+/// Caches the local features of up to `max_cached_views` views; reads them on first use through a
 /// separate file handle. Several threads may use it concurrently.
 class FeatureCache {
  public:
@@ -23,7 +23,7 @@ class FeatureCache {
   [[nodiscard]] std::optional<LocalFeatures> features(ViewId view);
 
  private:
-  static constexpr std::size_t max_kept_views = 10000;  ///< chosen: some 100 MB
+  static constexpr std::size_t max_cached_views = 10000;  ///< chosen: some 100 MB
   std::mutex mutex_;
   MemoryFile file_;
   bool is_lost_ = false;  ///< the connection of `file_` to its server was lost

@@ -12,7 +12,7 @@ namespace {
 constexpr double area_side_m = 10.0;
 // Number of views loaded before a sampled view without a position, and the same number from that
 // view on (chosen).
-constexpr std::size_t views_before = 128;
+constexpr std::size_t neighbouring_view_count = 128;
 
 PositionBounds enclosing_area_bounds(Point2 position) {
   const double x_m = std::floor(position.x_m / area_side_m) * area_side_m;
@@ -23,13 +23,13 @@ PositionBounds enclosing_area_bounds(Point2 position) {
 }  // namespace
 
 VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> views,
-                                  std::span<const ViewId> drawn, std::size_t max_views) {
+                                  std::span<const ViewId> sampled, std::size_t max_views) {
   std::vector<ViewId> sample;
   const auto add = [&](std::span<const ViewId> more) {
     sample.insert(sample.end(), more.begin(), more.end());
   };
-  const VisualMemory seeds = index.load(drawn);
-  for (const ViewId seed : drawn) {
+  const VisualMemory seeds = index.load(sampled);
+  for (const ViewId seed : sampled) {
     if (sample.size() >= max_views) break;
     if (!seeds.contains(seed)) continue;
     if (const auto& pose = seeds.info(seed).pose) {
@@ -38,8 +38,8 @@ VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> view
     } else {
       const auto at =
           static_cast<std::size_t>(std::ranges::lower_bound(views, seed) - views.begin());
-      const std::size_t first = at - std::min(at, views_before);
-      add(views.subspan(first, std::min(2 * views_before, views.size() - first)));
+      const std::size_t first = at - std::min(at, neighbouring_view_count);
+      add(views.subspan(first, std::min(2 * neighbouring_view_count, views.size() - first)));
     }
     std::ranges::sort(sample);
     sample.erase(std::unique(sample.begin(), sample.end()), sample.end());

@@ -12,7 +12,7 @@ namespace panonav {
 /// a sampled view has no position. `views`: all of the memory, ascending; `sampled`: in the
 /// order of sampling.
 [[nodiscard]] VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> views,
-                                                std::span<const ViewId> drawn,
+                                                std::span<const ViewId> sampled,
                                                 std::size_t max_views);
 
 }  // namespace panonav

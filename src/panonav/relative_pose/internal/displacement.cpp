@@ -227,8 +227,8 @@ DisplacementStart find_displacement_start(const HomingView& home, const HomingVi
   }
   const double ahead_rad = std::atan2(static_cast<double>(ahead_b), static_cast<double>(ahead_a));
   for (std::size_t band = 0; band < bands; ++band) {
-    turn_row(part(2).subspan(band * stride, stride), part(3).subspan(band * stride, stride),
-             ahead_rad);
+    rotate_row(part(2).subspan(band * stride, stride), part(3).subspan(band * stride, stride),
+               ahead_rad);
   }
   const BestDisplacement best =
       find_displacement(part(0), part(1), part(2), part(3), static_cast<int>(bands), frequencies,

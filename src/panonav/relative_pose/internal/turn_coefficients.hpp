@@ -7,7 +7,7 @@ namespace panonav {
 
 /// Calls visit(k, cos(k turn), sin(k turn)) for k = 0 .. frequencies - 1.
 template <class Visit>
-void for_frequencies(int frequencies, double turn_rad, const Visit& visit) {
+void for_each_frequency(int frequencies, double turn_rad, const Visit& visit) {
   const double step_cosine = std::cos(turn_rad);
   const double step_sine = std::sin(turn_rad);
   double cosine = 1.0;
@@ -22,8 +22,8 @@ void for_frequencies(int frequencies, double turn_rad, const Visit& visit) {
 
 /// Rotates the coefficients of one row, frequencies 0 .. a.size() - 1, as a turn of the robot by
 /// `turn_rad` does [S06 eq. 6].
-inline void turn_row(std::span<float> a, std::span<float> b, double turn_rad) {
-  for_frequencies(static_cast<int>(a.size()), turn_rad, [&](int k, float cosine, float sine) {
+inline void rotate_row(std::span<float> a, std::span<float> b, double turn_rad) {
+  for_each_frequency(static_cast<int>(a.size()), turn_rad, [&](int k, float cosine, float sine) {
     const float turned = a[k] * cosine + b[k] * sine;
     b[k] = b[k] * cosine - a[k] * sine;
     a[k] = turned;

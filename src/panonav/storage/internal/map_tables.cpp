@@ -131,7 +131,7 @@ bool erase_map(MemoryTables& tables, std::string_view name) {
   return there;
 }
 
-bool forget_views(TopologicalMap& map, const std::set<ViewId>& forgotten) {
+bool remove_views_from_map(TopologicalMap& map, const std::set<ViewId>& forgotten) {
   const auto nodes = std::erase_if(
       map.nodes, [&](const TopologicalMap::Node& node) { return forgotten.contains(node.view); });
   if (nodes == 0) return false;
@@ -146,7 +146,7 @@ void erase_views_from_maps(MemoryTables& tables, std::span<const ViewId> views) 
   const std::set<ViewId> forgotten(views.begin(), views.end());
   for (const std::string& name : tables.map_names()) {
     auto map = read_map(tables, name);
-    if (map && forget_views(*map, forgotten)) write_map(tables, name, *map);
+    if (map && remove_views_from_map(*map, forgotten)) write_map(tables, name, *map);
   }
 }
 

@@ -23,7 +23,7 @@ void write_map(MemoryTables& tables, std::string_view name, const TopologicalMap
 bool erase_map(MemoryTables& tables, std::string_view name);
 /// Removes views and their edges from a map and renumbers its components. Returns true if the map
 /// had one of the views.
-bool forget_views(TopologicalMap& map, const std::set<ViewId>& forgotten);
+bool remove_views_from_map(TopologicalMap& map, const std::set<ViewId>& forgotten);
 /// Removes these views, as nodes with their edges, from all maps.
 void erase_views_from_maps(MemoryTables& tables, std::span<const ViewId> views);
 /// Checks every map: passes each part, which may throw, to `check`, which must collect the errors.

@@ -95,9 +95,9 @@ Database open_memory_database(const fs::path& path, Access access) {
     return size_of(with_suffix(file, "-shm")) >= index_region_bytes;
   };
   // True if nobody has the file open for writing and no changes are left in the log.
-  const auto at_rest = [&] { return size_of(log) == 0 && !is_log_in_use(); };
+  const auto is_at_rest = [&] { return size_of(log) == 0 && !is_log_in_use(); };
   // A reader without write permission cannot create the log that SQLite needs.
-  if (!may_write && at_rest()) {
+  if (!may_write && is_at_rest()) {
     return {file, DatabaseMode::immutable};
   }
   require_own_log(file);
@@ -112,7 +112,7 @@ Database open_memory_database(const fs::path& path, Access access) {
   } catch (const FileError&) {
     // There is no room for a log on a full disk, or the file system cannot share one. For a damaged
     // file the next attempt fails as well.
-    if (at_rest()) return {file, DatabaseMode::immutable};
+    if (is_at_rest()) return {file, DatabaseMode::immutable};
     if (may_write && !is_log_in_use()) return read_with_private_index(file);
     if (may_write || size_of(log) == 0) throw;
     throw FileError(name,

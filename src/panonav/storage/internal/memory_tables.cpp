@@ -55,7 +55,7 @@ void MemoryTables::fail_damaged(std::string_view what) const {
   throw DamageError(message_path().string(), "is damaged: " + std::string(what));
 }
 
-void MemoryTables::fail_incomplete(const Link& link) const {
+void MemoryTables::fail_link_without_view(const Link& link) const {
   fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
                std::to_string(link.b.value) + ", of which one is missing");
 }
@@ -68,16 +68,16 @@ std::string MemoryTables::shorten_message(std::string_view message) const {
   return what;
 }
 
-void MemoryTables::leave_out(std::optional<ViewId> view, std::string_view what) {
+void MemoryTables::record_skipped_row(std::optional<ViewId> view, std::string_view what) {
   constexpr std::size_t max_reported = 10;  // chosen: one screen, however many rows are bad
   MemoryFile::Fault fault{view, shorten_message(what)};
   if (std::ranges::find(left_out_, fault) != left_out_.end()) return;
   if (view) left_out_views_.insert(*view);
   if (left_out_.size() < max_reported) {
-    report_left_out(message_path(), fault);
+    report_skipped_row(message_path(), fault);
   } else if (left_out_.size() == max_reported) {
-    report_left_out(message_path(),
-                    {std::nullopt, "there are more bad rows (`panonav verify` lists them)"});
+    report_skipped_row(message_path(),
+                       {std::nullopt, "there are more bad rows (`panonav verify` lists them)"});
   }
   if (left_out_.size() < max_left_out) left_out_.push_back(std::move(fault));
 }

@@ -102,7 +102,7 @@ class MemoryTables {
   /// Throws DamageError.
   [[noreturn]] void fail_damaged(std::string_view what) const;
   /// Throws DamageError on a link one of whose views is missing.
-  [[noreturn]] void fail_incomplete(const Link& link) const;
+  [[noreturn]] void fail_link_without_view(const Link& link) const;
   /// True if others than the user of this program may write rows, as on a server. A bad row is then
   /// left out and reported, so that it does not block access to the other rows; in a file it is an
   /// error.
@@ -116,14 +116,14 @@ class MemoryTables {
       return true;
     } catch (const DamageError& error) {
       if (!tolerates_bad_rows()) throw;
-      leave_out(view, error.what());
+      record_skipped_row(view, error.what());
       return false;
     }
   }
-  /// Records that a row was left out and reports it to the handler of `set_left_out_handler`,
+  /// Records that a row was left out and reports it to the handler of `set_skipped_row_handler`,
   /// unless that was done before. `view` is the view that is missing because of that; nullopt for
   /// other rows.
-  void leave_out(std::optional<ViewId> view, std::string_view what);
+  void record_skipped_row(std::optional<ViewId> view, std::string_view what);
   /// Largest number of recorded faults, chosen so that recording one more stays cheap.
   static constexpr std::size_t max_left_out = 1000;
   /// Returns the rows left out since the memory was opened, at most `max_left_out`.
@@ -213,11 +213,11 @@ class MemoryTables {
                            std::span<const std::uint8_t> lines, std::int64_t checksum) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> block(std::string_view route,
                                                          std::int64_t number) = 0;
-  [[nodiscard]] virtual std::int64_t blocks(std::string_view route) = 0;
+  [[nodiscard]] virtual std::int64_t block_count(std::string_view route) = 0;
   /// Returns the packed bytes of all blocks of a route.
   [[nodiscard]] virtual std::int64_t route_bytes(std::string_view route) = 0;
   /// Returns the names of routes that have blocks.
-  [[nodiscard]] virtual std::vector<std::string> routes_with_blocks() = 0;
+  [[nodiscard]] virtual std::vector<std::string> list_routes_with_blocks() = 0;
 
   /// Runs `changes` within a writing transaction, and keeps the rows that they add, replace or
   /// remove, so that `undo` can restore them.

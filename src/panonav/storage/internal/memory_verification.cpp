@@ -91,7 +91,8 @@ class MemoryVerification {
       if (ends <= std::exchange(before, ends)) tables_.fail_damaged("links are out of order");
       check([&] {
         const Link link = tables_.checked(row);
-        if (!views_.contains(link.a) || !views_.contains(link.b)) tables_.fail_incomplete(link);
+        if (!views_.contains(link.a) || !views_.contains(link.b))
+          tables_.fail_link_without_view(link);
       });
     });
   }

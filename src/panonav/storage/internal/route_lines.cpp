@@ -26,15 +26,15 @@ double& to_real(Pose2& pose, std::size_t i) {
 // Returns the columns by which the previous line is shifted to the heading of this one.
 std::size_t rotation_in_columns(const Pose2& before, const Pose2& now, std::size_t columns) {
   const auto size = static_cast<long long>(columns);
-  const auto turn = std::llround((now.heading_rad - before.heading_rad) *
-                                 static_cast<double>(columns) / (2.0 * std::numbers::pi));
-  return static_cast<std::size_t>((turn % size + size) % size);
+  const auto rotation = std::llround((now.heading_rad - before.heading_rad) *
+                                     static_cast<double>(columns) / (2.0 * std::numbers::pi));
+  return static_cast<std::size_t>((rotation % size + size) % size);
 }
 
 // Predicts a column as the mean of its left neighbour and of the previous line at that place.
-int predict_pixel(std::span<const std::uint8_t> before, std::size_t turn,
+int predict_pixel(std::span<const std::uint8_t> before, std::size_t rotation,
                   std::span<const std::uint8_t> line, std::size_t column) {
-  const int above = before.empty() ? 0 : before[(column + turn) % before.size()];
+  const int above = before.empty() ? 0 : before[(column + rotation) % before.size()];
   return (above + (column == 0 ? above : line[column - 1])) / 2;
 }
 
@@ -73,21 +73,21 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
       }
     }
     std::span<const std::uint8_t> before;
-    std::size_t turn = 0;
+    std::size_t rotation = 0;
     if (n > 0) {
       before = route.line(first + n - 1);
-      turn = rotation_in_columns(route.poses()[first + n - 1], pose, columns);
+      rotation = rotation_in_columns(route.poses()[first + n - 1], pose, columns);
     }
-    plain[8 * reals_of_pose * count + n] = static_cast<std::uint8_t>(turn & 255U);
-    plain[(8 * reals_of_pose + 1) * count + n] = static_cast<std::uint8_t>(turn >> 8U);
+    plain[8 * reals_of_pose * count + n] = static_cast<std::uint8_t>(rotation & 255U);
+    plain[(8 * reals_of_pose + 1) * count + n] = static_cast<std::uint8_t>(rotation >> 8U);
     const auto line = route.line(first + n);
     std::uint8_t* const to = plain.data() + count * head_bytes + n * columns;
     for (std::size_t c = 0; c < columns; ++c) {
-      to[c] = static_cast<std::uint8_t>((line[c] - predict_pixel(before, turn, line, c)) & 255);
+      to[c] = static_cast<std::uint8_t>((line[c] - predict_pixel(before, rotation, line, c)) & 255);
     }
   }
   std::vector<std::uint8_t> packed = compress_bytes(plain, Z_DEFAULT_STRATEGY);
-  if (plain.size() > max_unpacked_for_each_byte * packed.size()) {
+  if (plain.size() > max_compression_ratio * packed.size()) {
     packed = compress_bytes(plain, Z_HUFFMAN_ONLY);  // at least one bit a byte
   }
   return packed;
@@ -96,7 +96,7 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
 bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,
                         RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
-  if (count * (head_bytes + columns) > max_unpacked_for_each_byte * bytes.size()) return false;
+  if (count * (head_bytes + columns) > max_compression_ratio * bytes.size()) return false;
   std::vector<std::uint8_t> plain(count * (head_bytes + columns));
   auto size = static_cast<uLongf>(plain.size());
   auto read = static_cast<uLong>(bytes.size());
@@ -115,11 +115,12 @@ bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,
       }
       to_real(pose, i) = std::bit_cast<double>(word);
     }
-    const std::size_t turn = plain[8 * reals_of_pose * count + n] +
-                             256U * std::size_t{plain[(8 * reals_of_pose + 1) * count + n]};
+    const std::size_t rotation = plain[8 * reals_of_pose * count + n] +
+                                 256U * std::size_t{plain[(8 * reals_of_pose + 1) * count + n]};
     const std::uint8_t* const from = plain.data() + count * head_bytes + n * columns;
     for (std::size_t c = 0; c < columns; ++c) {
-      line[c] = static_cast<std::uint8_t>((predict_pixel(before, turn, line, c) + from[c]) & 255);
+      line[c] =
+          static_cast<std::uint8_t>((predict_pixel(before, rotation, line, c) + from[c]) & 255);
     }
     try {
       if (!route.append(pose, std::span<const std::uint8_t>(line))) return false;

@@ -17,7 +17,7 @@ namespace panonav {
 
 /// Largest number of bytes that one packed byte can give, so that the size of a file limits the
 /// memory it needs. Images of real places stay far below.
-inline constexpr std::size_t max_unpacked_for_each_byte = 100;
+inline constexpr std::size_t max_compression_ratio = 100;
 
 /// Unpacks `count` lines of `pack_route_lines` and appends them to the route. Returns false if the
 /// bytes are not valid; the route may then have some of the lines.

@@ -15,7 +15,7 @@ namespace {
 
 // Lines of a full block. A larger number has less overhead of SQLite for each block; a smaller one
 // writes less with each append, which replaces the last block.
-constexpr std::int64_t lines_of_block = 256;
+constexpr std::int64_t lines_per_block = 256;
 
 std::int64_t compute_row_checksum(std::string_view name, const RouteRow& row) {
   RecordBytes record;
@@ -26,12 +26,12 @@ std::int64_t compute_row_checksum(std::string_view name, const RouteRow& row) {
 }
 
 std::int64_t count_blocks(const RouteRow& row) {
-  return (row.lines - 1) / lines_of_block + 1;
+  return (row.lines - 1) / lines_per_block + 1;
 }
 
 // Returns the number of lines of block `number`; all blocks but the last are full.
 std::int64_t count_lines(const RouteRow& row, std::int64_t number) {
-  return std::min(lines_of_block, row.lines - number * lines_of_block);
+  return std::min(lines_per_block, row.lines - number * lines_per_block);
 }
 
 std::int64_t compute_block_checksum(std::string_view name, std::int64_t number,
@@ -120,7 +120,7 @@ std::size_t append_to_route(MemoryTables& tables, std::string_view name,
   const std::size_t appended = open.size() - known;
   if (appended == 0) return 0;
 
-  constexpr auto full = static_cast<std::size_t>(lines_of_block);
+  constexpr auto full = static_cast<std::size_t>(lines_per_block);
   for (std::size_t first = known == full ? full : 0; first < open.size(); first += full) {
     const auto bytes = pack_route_lines(open, first, std::min(full, open.size() - first));
     const std::int64_t block = number + static_cast<std::int64_t>(first / full);
@@ -133,18 +133,18 @@ std::size_t append_to_route(MemoryTables& tables, std::string_view name,
 
 std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view name) {
   const auto row = read_row(tables, name);
-  const std::int64_t blocks = tables.blocks(name);
+  const std::int64_t block_count = tables.block_count(name);
   if (!row) {
-    if (blocks > 0) fail_route(tables, name, "blocks without the route");
+    if (block_count > 0) fail_route(tables, name, "blocks without the route");
     return std::nullopt;
   }
-  if (blocks != count_blocks(*row)) {
+  if (block_count != count_blocks(*row)) {
     fail_route(tables, name,
-               "it holds " + std::to_string(blocks) + " of " + std::to_string(count_blocks(*row)) +
-                   " blocks");
+               "it holds " + std::to_string(block_count) + " of " +
+                   std::to_string(count_blocks(*row)) + " blocks");
   }
   RoutePanorama route(static_cast<int>(row->columns));
-  for (std::int64_t number = 0; number < blocks; ++number) {
+  for (std::int64_t number = 0; number < block_count; ++number) {
     read_block(tables, name, *row, number, route);
   }
   return route;
@@ -174,7 +174,7 @@ void verify_routes(MemoryTables& tables,
     names.insert(found.begin(), found.end());
   };
   check([&] { add(tables.route_names()); });
-  check([&] { add(tables.routes_with_blocks()); });
+  check([&] { add(tables.list_routes_with_blocks()); });
   for (const auto& name : names) {
     check([&] { static_cast<void>(read_route(tables, name)); });
   }

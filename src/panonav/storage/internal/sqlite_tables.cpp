@@ -35,7 +35,7 @@ std::vector<std::uint8_t> copy_bytes(std::span<const std::uint8_t> bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-const char* name_of(ViewAttachment table) {
+const char* attachment_table_name(ViewAttachment table) {
   return table == ViewAttachment::thumbnails ? "thumbnails" : "features";
 }
 
@@ -135,7 +135,7 @@ void SqliteTables::insert_attachment(ViewAttachment table, ViewId view,
                               ? "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"
                               : "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)";
   if (run_statement(database_, sql, view, bytes, attachment_checksum(view, bytes)) != 0) {
-    fail_damaged("an entry of " + std::string(name_of(table)) + " without a view");
+    fail_damaged("an entry of " + std::string(attachment_table_name(table)) + " without a view");
   }
 }
 
@@ -264,18 +264,20 @@ std::vector<PosedView> SqliteTables::views_within(const PositionBounds& bounds) 
 }
 
 bool SqliteTables::has_attachments(ViewAttachment table) {
-  const std::string sql = "SELECT EXISTS (SELECT 1 FROM " + std::string(name_of(table)) + ")";
+  const std::string sql =
+      "SELECT EXISTS (SELECT 1 FROM " + std::string(attachment_table_name(table)) + ")";
   return database_.integer(sql.c_str()) != 0;
 }
 
 std::vector<ViewId> SqliteTables::views_with_attachment(ViewAttachment table) {
   std::vector<ViewId> views;
-  const std::string sql = "SELECT view FROM " + std::string(name_of(table)) + " ORDER BY view";
+  const std::string sql =
+      "SELECT view FROM " + std::string(attachment_table_name(table)) + " ORDER BY view";
   Statement rows(database_, sql.c_str());
   while (rows.step()) {
     const ViewId view = read_view_id(rows, 0);
     if (!views.empty() && view <= views.back()) {
-      fail_damaged(std::string(name_of(table)) + " are out of order");
+      fail_damaged(std::string(attachment_table_name(table)) + " are out of order");
     }
     views.push_back(view);
   }
@@ -380,7 +382,7 @@ std::optional<StoredBytes> SqliteTables::block(std::string_view route, std::int6
   return StoredBytes{copy_bytes(rows.blob(0)), rows.integer(1)};
 }
 
-std::int64_t SqliteTables::blocks(std::string_view route) {
+std::int64_t SqliteTables::block_count(std::string_view route) {
   Statement count(database_, "SELECT count(*) FROM route_blocks WHERE route = ?", route);
   return count.step() ? count.integer(0) : 0;
 }
@@ -391,7 +393,7 @@ std::int64_t SqliteTables::route_bytes(std::string_view route) {
   return sum.step() ? sum.integer(0) : 0;
 }
 
-std::vector<std::string> SqliteTables::routes_with_blocks() {
+std::vector<std::string> SqliteTables::list_routes_with_blocks() {
   return query_texts("SELECT DISTINCT route FROM route_blocks");
 }
 

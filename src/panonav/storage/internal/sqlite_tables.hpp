@@ -61,9 +61,9 @@ class SqliteTables final : public MemoryTables {
                    std::int64_t checksum) override;
   [[nodiscard]] std::optional<StoredBytes> block(std::string_view route,
                                                  std::int64_t number) override;
-  [[nodiscard]] std::int64_t blocks(std::string_view route) override;
+  [[nodiscard]] std::int64_t block_count(std::string_view route) override;
   [[nodiscard]] std::int64_t route_bytes(std::string_view route) override;
-  [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
+  [[nodiscard]] std::vector<std::string> list_routes_with_blocks() override;
 
   void run_with_undo(const std::function<void()>& changes, const std::string& what) override;
   [[nodiscard]] std::vector<MemoryFile::KeptChange> history() override;

@@ -48,7 +48,7 @@ constexpr const char* select_history =
     "SELECT id, what, stamp_s, changes, checksum FROM history ORDER BY id DESC";
 
 // Returns the kept rows of a change; empty also if only its description is left.
-std::span<const std::uint8_t> changes_in(const Statement& row) {
+std::span<const std::uint8_t> read_changes(const Statement& row) {
   if (row.is_null(3)) return {};
   return row.blob(3);
 }
@@ -57,7 +57,7 @@ std::span<const std::uint8_t> changes_in(const Statement& row) {
 // first, so that SQLite's own reader gets only valid ones.
 std::optional<UndoneRows> step_checked(Database& database, Statement& row) {
   if (!row.step()) return std::nullopt;
-  const auto changes = changes_in(row);
+  const auto changes = read_changes(row);
   if (row.integer(4) != undo_checksum(row.text(1), row.real(2), changes)) {
     database.fail_damaged("a change that can be undone does not match its checksum");
   }
@@ -68,21 +68,21 @@ std::optional<UndoneRows> step_checked(Database& database, Statement& row) {
   }
 }
 
-double now_s() {
+double unix_time_s() {
   const auto since = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration<double>(since).count();
 }
 
 // Newer settings stay, because settings are notes about the views, which are checked when they are
 // used.
-int on_conflict(void* in_the_way, int, sqlite3_changeset_iter* change) {
+int on_conflict(void* conflicting_table, int, sqlite3_changeset_iter* change) {
   const char* table = nullptr;
   int columns = 0;
   int operation = 0;
   int indirect = 0;
   sqlite3changeset_op(change, &table, &columns, &operation, &indirect);
   if (std::string_view(table) == "settings") return SQLITE_CHANGESET_OMIT;
-  *static_cast<std::string*>(in_the_way) = table;
+  *static_cast<std::string*>(conflicting_table) = table;
   return SQLITE_CHANGESET_ABORT;
 }
 
@@ -105,7 +105,7 @@ void SqliteTables::run_with_undo(const std::function<void()>& changes, const std
   made.data.reset(data);
   session.reset();
   require_undo_bytes(path_, made.size);
-  const double stamp_s = now_s();
+  const double stamp_s = unix_time_s();
   if (run_statement(database_,
                     "INSERT INTO history(what, stamp_s, changes, checksum) VALUES(?, ?, ?, ?)",
                     what, stamp_s, made.bytes(), undo_checksum(what, stamp_s, made.bytes())) != 0) {
@@ -151,7 +151,7 @@ std::vector<MemoryFile::KeptChange> SqliteTables::history() {
   Statement row(database_, select_history);
   while (step_checked(database_, row)) {
     changes.push_back(
-        {std::string(row.text(1)), row.real(2), changes_in(row).size(), !row.is_null(3)});
+        {std::string(row.text(1)), row.real(2), read_changes(row).size(), !row.is_null(3)});
   }
   return changes;
 }
@@ -184,14 +184,14 @@ void SqliteTables::undo() {
     int code = sqlite3changeset_invert(static_cast<int>(changes.size()), changes.data(),
                                        &inverse.size, &data);
     inverse.data.reset(data);
-    std::string in_the_way;
+    std::string conflicting_table;
     if (code == SQLITE_OK) {
       code = sqlite3changeset_apply(database_.handle(), inverse.size, data, nullptr, on_conflict,
-                                    &in_the_way);
+                                    &conflicting_table);
     }
     if (code == SQLITE_ABORT) {
       throw FileError(path_.string(), "cannot undo \"" + std::string(row.text(1)) +
-                                          "\": the table " + in_the_way +
+                                          "\": the table " + conflicting_table +
                                           " has changed since where it was changed then");
     }
     if (code != SQLITE_OK) database_.fail(code);

@@ -108,11 +108,11 @@ std::map<ViewId, std::int64_t> read_view_checksums(SqliteTables& file) {
   return checksums;
 }
 
-std::int64_t random_number(SqliteTables& file) {
+std::int64_t make_random_number(SqliteTables& file) {
   return file.database().integer("SELECT random() & 9223372036854775807");
 }
 
-std::string random_identity(SqliteTables& file) {
+std::string make_random_identity(SqliteTables& file) {
   Statement row(file.database(), "SELECT lower(hex(randomblob(16)))");
   return row.step() ? std::string(row.text(0)) : "";
 }

@@ -47,9 +47,9 @@ void erase_synchronised_link(SqliteTables& file, ViewId a, ViewId b);
 /// Returns the position of each view that has one, by ascending id.
 [[nodiscard]] std::map<ViewId, std::pair<double, double>> read_positions(SqliteTables& file);
 /// Returns a random number of 63 bits.
-[[nodiscard]] std::int64_t random_number(SqliteTables& file);
+[[nodiscard]] std::int64_t make_random_number(SqliteTables& file);
 /// Returns 128 random bits in hexadecimal.
-[[nodiscard]] std::string random_identity(SqliteTables& file);
+[[nodiscard]] std::string make_random_identity(SqliteTables& file);
 
 /// Identities of a file and of the memory on a server with which it is synchronised.
 struct SynchronisedState {

@@ -28,7 +28,7 @@ struct Column {
 constexpr Column integer{FieldType::integer}, text{FieldType::text}, blob{FieldType::blob};
 constexpr Column integer_key{FieldType::integer, true}, text_key{FieldType::text, true};
 constexpr Column real_or_null{FieldType::real, false, true};
-constexpr Column any{FieldType::null};
+constexpr Column any_type{FieldType::null};
 
 struct UndoTable {
   std::string_view name;
@@ -43,7 +43,7 @@ const std::array<UndoTable, 8>& undo_tables() {
       {"thumbnails", {integer_key, blob, integer}},
       {"links", {integer_key, integer_key, integer, integer}},
       {"maps", {text_key, blob, blob, integer}},
-      {"settings", {text_key, any, integer}},
+      {"settings", {text_key, any_type, integer}},
       {"routes", {text_key, integer, integer, integer}},
       {"route_blocks", {text_key, integer_key, blob, integer}},
       {"features", {integer_key, blob, integer}},
@@ -163,7 +163,7 @@ class ChangeReader {
 
   void check_row(const std::vector<Field>& row) {
     if (!std::ranges::equal(table_->columns, row, can_hold)) fail("a row has a wrong field");
-    note(row);
+    add_affected_rows(row);
   }
 
   /// Unchanged columns are missing in both rows, except the key, which the old row has.
@@ -180,25 +180,25 @@ class ChangeReader {
         fail("a row has a wrong field");
       }
     }
-    note(old_row);
+    add_affected_rows(old_row);
   }
 
-  void note(const std::vector<Field>& row) {
-    const auto note_view = [&](const Field& field) {
+  void add_affected_rows(const std::vector<Field>& row) {
+    const auto add_affected_view = [&](const Field& field) {
       if (field.number < 1 || field.number > std::numeric_limits<std::uint32_t>::max()) {
         fail("the id of a view is " + std::to_string(field.number));
       }
       rows_.views.push_back({static_cast<std::uint32_t>(field.number)});
     };
     if (table_->name == "links") {
-      note_view(row[0]);
-      note_view(row[1]);
+      add_affected_view(row[0]);
+      add_affected_view(row[1]);
     } else if (table_->name == "maps") {
       rows_.maps.emplace(row[0].text);
     } else if (table_->name == "routes" || table_->name == "route_blocks") {
       rows_.routes.emplace(row[0].text);
     } else if (table_->name != "settings") {
-      note_view(row[0]);
+      add_affected_view(row[0]);
     }
   }
 

@@ -162,7 +162,7 @@ bool is_own_log(const fs::path& file, const fs::path& log) {
 
 void require_own_log(const fs::path& file) {
   std::error_code missing;
-  const auto beside = [&](const char* suffix) {
+  const auto with_suffix = [&](const char* suffix) {
     fs::path path = file;
     path += suffix;
     return path;
@@ -178,14 +178,14 @@ void require_own_log(const fs::path& file) {
                         "log belongs to");
   };
   // A journal belongs to another program, whose changes have no marks.
-  const fs::path journal = beside("-journal");
+  const fs::path journal = with_suffix("-journal");
   if (size(journal) > 0 && std::ifstream(journal).peek() != 0) refuse(journal);
 
-  const fs::path log = beside("-wal");
+  const fs::path log = with_suffix("-wal");
   // Repeated, because a writer may move its log into the file between the two checks.
-  constexpr int max_looks = 20;
+  constexpr int max_attempts = 20;
   constexpr std::chrono::milliseconds pause(20);
-  for (int look = 0; look < max_looks; ++look) {
+  for (int attempt = 0; attempt < max_attempts; ++attempt) {
     if (size(log) == 0 || is_own_log(file, log)) return;
     std::this_thread::sleep_for(pause);
   }

@@ -1,4 +1,4 @@
-#include "lab/baselines/turn_products.hpp"
+#include "lab/baselines/rotation_products.hpp"
 
 #include <limits>
 
@@ -8,8 +8,9 @@ namespace panonav::lab {
 
 namespace {
 
-/// Number of turns by which the products of a row are padded: the floats of the widest register.
-constexpr std::size_t padded_lanes = 16;
+/// The products of a row are padded to a multiple of this number of turns: the floats of the widest
+/// register.
+constexpr std::size_t stride_multiple = 16;
 
 template <int lanes>
 struct Lanes {
@@ -73,7 +74,7 @@ template <int lanes, int vectors>
 [[gnu::always_inline]] inline void correlate_all(const float* rows, std::size_t count,
                                                  std::size_t columns, const float* periodic,
                                                  float* products, float* largest) {
-  const std::size_t stride = turn_products_stride(columns);
+  const std::size_t stride = rotation_products_stride(columns);
   constexpr int row_count = 4;
   std::size_t r = 0;
   for (; r + row_count <= count; r += row_count) {
@@ -113,19 +114,19 @@ void correlate_by_four(const float* rows, std::size_t count, std::size_t columns
 
 }  // namespace
 
-std::size_t turn_products_stride(std::size_t columns) noexcept {
-  return (columns + padded_lanes - 1) / padded_lanes * padded_lanes;
+std::size_t rotation_products_stride(std::size_t columns) noexcept {
+  return (columns + stride_multiple - 1) / stride_multiple * stride_multiple;
 }
 
-void turn_products(std::span<const float> rows, std::size_t columns,
-                   std::span<const float> periodic, std::span<float> products,
-                   std::span<float> largest, kernels::Instructions instructions) {
+void compute_rotation_products(std::span<const float> rows, std::size_t columns,
+                               std::span<const float> periodic, std::span<float> products,
+                               std::span<float> largest, kernels::Instructions instructions) {
   const auto check = [](std::size_t size, std::size_t expected, const char* what) {
     require(size == expected, what, static_cast<double>(size),
             to_text(static_cast<double>(expected)));
   };
   const std::size_t count = largest.size();
-  const std::size_t stride = turn_products_stride(columns);
+  const std::size_t stride = rotation_products_stride(columns);
   require(columns >= 1 && columns <= 65536, "columns", static_cast<double>(columns), "1 .. 65536");
   check(rows.size(), count * columns, "values of the rows");
   check(periodic.size(), columns + stride, "values of the periodic row");

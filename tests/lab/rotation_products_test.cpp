@@ -1,4 +1,4 @@
-#include "lab/baselines/turn_products.hpp"
+#include "lab/baselines/rotation_products.hpp"
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ TEST(TurnProducts, EveryInstructionSetAgreesWithTheSumsInDoublePrecision) {
   std::size_t compared = 0;
   for (const std::size_t columns : {1U, 5U, 16U, 72U, 90U, 360U}) {
     for (const std::size_t count : {0U, 1U, 4U, 7U}) {
-      const std::size_t stride = turn_products_stride(columns);
+      const std::size_t stride = rotation_products_stride(columns);
       std::vector<float> rows(count * columns);
       for (float& v : rows) v = static_cast<float>(random.uniform(-0.5, 0.5));
       std::vector<float> periodic(columns + stride);
@@ -28,7 +28,7 @@ TEST(TurnProducts, EveryInstructionSetAgreesWithTheSumsInDoublePrecision) {
       for (const kernels::Instructions instructions : kernels::available_instructions()) {
         std::vector<float> products(count * stride, -100.0F);
         std::vector<float> largest(count, -100.0F);
-        turn_products(rows, columns, periodic, products, largest, instructions);
+        compute_rotation_products(rows, columns, periodic, products, largest, instructions);
         for (std::size_t r = 0; r < count; ++r) {
           for (std::size_t t = 0; t < stride; ++t) {
             double sum = 0.0;
@@ -57,7 +57,8 @@ TEST(TurnProducts, RefusesWrongSizes) {
   std::vector<float> products(16);
   std::vector<float> largest(1);
   const auto run = [&](std::size_t columns) {
-    turn_products(rows, columns, periodic, products, largest, kernels::Instructions::scalar);
+    compute_rotation_products(rows, columns, periodic, products, largest,
+                              kernels::Instructions::scalar);
   };
   EXPECT_NO_THROW(run(8));
   EXPECT_THROW(run(7), ContractError);
