@@ -34,7 +34,8 @@ struct ReproductionOptions {
   int columns = 512;       ///< of the views; half as many outside the main scene of [M03]
   /// [M04] figure 17 is repeated with references every 30 cm in every n-th scene; 0 skips it.
   int fine_lattice_every = 4;
-  /// [M04] figure 18: scenes of missions; their seeds begin 1000 above `seed`.
+  /// [M04] figure 18: kind of scene and grid spacing in metres for each group of missions. The
+  /// first scene has the seed `seed` + 1000.
   std::vector<MissionGrid> mission_grids{{"office", 0.3}, {"hall", 0.4}, {"garden", 0.3}};
   int mission_scenes = 4;       ///< [M04] figure 18: variants of each scene
   int variants = 3;             ///< [M03]: of light and moved objects, per scene

@@ -150,7 +150,7 @@ class LeaveOneOut {
              target);
   }
 
-  void add_known(const std::vector<Place>& places) const {
+  void add_known_rates(const std::vector<Place>& places) const {
     std::size_t known = 0;
     std::size_t placed = 0;
     std::size_t inside = 0;
@@ -240,7 +240,7 @@ void ElsewhereExperiments::reproduce_leave_one_out(
   pictures.add_near(ours,
                     name == "ciirc_b670" ? std::optional(at_least(29.0 / 31.0)) : std::nullopt);
   const std::size_t judged = result.rows.size() - 1;
-  pictures.add_known(places);
+  pictures.add_known_rates(places);
   pictures.add_cost(ours, static_cast<double>(std::filesystem::file_size(memory.file)));
 
   std::string others =

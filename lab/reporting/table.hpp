@@ -67,5 +67,5 @@ struct TargetCount {
 [[nodiscard]] std::string to_json(std::span<const ResultRow> rows);
 /// Parses the output of `to_json`; rows may lack `over` and `reason`. Throws FileError with the
 /// name `file`, the row and the field.
-[[nodiscard]] std::vector<ResultRow> from_json(std::string_view text, std::string_view file);
+[[nodiscard]] std::vector<ResultRow> rows_from_json(std::string_view text, std::string_view file);
 }  // namespace panonav::lab

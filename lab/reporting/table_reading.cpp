@@ -79,7 +79,7 @@ class RowReader {
 
 }  // namespace
 
-std::vector<ResultRow> from_json(std::string_view text, std::string_view file) {
+std::vector<ResultRow> rows_from_json(std::string_view text, std::string_view file) {
   const json list = json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (list.is_discarded()) throw FileError(file, "is no JSON, or not all of it");
   if (!list.is_array()) throw FileError(file, "is no list of rows");

@@ -21,7 +21,8 @@ inline constexpr std::array<double, 3> s06_accepted_m{0.025, 0.05, 0.1};
 /// Iterations of the published rule in homing runs: N_it + 1 = 3 [S06 figure 11].
 inline constexpr int s06_iterations = 2;
 
-/// Image difference at K = 10 below which a view is similar to home.
+/// A view is similar to home if their image difference, computed with the highest frequency K = 10
+/// [S06], is below this value.
 inline constexpr double s06_max_similar_difference = 0.1;
 
 /// A homing strategy: a sequence of rules; whenever homing stops, the next rule continues.

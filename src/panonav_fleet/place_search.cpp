@@ -343,7 +343,7 @@ struct PlaceSearch::Snapshot::Implementation {
         tables->accept_row(row.id, [&] {
           const SignatureShape shape = search->header.shape;
           CachedView view{row.info, {}};
-          unpack_signature(tables->checked(row, shape, scratch).signature, shape, view.signature);
+          unpack_signature(tables->check_row(row, shape, scratch).signature, shape, view.signature);
           cached.insert_or_assign(row.id, std::move(view));
         });
       });

@@ -139,7 +139,7 @@ struct PointStamped {
   Vector3 point;  ///< metres
 };
 
-/// A pose at a time.
+/// A pose with its time stamp and frame.
 struct PoseStamped {
   /// ROS 1's name of the type.
   static constexpr std::string_view type = "geometry_msgs/PoseStamped";
@@ -147,7 +147,7 @@ struct PoseStamped {
   Pose pose;      ///< in the frame of the header
 };
 
-/// A pose at a time and its covariance.
+/// A pose with its covariance, time stamp and frame.
 struct PoseWithCovarianceStamped {
   /// ROS 1's name of the type.
   static constexpr std::string_view type = "geometry_msgs/PoseWithCovarianceStamped";

@@ -55,7 +55,7 @@ void MemoryLocaliser::load_neighbour(const std::string& name) {
 
 /// Reads the changes of the memory and keeps the robot's pose.
 void MemoryLocaliser::reload() {
-  if (!loaded().tracker.is_held()) {
+  if (!loaded().tracker.is_memory_held()) {
     if (loaded().tracker.refresh()) publish_references();
     return;
   }
@@ -132,7 +132,7 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
 void MemoryLocaliser::refresh_if_due() {
   constexpr std::chrono::seconds interval(10);  // new views are not urgent
   const auto now = std::chrono::steady_clock::now();
-  if (memory_->tracker.is_held() || now - last_refresh_ < interval) return;
+  if (memory_->tracker.is_memory_held() || now - last_refresh_ < interval) return;
   last_refresh_ = now;
   reload();
 }
@@ -171,10 +171,13 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
   }
   if (best_matches_.subscribers() > 0) {
     const auto found = tracker.index()->search(view, {.top = 1}, {});
-    // A view that another robot has just removed from a server is not found any more.
-    const auto thumbnail =
-        found.matches.empty() ? std::nullopt : memory_->file.thumbnail(found.matches.front().view);
-    if (thumbnail) best_matches_.publish({{stamp_ns, setup_.frames.base}, "png", *thumbnail});
+    if (found.matches.empty()) return;
+    try {
+      const auto thumbnail = memory_->file.thumbnail(found.matches.front().view);
+      if (thumbnail) best_matches_.publish({{stamp_ns, setup_.frames.base}, "png", *thumbnail});
+    } catch (const ContractError&) {
+      // Another program has removed this view from the memory since the memory was read.
+    }
   }
 }
 

@@ -76,7 +76,7 @@ std::string describe_memories(const std::map<std::string, Served>& served) {
                                      const std::string& help, const auto& value) {
     std::string lines;
     for (const auto& [memory, one] : served) {
-      if (one.loaded->recogniser.is_held()) continue;
+      if (one.loaded->recogniser.is_memory_held()) continue;
       lines += name + "{memory=\"" + memory + "\"} " + value(one.loaded->recogniser) + "\n";
     }
     if (!lines.empty()) text += describe_metric(name, type, help) + lines;

@@ -436,7 +436,7 @@ struct LocalisationServer::Implementation {
     std::shared_ptr<LoadedMemory> again;
     const auto now = loaded(name);
     try {
-      if (!now->recogniser.is_held()) {
+      if (!now->recogniser.is_memory_held()) {
         if (now->recogniser.refresh()) again = now;
       } else if (one.watch->has_changed()) {
         again = std::make_shared<LoadedMemory>(one.memory.path, options);

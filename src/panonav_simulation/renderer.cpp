@@ -323,8 +323,9 @@ class CameraRays {
         dual_->lenses[lens_at(camera_, {static_cast<double>(column), 0.0})].gain);
   }
 
-  // Returns an approximate angle between neighbouring pixels for the whole image: it varies little;
-  // for a mirror that at two thirds of the rim, near the horizon.
+  // Returns the approximate angle between neighbouring pixels. One value serves for the whole
+  // image, because the angle varies little. For a mirror it is the angle at two thirds of the rim
+  // radius, which is near the horizon.
   [[nodiscard]] double pixel_rad() const {
     const bool flat = std::holds_alternative<EquirectangularModel>(camera_.model);
     const double around_px = flat    ? camera_.image_size.width

@@ -89,7 +89,7 @@ void check_series(const Series& series) {
           "the number of its x values");
 }
 
-bool has_bars(const LinePlot& plot) {
+bool has_bar_series(const LinePlot& plot) {
   return std::ranges::find(plot.series, SeriesStyle::bars, &Series::style) != plot.series.end();
 }
 
@@ -116,7 +116,7 @@ PlotAxis make_x_axis(const LinePlot& plot) {
     }
   }
   PlotAxis axis = make_axis(plot.x_label, plot.log_x, plot.x_range, values, false);
-  if (has_bars(plot) && !plot.x_range) {
+  if (has_bar_series(plot) && !plot.x_range) {
     for (const Series& series : plot.series)
       values.insert(values.end(), series.x.begin(), series.x.end());
     if (!values.empty()) {
@@ -139,7 +139,7 @@ PlotAxis make_y_axis(const LinePlot& plot) {
       values.insert(values.end(), part->begin(), part->end());
     }
   }
-  return make_axis(plot.y_label, plot.log_y, plot.y_range, values, has_bars(plot));
+  return make_axis(plot.y_label, plot.log_y, plot.y_range, values, has_bar_series(plot));
 }
 
 /// Draws the bars of series `number`; bars of several series are next to each other.

@@ -143,8 +143,8 @@ TEST_F(RecogniserOfAnIndexTest, ATrackerEstimatesAsInTheHeldMemory) {
     const TrackerOptions options{.filter = {.max_particles = 1000, .seed = seed}};
     Tracker held(path_, options);
     Tracker searched(std::make_unique<PlaceSearch>(path_), path_, options);
-    EXPECT_TRUE(held.is_held());
-    EXPECT_FALSE(searched.is_held());
+    EXPECT_TRUE(held.is_memory_held());
+    EXPECT_FALSE(searched.is_memory_held());
     EXPECT_THROW((void)searched.memory(), ContractError);
     EXPECT_EQ(searched.localiser().model(), held.localiser().model());
     for (int i = 0; i < 6; ++i) {
@@ -230,7 +230,7 @@ TEST_F(RecogniserOfAnIndexTest, RefusesWhatItCannotTell) {
   EXPECT_THROW((void)search(), FileError);
   memorise(3, 1);
   PlaceRecogniser searched = search();
-  EXPECT_FALSE(searched.is_held());
+  EXPECT_FALSE(searched.is_memory_held());
   EXPECT_THROW((void)searched.memory(), ContractError);
   EXPECT_THROW((void)searched.localiser(), ContractError);
   EXPECT_THROW(searched.append({.name = "new"}, PackedSignature{}), ContractError);

@@ -148,8 +148,8 @@ TEST_F(MemoryOnServer, ATrackerHoldsOnlyMemoriesThatAreSmallEnough) {
   file.append(random_views(0, 60));
   const Tracker held(path);
   const Tracker searched(path, {.max_held_views = 59});
-  EXPECT_TRUE(held.is_held());
-  EXPECT_FALSE(searched.is_held());
+  EXPECT_TRUE(held.is_memory_held());
+  EXPECT_FALSE(searched.is_memory_held());
   EXPECT_EQ(searched.localiser().model(), held.localiser().model());
   EXPECT_EQ(searched.localiser().particles().x_m, held.localiser().particles().x_m);
   EXPECT_EQ(searched.index()->posed_views().size(), 40U);

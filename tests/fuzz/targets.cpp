@@ -123,7 +123,7 @@ void read_recording(Bytes bytes) {
     });
     const auto locations = recording->locations(topics);
     if (!std::ranges::is_sorted(locations, {}, &recordings::MessageLocation::time_ns)) {
-      throw std::logic_error("places are not in order of time");
+      throw std::logic_error("locations are not in order of time");
     }
     for (const recordings::MessageLocation& location : locations) {
       expect_value_or_line([&] { read += recording->read(location).size(); });

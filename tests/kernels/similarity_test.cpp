@@ -29,14 +29,14 @@ SimilarityLanes random_lanes(Random& random) {
   return lanes;
 }
 
-double explained(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall, double x,
+double explained(const SimilarityLanes& lanes, const SimilarityLanes::Decay& decay, double x,
                  double y, double heading) {
   double product = 0.0;
   double square = 0.0;
   for (int i = 0; i < similarity_lanes; ++i) {
     const double apart = std::sqrt(std::pow(lanes.x_m[i] - x, 2) + std::pow(lanes.y_m[i] - y, 2) +
-                                   static_cast<double>(fall.blur_square_m2));
-    const double expected = std::exp(-apart * static_cast<double>(fall.per_metre));
+                                   static_cast<double>(decay.blur_square_m2));
+    const double expected = std::exp(-apart * static_cast<double>(decay.per_metre));
     const auto facing = [&](double reported) {
       const double turn = std::remainder(heading - reported, 2.0 * std::numbers::pi);
       return std::exp(turn * turn * static_cast<double>(lanes.per_square_turn[i]));
@@ -57,8 +57,8 @@ TEST(ExplainSimilarity, AgreesWithItsDefinitionOnEveryInstructionSet) {
   int checked = 0;
   for (int trial = 0; trial < 40; ++trial) {
     const SimilarityLanes lanes = random_lanes(random);
-    const SimilarityLanes::Fall fall{static_cast<float>(random.uniform(0.5, 5.0)),
-                                     trial % 2 == 0 ? 0.0F : 0.04F};
+    const SimilarityLanes::Decay decay{static_cast<float>(random.uniform(0.5, 5.0)),
+                                       trial % 2 == 0 ? 0.0F : 0.04F};
     std::vector<float> x, y, heading, found(17);
     for (std::size_t p = 0; p < found.size(); ++p) {
       x.push_back(static_cast<float>(random.uniform(-1.5, 1.5)));
@@ -66,13 +66,13 @@ TEST(ExplainSimilarity, AgreesWithItsDefinitionOnEveryInstructionSet) {
       heading.push_back(static_cast<float>(random.uniform(-3.1, 3.1)));
     }
     std::vector<float> plain(found.size());
-    explain_similarity(lanes, fall, x, y, heading, plain, Instructions::scalar);
+    explain_similarity(lanes, decay, x, y, heading, plain, Instructions::scalar);
     for (const Instructions set : available_instructions()) {
-      explain_similarity(lanes, fall, x, y, heading, found, set);
+      explain_similarity(lanes, decay, x, y, heading, found, set);
       EXPECT_EQ(found, plain) << name(set);
       for (std::size_t p = 0; p < found.size(); ++p) {
         const double expected =
-            explained(lanes, fall, static_cast<double>(x[p]), static_cast<double>(y[p]),
+            explained(lanes, decay, static_cast<double>(x[p]), static_cast<double>(y[p]),
                       static_cast<double>(heading[p]));
         EXPECT_NEAR(static_cast<double>(found[p]), expected, 1e-6 + 1e-4 * expected) << name(set);
         ++checked;

@@ -55,7 +55,7 @@ TEST(ResultsDocument, JsonHasTheRowsOfEveryPaper) {
   EXPECT_EQ(object["held"], 1);
   ASSERT_EQ(object["papers"].size(), 2U);
   EXPECT_EQ(object["papers"]["a01"], nlohmann::json::parse(to_json(made.papers[0].rows)));
-  const auto read = from_json(object["papers"]["a01"].dump(), "x");
+  const auto read = rows_from_json(object["papers"]["a01"].dump(), "x");
   EXPECT_EQ(to_json(read), to_json(made.papers[0].rows));
 }
 

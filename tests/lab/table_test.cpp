@@ -74,7 +74,7 @@ TEST(ResultRow, ReadsBackWhatItWrites) {
   ResultRow nothing = row(nan, Comparison::at_most, 1.0);
   nothing.interval = std::pair{nan, 4.0};
   const std::vector<ResultRow> rows{bare, range, nothing, row(-7.0, Comparison::at_most, 3.0)};
-  const auto read = from_json(to_json(rows), "x.json");
+  const auto read = rows_from_json(to_json(rows), "x.json");
   ASSERT_EQ(read.size(), rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     EXPECT_EQ(read[i].id, rows[i].id);
@@ -94,7 +94,7 @@ TEST(ResultRow, ReadsBackWhatItWrites) {
   EXPECT_TRUE(std::isnan(read[2].interval->first));
   EXPECT_EQ(read[2].interval->second, 4.0);
   EXPECT_EQ(to_json(read), to_json(rows));
-  EXPECT_TRUE(from_json("[]", "x.json").empty());
+  EXPECT_TRUE(rows_from_json("[]", "x.json").empty());
 }
 
 TEST(ResultRow, AReasonIsToldOnlyWhereTheTargetIsMissed) {
@@ -110,7 +110,7 @@ TEST(ResultRow, ReadsRowsOfBeforeReasonsWereTold) {
   auto list = nlohmann::json::parse(to_json(std::vector{missed()}));
   list[0].erase("reason");
   list[0].erase("over");
-  const auto read = from_json(list.dump(), "x.json");
+  const auto read = rows_from_json(list.dump(), "x.json");
   ASSERT_EQ(read.size(), 1U);
   EXPECT_EQ(read[0].reason, "");
   EXPECT_EQ(read[0].over, "");
@@ -118,7 +118,7 @@ TEST(ResultRow, ReadsRowsOfBeforeReasonsWereTold) {
 
 TEST(ResultRow, ReadingNamesFileRowAndField) {
   const auto fault = [](const std::string& text) {
-    return message_of<FileError>([&] { (void)from_json(text, "x.json"); });
+    return message_of<FileError>([&] { (void)rows_from_json(text, "x.json"); });
   };
   EXPECT_TRUE(contains(fault(""), "x.json: is no JSON"));
   EXPECT_TRUE(contains(fault("{}"), "x.json: is no list of rows"));

@@ -196,7 +196,7 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
   for (const double difference : {0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6}) {
     evidence.difference = difference;
     evidence.difference_of_all_columns = difference;
-    evidence.tenth_difference = difference + 0.1;
+    evidence.tenth_best_difference = difference + 0.1;
     const double probability = place_probability(evidence);
     EXPECT_GE(probability, 0.0);
     EXPECT_LE(probability, last);
@@ -211,7 +211,7 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
   // Fewer components resolve fewer columns, which agree more often by chance.
   evidence = {.difference = 0.3,
               .difference_of_all_columns = 0.4,
-              .tenth_difference = 0.35,
+              .tenth_best_difference = 0.35,
               .chance = 0.5,
               .views = 200,
               .components = 15};
@@ -230,7 +230,7 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
 TEST(PlaceModel, VerifiedFeaturesCountWhereColumnsLeaveDoubtAlone) {
   PlaceEvidence doubtful{.difference = 0.42,
                          .difference_of_all_columns = 0.5,
-                         .tenth_difference = 0.48,
+                         .tenth_best_difference = 0.48,
                          .chance = 0.62,
                          .views = 200,
                          .components = 15};
@@ -283,7 +283,7 @@ TEST(PlaceModel, EvidenceForOneViewIsThatOfTheBestMatchWhereItIsTheOne) {
     for (std::size_t first = 0; first < views.size(); ++first) {
       std::swap(views.front(), views[first]);
       const PlaceEvidence one = in_parts.evidence_for_first(query, views);
-      EXPECT_EQ(one.tenth_difference, best.tenth_difference);
+      EXPECT_EQ(one.tenth_best_difference, best.tenth_best_difference);
       EXPECT_EQ(one.chance, best.chance);
       EXPECT_EQ(one.views, best.views);
       EXPECT_EQ(one.components, best.components);

@@ -153,10 +153,10 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
 
   // In another order they are the same particles, and those of one cell follow each other.
   particles.weight = ratios;
-  auto arranged = particles;
-  likelihood.reorder_by_cell(arranged);
-  likelihood.compute_log_ratios(arranged, ratios);
-  for (std::size_t i = 0; i < arranged.size(); ++i) EXPECT_EQ(ratios[i], arranged.weight[i]);
+  auto reordered = particles;
+  likelihood.reorder_by_cell(reordered);
+  likelihood.compute_log_ratios(reordered, ratios);
+  for (std::size_t i = 0; i < reordered.size(); ++i) EXPECT_EQ(ratios[i], reordered.weight[i]);
   const auto in_order = [](const Particles& p) {
     std::vector<std::array<double, 4>> rows;
     for (std::size_t i = 0; i < p.size(); ++i) {
@@ -167,15 +167,15 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   };
   std::set<const std::uint32_t*> begun;
   const std::uint32_t* last = nullptr;
-  for (std::size_t i = 0; i < arranged.size(); ++i) {
-    const std::uint32_t* const near = likelihood.sites_near(arranged.position(i)).data();
+  for (std::size_t i = 0; i < reordered.size(); ++i) {
+    const std::uint32_t* const near = likelihood.sites_near(reordered.position(i)).data();
     if (near != last) {
       EXPECT_TRUE(begun.insert(near).second);
     }
     last = near;
   }
   EXPECT_GT(begun.size(), 20U);
-  EXPECT_EQ(in_order(arranged), in_order(particles));
+  EXPECT_EQ(in_order(reordered), in_order(particles));
 }
 
 TEST(ViewLikelihood, WithoutTheCompassHeadingsDoNotCount) {

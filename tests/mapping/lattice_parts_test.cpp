@@ -268,12 +268,12 @@ TEST(LatticeGrowth, FindsTheShapeAndKeepsWhatOnlyLooksAlikeApart) {
   std::vector<Point2> found;
   std::vector<Point2> truth;
   for (std::size_t i = 0; i < halls.poses.size(); ++i) {
-    ASSERT_EQ(grown.start.components[i], i / TwoHalls::views) << i;
+    ASSERT_EQ(grown.layout.components[i], i / TwoHalls::views) << i;
     if (i >= TwoHalls::views) continue;
-    found.push_back(grown.start.poses[i].position());
+    found.push_back(grown.layout.poses[i].position());
     truth.push_back(halls.poses[i].position());
-    EXPECT_NEAR(angle_difference(grown.start.poses[i].heading_rad - halls.poses[i].heading_rad,
-                                 grown.start.poses[0].heading_rad - halls.poses[0].heading_rad),
+    EXPECT_NEAR(angle_difference(grown.layout.poses[i].heading_rad - halls.poses[i].heading_rad,
+                                 grown.layout.poses[0].heading_rad - halls.poses[0].heading_rad),
                 0.0, 0.1);
   }
   EXPECT_LT(shape_difference(found, truth).value, 0.01);
@@ -289,11 +289,11 @@ TEST(LatticeGrowth, AFalseSpringDoesNotFoldAHall) {
   halls.link(0, TwoHalls::views - 1, {0.5, 0.0, 1.0}, 0.12);
   halls.link(1, TwoHalls::views - 2, {0.5, 0.0, -2.0}, 0.12);
   const GrownLayout grown = grow_components(halls.poses.size(), halls.springs, 1.0);
-  const double across =
-      distance(grown.start.poses[0].position(), grown.start.poses[TwoHalls::views - 1].position());
+  const double across = distance(grown.layout.poses[0].position(),
+                                 grown.layout.poses[TwoHalls::views - 1].position());
   EXPECT_NEAR(across, std::hypot(5.0, 5.0), 0.7);
-  EXPECT_FALSE(fits_layout(halls.springs.back(), 1.0, grown.start.poses[1],
-                           grown.start.poses[TwoHalls::views - 2]));
+  EXPECT_FALSE(fits_layout(halls.springs.back(), 1.0, grown.layout.poses[1],
+                           grown.layout.poses[TwoHalls::views - 2]));
 }
 
 TEST(LatticeGrowth, TheOrderOfViewsDoesNotMatter) {
@@ -310,9 +310,9 @@ TEST(LatticeGrowth, TheOrderOfViewsDoesNotMatter) {
   std::vector<Point2> one;
   std::vector<Point2> other;
   for (std::size_t i = 0; i < TwoHalls::views; ++i) {
-    one.push_back(grown.start.poses[i].position());
-    other.push_back(again.start.poses[last - i].position());
-    EXPECT_EQ(again.start.components[last - i], again.start.components[last]);
+    one.push_back(grown.layout.poses[i].position());
+    other.push_back(again.layout.poses[last - i].position());
+    EXPECT_EQ(again.layout.components[last - i], again.layout.components[last]);
   }
   EXPECT_LT(shape_difference(one, other).value, 1e-3);
 }

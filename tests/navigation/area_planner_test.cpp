@@ -38,9 +38,9 @@ void expect_partition(const NavigationGraph& graph, const SubAreas& areas) {
     EXPECT_TRUE(std::ranges::is_sorted(areas.nodes[a]));
     EXPECT_TRUE(is_connected(graph, areas, a)) << "area " << a;
     views += areas.nodes[a].size();
-    for (std::size_t place = 0; place < areas.nodes[a].size(); ++place) {
-      EXPECT_EQ(areas.area_of[areas.nodes[a][place]], a);
-      EXPECT_EQ(areas.index_in_area[areas.nodes[a][place]], place);
+    for (std::size_t index = 0; index < areas.nodes[a].size(); ++index) {
+      EXPECT_EQ(areas.area_of[areas.nodes[a][index]], a);
+      EXPECT_EQ(areas.index_in_area[areas.nodes[a][index]], index);
     }
   }
   EXPECT_EQ(views, graph.size());
@@ -151,23 +151,23 @@ TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
         planner.unblock_all();
         EXPECT_EQ(planner.blocked_edge_count(), 0U);
       }
-      const auto ways = all_ways(graph, closed);
+      const auto path_lengths = compute_all_path_lengths(graph, closed);
       for (std::size_t goal = 0; goal < graph.size(); goal += 17) {
         planner.set_goal(graph.view(goal));
         for (std::size_t area = 0; area < planner.areas().nodes.size(); ++area) {
           const auto guides = planner.field(area);
-          for (std::size_t place = 0; place < guides.size(); ++place) {
-            const std::size_t node = planner.areas().nodes[area][place];
-            const double truth = ways[goal * graph.size() + node];
-            ASSERT_EQ(guides[place].is_reachable(), std::isfinite(truth));
-            if (!guides[place].is_reachable()) continue;
-            ASSERT_NEAR(guides[place].path_length, truth, 1e-9);
+          for (std::size_t index = 0; index < guides.size(); ++index) {
+            const std::size_t node = planner.areas().nodes[area][index];
+            const double truth = path_lengths[goal * graph.size() + node];
+            ASSERT_EQ(guides[index].is_reachable(), std::isfinite(truth));
+            if (!guides[index].is_reachable()) continue;
+            ASSERT_NEAR(guides[index].path_length, truth, 1e-9);
             ++compared;
           }
         }
-        const auto way = planner.plan_path((goal + 40) % graph.size());
-        if (!way.empty()) {
-          EXPECT_EQ(way.back(), goal);
+        const auto path = planner.plan_path((goal + 40) % graph.size());
+        if (!path.empty()) {
+          EXPECT_EQ(path.back(), goal);
         }
       }
     }
@@ -193,12 +193,12 @@ TEST(AreaPlanner, FewGatesReachTheGoalFromEverywhereByWaysHardlyLonger) {
     if (goal == start) continue;
     planner.set_goal(graph.view(goal));
     const auto flat = direction_field(graph, graph.view(goal));
-    const auto way = planner.plan_path(start);
-    ASSERT_FALSE(way.empty());
-    EXPECT_EQ(way.back(), goal);
+    const auto path = planner.plan_path(start);
+    ASSERT_FALSE(path.empty());
+    EXPECT_EQ(path.back(), goal);
     double length = 0.0;
-    for (std::size_t k = 0; k + 1 < way.size(); ++k) {
-      length += distance(poses[way[k]].position(), poses[way[k + 1]].position());
+    for (std::size_t k = 0; k + 1 < path.size(); ++k) {
+      length += distance(poses[path[k]].position(), poses[path[k + 1]].position());
     }
     EXPECT_GE(length, flat[start].path_length - 1e-9);
     longer += length / flat[start].path_length;

@@ -15,11 +15,11 @@ namespace {
 
 // The nodes from `start` to where the tree ends.
 std::vector<std::size_t> followed(const std::vector<Guide>& guides, std::size_t start) {
-  std::vector<std::size_t> way{start};
-  while (guides[way.back()].next != way.back() && way.size() <= guides.size()) {
-    way.push_back(guides[way.back()].next);
+  std::vector<std::size_t> path{start};
+  while (guides[path.back()].next != path.back() && path.size() <= guides.size()) {
+    path.push_back(guides[path.back()].next);
   }
-  return way;
+  return path;
 }
 
 TEST(DirectionField, WaysAreTheShortestOnes) {
@@ -29,11 +29,11 @@ TEST(DirectionField, WaysAreTheShortestOnes) {
     const NavigationGraph graph = random_graph(30, 20 + seed, seed);
     std::vector<std::uint8_t> closed(graph.edges().size(), 0);
     for (std::size_t p = 0; p < closed.size(); p += 7) closed[p] = 1;
-    const auto ways = all_ways(graph, closed);
+    const auto path_lengths = compute_all_path_lengths(graph, closed);
     for (std::size_t goal = 0; goal < graph.size(); goal += 5) {
       const auto guides = direction_field(graph, graph.view(goal), {}, closed);
       for (std::size_t node = 0; node < graph.size(); ++node) {
-        const double truth = ways[goal * graph.size() + node];
+        const double truth = path_lengths[goal * graph.size() + node];
         ASSERT_EQ(guides[node].is_reachable(), std::isfinite(truth));
         if (!guides[node].is_reachable()) {
           ++unreachable;
@@ -41,12 +41,12 @@ TEST(DirectionField, WaysAreTheShortestOnes) {
         }
         ++compared;
         ASSERT_NEAR(guides[node].path_length, truth, 1e-9);
-        const auto way = followed(guides, node);
-        ASSERT_EQ(way.front(), node);
-        ASSERT_EQ(way.back(), goal);
+        const auto path = followed(guides, node);
+        ASSERT_EQ(path.front(), node);
+        ASSERT_EQ(path.back(), goal);
         double length = 0.0;
-        for (std::size_t i = 0; i + 1 < way.size(); ++i) {
-          const std::size_t edge = guides[way[i]].edge;
+        for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+          const std::size_t edge = guides[path[i]].edge;
           ASSERT_EQ(closed[edge], 0);
           length += graph.edges()[edge].length;
         }

@@ -256,7 +256,7 @@ TEST(PlaceScale, TellsNeighboursFromStrangers) {
   const PlaceScale scale = learn_place_scale(source, graph);
   EXPECT_GT(scale.neighbour_difference, 0.0);
   EXPECT_LT(scale.neighbour_difference, scale.max_difference());
-  EXPECT_LT(scale.max_difference(), scale.random_pair_difference);
+  EXPECT_LT(scale.max_difference(), scale.distant_pair_difference);
   EXPECT_THROW((void)learn_place_scale(source, graph, 0, 0), ContractError);
 }
 

@@ -208,6 +208,40 @@ TEST_F(MemoryFileDamage, RowsThatWereTamperedWith) {
   refused_after("DELETE FROM views WHERE id = 2");  // its links stay behind
 }
 
+/// Lowers the first key of each inner page of the file's trees by one, so that a search for a row
+/// ends on the wrong page, and a scan still finds it.
+std::string misdirect_searches(std::string bytes) {
+  const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(bytes[at]); };
+  const std::size_t page_bytes = byte(16) * 256U + byte(17);
+  for (std::size_t page = page_bytes; page + page_bytes <= bytes.size(); page += page_bytes) {
+    constexpr unsigned char inner_table_page = 5;
+    if (byte(page) != inner_table_page || byte(page + 3) + byte(page + 4) == 0) continue;
+    const std::size_t cell = page + byte(page + 12) * 256U + byte(page + 13);
+    constexpr unsigned char max_short_key = 127;  // larger ones take more bytes
+    if (byte(cell + 4) > 1 && byte(cell + 4) <= max_short_key) --bytes[cell + 4];
+  }
+  return bytes;
+}
+
+TEST_F(MemoryFileDamage, AViewThatIsListedButNotFoundIsDamage) {
+  const Sample sample(path);
+  const auto damaged = folder.write("damaged.panonav", misdirect_searches(bytes_of(path)));
+  MemoryFile file = MemoryFile::open(damaged, Access::read_write);
+  int missing = 0;
+  for (const ViewId view : file.views()) {
+    try {
+      (void)file.thumbnail(view);
+      const Link link{view, ViewId{view.value == 1 ? 2U : 1U}, Link::Kind::closure};
+      file.link(std::span(&link, 1));
+    } catch (const FileError& error) {
+      EXPECT_NE(std::string(error.what()).find("is missing"), std::string::npos) << error.what();
+      ++missing;
+    }
+  }
+  EXPECT_GT(missing, 0);
+  EXPECT_THROW((void)file.thumbnail(ViewId{1000}), ContractError);
+}
+
 // A file in SQLite's other journal mode (copied with its tools, say) is as good.
 TEST_F(MemoryFileDamage, AFileWithoutWriteAheadLogIsRead) {
   const Sample sample(path);

@@ -49,28 +49,29 @@ NavigationGraph posed_graph(const std::vector<Pose2>& poses, double reach_m, con
   return {views, made};
 }
 
-/// Shortest ways between all nodes (Floyd and Warshall), by index a * size + b.
-inline std::vector<double> all_ways(const NavigationGraph& graph,
-                                    const std::vector<std::uint8_t>& closed = {}) {
+/// Lengths of the shortest paths between all nodes (Floyd and Warshall), by index a * size + b.
+inline std::vector<double> compute_all_path_lengths(const NavigationGraph& graph,
+                                                    const std::vector<std::uint8_t>& closed = {}) {
   const std::size_t n = graph.size();
-  std::vector<double> ways(n * n, std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < n; ++i) ways[i * n + i] = 0.0;
+  std::vector<double> path_lengths(n * n, std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < n; ++i) path_lengths[i * n + i] = 0.0;
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {
     if (!closed.empty() && closed[p] != 0) continue;
     const NavigationGraph::Edge& edge = graph.edges()[p];
     const std::size_t a = *graph.node_of(edge.a);
     const std::size_t b = *graph.node_of(edge.b);
-    ways[a * n + b] = std::min(ways[a * n + b], edge.length);
-    ways[b * n + a] = ways[a * n + b];
+    path_lengths[a * n + b] = std::min(path_lengths[a * n + b], edge.length);
+    path_lengths[b * n + a] = path_lengths[a * n + b];
   }
   for (std::size_t k = 0; k < n; ++k) {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) {
-        ways[i * n + j] = std::min(ways[i * n + j], ways[i * n + k] + ways[k * n + j]);
+        path_lengths[i * n + j] =
+            std::min(path_lengths[i * n + j], path_lengths[i * n + k] + path_lengths[k * n + j]);
       }
     }
   }
-  return ways;
+  return path_lengths;
 }
 
 }  // namespace panonav::testing

@@ -70,7 +70,7 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
 
 }  // namespace
 
-void declare_layout(Arguments& arguments, PictureArguments& pictures) {
+void declare_picture_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
                    "Type of the images; not needed if a dataset.toml gives it");
   arguments.option("--camera FILE", pictures.camera,
@@ -118,7 +118,7 @@ void declare_part(Arguments& arguments, PartArguments& part, bool every) {
 }
 
 void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
-  declare_layout(arguments, pictures);
+  declare_picture_layout(arguments, pictures);
   declare_topics(arguments, pictures.topics);
   declare_part(arguments, pictures.part, true);
 }

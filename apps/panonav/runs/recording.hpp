@@ -35,12 +35,12 @@ struct PictureArguments {
 };
 
 /// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
-void declare_layout(Arguments& arguments, PictureArguments& pictures);
+void declare_picture_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics);
 /// Adds --from and --to, with `every` also --every.
 void declare_part(Arguments& arguments, PartArguments& part, bool every);
-/// Adds the flags of `declare_layout`, `declare_topics` and `declare_part`.
+/// Adds the flags of `declare_picture_layout`, `declare_topics` and `declare_part`.
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
 /// Returns the flags of `declare_topics` and `declare_part`, which verbs reject for single images.

@@ -154,7 +154,7 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
                                         out / paper.name, session));
     }
     lab::PaperResults results{std::string(paper.name), std::string(paper.title),
-                              lab::from_json(read_text(file), file.string())};
+                              lab::rows_from_json(read_text(file), file.string())};
     report(paper, results.rows, is_done ? " (finished by an earlier run)" : "");
     document.papers.push_back(std::move(results));
   }

@@ -152,7 +152,7 @@ Run declare_ros2(Arguments& arguments) {
   arguments.option("--base-frame NAME", setup.frames.base, "Name of the frame of the robot");
   arguments.allow_in_config_files(
       "ros2", {"--node-name", "--namespace", "--map-frame", "--odom-frame", "--base-frame"});
-  declare_layout(arguments, values->pictures);
+  declare_picture_layout(arguments, values->pictures);
   arguments.options("signature", values->teacher.signature);
   arguments.options("preprocessing", values->teacher.preprocessing);
   arguments.options("ros2", setup.node);

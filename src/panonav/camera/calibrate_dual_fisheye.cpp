@@ -33,8 +33,8 @@ constexpr std::array<double, 4> fields_of_view_deg{186, 194, 203, 213};
 constexpr double min_turn_deg = 10.0;
 /// Numbers of directions in which patches are matched, in the first and in the last fits. A single
 /// picture has matches only in the overlap of the lenses, so it needs more directions.
-constexpr int coarse_directions = 250, coarse_directions_single_picture = 1000;
-constexpr int fine_directions = 2000, fine_directions_single_picture = 6000;
+constexpr int coarse_directions = 250, single_picture_coarse_directions = 1000;
+constexpr int fine_directions = 2000, single_picture_fine_directions = 6000;
 /// Smallest number of patches with contrast in the last fit, and the smallest share of them that
 /// must be matched; chance matches about 0.1.
 constexpr int min_textured = 100;
@@ -55,7 +55,7 @@ VectorXd prior_deviations(const std::array<FieldCircle, 2>& circles, int picture
   VectorXd deviations(rotation_offset(pictures));
   for (int lens = 0; lens < 2; ++lens) {
     const double centre_px = 0.015 * circles[lens].radius;
-    deviations.segment<lens_parameter_count>(lens_at(lens)) << centre_px, centre_px, 0.1, 0.05,
+    deviations.segment<lens_parameter_count>(lens_offset(lens)) << centre_px, centre_px, 0.1, 0.05,
         0.02, lens == 0 ? fixed : radians(3.0), radians(3.0), radians(3.0);
   }
   for (int p = 0; p < pictures; ++p) {
@@ -106,15 +106,16 @@ std::optional<std::array<FieldCircle, 2>> find_circles(const std::vector<Image>&
 class Calibrator {
  public:
   Calibrator(const std::vector<Image>& grey, const std::array<FieldCircle, 2>& circles,
-             const DualFisheyeCalibration::Knowledge& known, Executor& executor)
+             const DualFisheyeCalibration::Knowledge& knowledge, Executor& executor)
       : grey_(grey),
         circles_(circles),
-        knowledge_(known),
-        mirror_sign_(known.direction == ColumnDirection::clockwise ? 1.0 : -1.0),
+        knowledge_(knowledge),
+        mirror_sign_(knowledge.direction == ColumnDirection::clockwise ? 1.0 : -1.0),
         fine_step_rad_(1.8 / circles[0].radius),
         coarse_step_rad_(std::max(radians(0.6), 2 * fine_step_rad_)),
         matcher_(grey_, mirror_sign_, executor),
-        fit_(prior_deviations(circles, static_cast<int>(grey.size()), known.turn_rad.has_value()),
+        fit_(prior_deviations(circles, static_cast<int>(grey.size()),
+                              knowledge.turn_rad.has_value()),
              fine_step_rad_, mirror_sign_, executor) {}
 
   std::variant<DualFisheyeCalibration, std::string> calibrate();
@@ -174,7 +175,7 @@ std::optional<std::string> Calibrator::fit_fields_of_view() {
   // overlap depend.
   std::vector<double> fields_deg(fields_of_view_deg.begin(), fields_of_view_deg.end());
   if (knowledge_.field_of_view_rad) fields_deg = {degrees(*knowledge_.field_of_view_rad)};
-  const int directions = grey_.size() == 1 ? coarse_directions_single_picture : coarse_directions;
+  const int directions = grey_.size() == 1 ? single_picture_coarse_directions : coarse_directions;
   LensFit::Parameters best;
   int best_match_count = -1;
   for (const double field_deg : fields_deg) {
@@ -191,11 +192,11 @@ std::optional<std::string> Calibrator::fit_fields_of_view() {
     }
     fit_.solve(matcher_.match(fit_.state(), coarse_step_rad_, 10, directions).matches);
     if (!set_max_angles()) continue;
-    const Matching again = matcher_.match(fit_.state(), coarse_step_rad_, 4, directions);
-    fit_.solve(again.matches);
-    if (again.count_near_expected() > best_match_count && set_max_angles()) {
+    const Matching second_matching = matcher_.match(fit_.state(), coarse_step_rad_, 4, directions);
+    fit_.solve(second_matching.matches);
+    if (second_matching.count_near_expected() > best_match_count && set_max_angles()) {
       best = fit_.parameters();
-      best_match_count = again.count_near_expected();
+      best_match_count = second_matching.count_near_expected();
     }
   }
   if (best_match_count < 0) return "the two circles show no common objects";
@@ -204,9 +205,9 @@ std::optional<std::string> Calibrator::fit_fields_of_view() {
 }
 
 std::optional<std::string> Calibrator::refine_fit() {
-  const double middle_rad = std::sqrt(coarse_step_rad_ * fine_step_rad_);
-  const int directions = grey_.size() == 1 ? fine_directions_single_picture : fine_directions;
-  for (const double step_rad : {middle_rad, fine_step_rad_, fine_step_rad_}) {
+  const double middle_step_rad = std::sqrt(coarse_step_rad_ * fine_step_rad_);
+  const int directions = grey_.size() == 1 ? single_picture_fine_directions : fine_directions;
+  for (const double step_rad : {middle_step_rad, fine_step_rad_, fine_step_rad_}) {
     last_matching_ = matcher_.match(fit_.state(), step_rad, 3, directions);
     fit_.solve(last_matching_.matches);
     if (!set_max_angles()) return "the lenses' distortion cannot be determined";
@@ -257,7 +258,7 @@ Camera Calibrator::make_camera() const {
 
 double Calibrator::azimuth_deviation(const Camera& camera, const MatrixXd& covariance) const {
   constexpr int azimuths = 90;  // every fourth degree of the horizon
-  const State now = fit_.state();
+  const State state = fit_.state();
   MatrixXd derivatives = MatrixXd::Zero(azimuths, covariance.rows());
   for (int i = 0; i < azimuths; ++i) {
     const auto direction = Direction3::from_angles(2 * std::numbers::pi * i / azimuths, 0.0);
@@ -270,10 +271,10 @@ double Calibrator::azimuth_deviation(const Camera& camera, const MatrixXd& covar
       return std::atan2(d.y(), d.x());
     };
     for (int j = 0; j < lens_parameter_count; ++j) {
-      FisheyeLens changed = now.lenses[lens];
+      FisheyeLens changed = state.lenses[lens];
       add_to_parameter(changed, j, derivative_step(j));
-      derivatives(i, lens_at(lens) + j) =
-          angle_difference(azimuth(changed), azimuth(now.lenses[lens])) / derivative_step(j);
+      derivatives(i, lens_offset(lens) + j) =
+          angle_difference(azimuth(changed), azimuth(state.lenses[lens])) / derivative_step(j);
     }
   }
   derivatives.rowwise() -= derivatives.colwise().mean().eval();
@@ -314,7 +315,7 @@ std::variant<DualFisheyeCalibration, std::string> Calibrator::calibrate() {
 namespace panonav {
 
 std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
-    std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& known,
+    std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& knowledge,
     Executor& executor) {
   require(!pictures.empty(), "number of images", 0, "at least 1");
   for (const ImageView& picture : pictures) {
@@ -326,7 +327,7 @@ std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
   for (const ImageView& picture : pictures) grey.push_back(to_grey(picture));
   const auto circles = dual_fisheye::find_circles(grey);
   if (!circles) return "no circle of a lens in each half of the images";
-  return dual_fisheye::Calibrator(grey, *circles, known, executor).calibrate();
+  return dual_fisheye::Calibrator(grey, *circles, knowledge, executor).calibrate();
 }
 
 }  // namespace panonav

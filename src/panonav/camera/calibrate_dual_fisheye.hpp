@@ -49,7 +49,7 @@ struct DualFisheyeCalibration {
 /// picture, different sizes, or a height below 64 px. Results are bit-identical for any number of
 /// threads. Cost: some seconds for four pictures of 1280 x 640.
 [[nodiscard]] std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
-    std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& known,
+    std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& knowledge,
     Executor& executor);
 
 }  // namespace panonav

@@ -10,7 +10,7 @@ namespace panonav {
 
 namespace {
 
-double interpolate_sorted(std::span<const double> sorted, double fraction) {
+double interpolate_quantile(std::span<const double> sorted, double fraction) {
   const double position = fraction * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(position);
   const std::size_t above = std::min(below + 1, sorted.size() - 1);
@@ -25,7 +25,7 @@ double quantile(std::span<const double> values, double fraction) {
   require(fraction >= 0.0 && fraction <= 1.0, "fraction", fraction, "0 .. 1");
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
-  return interpolate_sorted(sorted, fraction);
+  return interpolate_quantile(sorted, fraction);
 }
 
 double median(std::span<const double> values) {

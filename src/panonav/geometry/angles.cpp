@@ -6,7 +6,7 @@
 
 namespace panonav {
 
-double wrap_any_angle(double angle_rad) {
+double wrap_angle_by_remainder(double angle_rad) {
   constexpr double turn = 2.0 * std::numbers::pi;
   double wrapped = std::remainder(angle_rad, turn);  // [-pi, pi]
   if (wrapped >= std::numbers::pi) wrapped = -std::numbers::pi;

@@ -8,12 +8,12 @@
 namespace panonav {
 
 /// Wraps any angle to [-pi, pi). NaN and infinities give NaN.
-[[nodiscard]] double wrap_any_angle(double angle_rad);
+[[nodiscard]] double wrap_angle_by_remainder(double angle_rad);
 /// Wraps an angle to [-pi, pi); fast for angles already within. NaN and infinities give NaN.
 [[nodiscard]] inline double wrap_angle(double angle_rad) {
   // Avoids the slow remainder for angles that are already wrapped, which most are.
   if (angle_rad >= -std::numbers::pi && angle_rad < std::numbers::pi) return angle_rad;
-  return wrap_any_angle(angle_rad);
+  return wrap_angle_by_remainder(angle_rad);
 }
 
 /// The smallest rotation from `from_rad` to `to_rad`, in [-pi, pi).

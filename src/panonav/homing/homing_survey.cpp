@@ -14,13 +14,13 @@ namespace panonav {
 namespace {
 
 /// Tolerance of distances, so that a step of exactly the limit is accepted in spite of rounding.
-constexpr double rounding_m = 1e-9;
+constexpr double distance_tolerance_m = 1e-9;
 
 // Finds the place nearest to a point, if one is within a fixed reach.
 class PlaceFinder {
  public:
   PlaceFinder(std::span<const Pose2> places, double reach_m)
-      : reach_m_(reach_m + rounding_m), grid_(reach_m_) {
+      : reach_m_(reach_m + distance_tolerance_m), grid_(reach_m_) {
     for (std::size_t i = 0; i < places.size(); ++i) {
       grid_.add(static_cast<std::uint32_t>(i), places[i].position());
     }
@@ -102,7 +102,7 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
         const double home_m = std::hypot(home_x, home_y);
         const std::size_t pair = g * places.size() + p;
         survey.homeward[pair] =
-            home_m > rounding_m
+            home_m > distance_tolerance_m
                 ? static_cast<float>(length > 0.0 ? (x * home_x + y * home_y) / (length * home_m)
                                                   : 0.0)
                 : std::numeric_limits<float>::quiet_NaN();
@@ -164,7 +164,7 @@ double mean_homeward_component(const HomingSurvey& survey, double max_m) {
     for (std::size_t p = 0; p < homeward.size(); ++p) {
       if (std::isnan(homeward[p])) continue;
       const double away_m = distance(survey.goals[g].position(), survey.places[p].position());
-      if (away_m > max_m + rounding_m) continue;
+      if (away_m > max_m + distance_tolerance_m) continue;
       ++pairs;
       sum += static_cast<double>(homeward[p]);
     }

@@ -384,10 +384,10 @@ std::vector<std::size_t> select_picture_indices(const std::vector<double>& stamp
 }
 
 void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
-  if (!selection.selects_by_time() && selection.every <= 1) return;
+  if (!selection.has_time_selection() && selection.every <= 1) return;
   const std::string name = dataset.folder.string();
   std::vector<double> stamps_s(dataset.entries.size(), 0.0);
-  if (selection.selects_by_time()) {
+  if (selection.has_time_selection()) {
     for (std::size_t i = 0; i < stamps_s.size(); ++i) {
       const DatasetEntry& entry = dataset.entries[i];
       if (!entry.stamp_s) {

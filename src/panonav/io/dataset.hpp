@@ -63,7 +63,7 @@ struct Dataset {
     std::optional<double> to_s;     ///< this moment included
 
     /// True if pictures need stamps to be selected.
-    [[nodiscard]] bool selects_by_time() const noexcept { return every_s || from_s || to_s; }
+    [[nodiscard]] bool has_time_selection() const noexcept { return every_s || from_s || to_s; }
   };
 
   /// Fields that all pictures of a data set have.

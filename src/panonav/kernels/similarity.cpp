@@ -7,7 +7,7 @@
 
 namespace panonav::kernels {
 
-void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall,
+void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Decay& decay,
                         std::span<const float> x_m, std::span<const float> y_m,
                         std::span<const float> heading_rad, std::span<float> explained,
                         Instructions instructions) {
@@ -18,7 +18,7 @@ void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Fal
   }
   const auto count = static_cast<int>(x_m.size());
   with_body<SimilarityBody>(instructions, [&](auto body) {
-    body.explain_similarity(lanes, fall, x_m.data(), y_m.data(), heading_rad.data(),
+    body.explain_similarity(lanes, decay, x_m.data(), y_m.data(), heading_rad.data(),
                             explained.data(), count);
   });
 }

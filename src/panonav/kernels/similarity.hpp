@@ -13,7 +13,7 @@ namespace panonav::kernels {
 /// the reference implies; of the two headings of a reference the one with the larger product is
 /// used. Spans of one size; throws ContractError otherwise. All instruction sets give the same
 /// bits. Cost: about 5 ns per pose with AVX-512, in blocks of 16 poses.
-void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall,
+void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Decay& decay,
                         std::span<const float> x_m, std::span<const float> y_m,
                         std::span<const float> heading_rad, std::span<float> explained,
                         Instructions instructions);

@@ -131,7 +131,7 @@ inline constexpr int similarity_lanes = 12;
 /// has similarity 0 (logarithm minus infinity) and a distant position.
 struct SimilarityLanes {
   /// Decrease of similarity with distance: exp(-sqrt(distance^2 + blur_square_m2) * per_metre).
-  struct Fall {
+  struct Decay {
     float per_metre;  ///< > 0, decrease of the logarithm per metre
     /// Added to the square of each distance, which makes the decrease flat near a reference.
     float blur_square_m2;

@@ -191,7 +191,7 @@ class Localiser::Query {
         compared_(localiser.held_.get()) {
     const VisualMemory& memory = compared_ != nullptr ? *compared_->memory : *localiser_.sampled_;
     place_.components = options_.components == 0 ? memory.shape().components : options_.components;
-    if (features && localiser_.is_ranked_by_features() && options_.reranked_views > 0) {
+    if (features && localiser_.should_rank_by_features() && options_.reranked_views > 0) {
       features_ = compute_features(Handedness::original);
     }
     is_ranked_by_features_ = features_.has_value();

@@ -41,7 +41,7 @@ class Localiser {
     rank_by_features_ = rank;
   }
   /// True if features sort the best matches.
-  [[nodiscard]] bool is_ranked_by_features() const noexcept {
+  [[nodiscard]] bool should_rank_by_features() const noexcept {
     return features_ && rank_by_features_;
   }
 

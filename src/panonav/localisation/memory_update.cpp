@@ -19,7 +19,8 @@ constexpr double min_sure_probability = 0.9;
 /// Longest travel between an image and its witness, in spacings; over this length odometry errs by
 /// 0.4 spacings.
 constexpr double max_witness_travel_spacings = 8.0;
-/// Largest number of witnesses before an image, and after it.
+/// At most this many earlier images, and as many later ones, are witnesses for the pose of an image
+/// (`find_witnessed_pose`).
 constexpr std::size_t max_witnesses = 64;
 /// A reference explains a view if their similarity is at least this share of the expected one.
 constexpr double min_explained_share = 0.5;
@@ -135,7 +136,7 @@ void MemoryUpdate::decide_image(std::size_t index) {
     const ColumnMatch match = match_columns(profiles, ranking_->profiles(view));
     const double turn_rad =
         angle_difference(*reference.heading_rad + match.heading_rad, pose->heading_rad);
-    const double similarity = std::abs(turn_rad) <= agreeing_heading_tolerance_rad
+    const double similarity = std::abs(turn_rad) <= heading_agreement_tolerance_rad
                                   ? max_similarity - match.difference * match.difference
                                   : 0.0;
     if (similarity >= min_explained_share * max_similarity * std::exp(-off_m / use_.range_m)) {

@@ -33,7 +33,7 @@ constexpr double min_far_spacings = 6.0;
 constexpr std::size_t max_fitted_sites = 48;
 constexpr double max_fitted_spacings = 4.0;
 /// Largest distance of neighbours on a grid in spacings, diagonal ones included.
-constexpr double adjacent_site_spacings = 1.5;
+constexpr double max_adjacent_spacings = 1.5;
 /// Limits of the similarity range in spacings. With a shorter range, neighbours would have nothing
 /// in common; with a longer one, no decay is measurable over four spacings.
 constexpr double min_range_spacings = 0.4;
@@ -226,7 +226,7 @@ class LearningSample {
         if (distance_m > max_fitted_spacings * spacing_m_) break;
         const ColumnMatch& match = left_out_[i].match(s);
         curve.emplace_back(distance_m, to_similarity(match, model.far_difference));
-        if (distance_m <= adjacent_site_spacings * spacing_m_ && here.pose.heading_rad &&
+        if (distance_m <= max_adjacent_spacings * spacing_m_ && here.pose.heading_rad &&
             sites_[s].pose.heading_rad) {
           heading_errors.push_back(std::abs(angle_difference(
               *sites_[s].pose.heading_rad + match.heading_rad, *here.pose.heading_rad)));
@@ -250,9 +250,9 @@ class LearningSample {
     near_sites_.resize(sites_.size());
     std::vector<Explained> explained;
     for (std::size_t i = 0; i < own_.size(); ++i) {
-      Explained view{explained_at(i, own_[i], model)};
+      Explained view{compute_explained_similarity(i, own_[i], model)};
       for (const std::uint32_t c : candidates_) {
-        if (c != own_[i]) view.push_back(explained_at(i, c, model));
+        if (c != own_[i]) view.push_back(compute_explained_similarity(i, c, model));
       }
       explained.push_back(std::move(view));
     }
@@ -260,7 +260,8 @@ class LearningSample {
   }
 
  private:
-  double explained_at(std::size_t i, std::uint32_t where, const ObservationModel& model) {
+  double compute_explained_similarity(std::size_t i, std::uint32_t where,
+                                      const ObservationModel& model) {
     if (near_sites_[where].empty()) {
       near_sites_[where] = find_nearest_sites(sites_, where, near_site_count);
       near_sites_[where].insert(near_sites_[where].begin(), where);

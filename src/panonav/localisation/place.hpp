@@ -30,7 +30,7 @@ struct PlaceEvidence {
   double difference_of_all_columns = 1.0;  ///< smallest difference of a match over all columns
   /// Difference of the tenth best match. It is hardly larger than `difference` if the place is
   /// unknown, as many views then fit equally badly.
-  double tenth_difference = 1.0;
+  double tenth_best_difference = 1.0;
   /// Difference reached by chance: mean minus 1.28 standard deviations (the 10 % quantile of a
   /// Gaussian) of the mirrored query's differences to sampled views. The mirrored query has the
   /// same brightness, edges and textures but shows no place of the memory.

@@ -122,7 +122,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
   std::vector<double> between;
   std::vector<double> nearest;
   std::vector<double> nearest_of_mirrored;
-  std::vector<double> nearest_view_difference;
+  std::vector<double> nearest_view_differences;
   for (const ViewId view : sample) {
     const ColumnProfiles own = ranking.profiles(view);
     const ColumnProfiles reversed(mirror(memory.packed(view)), ranking.components());
@@ -137,7 +137,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
     }
     nearest.push_back(best);
     if (const auto neighbour = find_nearest_in_space(memory, view)) {
-      nearest_view_difference.push_back(
+      nearest_view_differences.push_back(
           match_columns(own, ranking.profiles(*neighbour)).difference);
     }
     nearest_of_mirrored.push_back(best_of_mirrored);
@@ -147,8 +147,8 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
   model.mirrored_difference = quantile(nearest_of_mirrored, 0.5);
   double min_threshold = std::min(PlaceModel::related_share * model.arbitrary_difference,
                                   PlaceModel::unrelated_difference);
-  if (nearest_view_difference.size() >= static_cast<std::size_t>(PlaceModel::min_views)) {
-    model.nearest_view_difference = quantile(nearest_view_difference, 0.9);
+  if (nearest_view_differences.size() >= static_cast<std::size_t>(PlaceModel::min_views)) {
+    model.nearest_view_difference = quantile(nearest_view_differences, 0.9);
     min_threshold = std::min(min_threshold, *model.nearest_view_difference);
   }
   model.threshold =
@@ -169,7 +169,7 @@ std::array<double, column_term_count> column_terms(const PlaceEvidence& evidence
   return {
       1.0,
       std::log(difference / std::max(evidence.chance, min_difference)),
-      std::log(difference / std::max(evidence.tenth_difference, min_difference)),
+      std::log(difference / std::max(evidence.tenth_best_difference, min_difference)),
       std::log(std::clamp(evidence.views, min_views, max_views)),
       std::log(std::max(evidence.difference_of_all_columns, large_difference) / large_difference),
       std::log(std::clamp(evidence.components, 1, max_components) / double{max_components})};
@@ -223,9 +223,9 @@ ColumnProfiles PlaceCriterion::profiles(ViewId view,
              : ColumnProfiles(ranking_->memory().packed(view), 0, allowed_rows);
 }
 
-double PlaceCriterion::chance_difference(const PackedSignature& query,
-                                         const ColumnProfiles& query_profiles,
-                                         const SearchMask& mask) const {
+double PlaceCriterion::max_chance_difference(const PackedSignature& query,
+                                             const ColumnProfiles& query_profiles,
+                                             const SearchMask& mask) const {
   // An image without structure matches any other image without structure, so it gives no evidence.
   const auto is_flat = [](std::uint8_t value) { return value == 128; };
   if (std::ranges::all_of(query_profiles.values(), is_flat)) return 0.0;
@@ -271,8 +271,8 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
     differences.push_back(better_half_difference(query_profiles, reference, turned.heading_rad));
   }
   found.difference = *std::ranges::min_element(differences);
-  found.tenth_difference = tenth_smallest(std::move(differences));
-  found.chance = chance_difference(query, query_profiles, mask);
+  found.tenth_best_difference = tenth_smallest(std::move(differences));
+  found.chance = max_chance_difference(query, query_profiles, mask);
   return found;
 }
 
@@ -330,8 +330,8 @@ PlaceEvidence PlaceCriterion::evidence_for_first(
     differences.push_back(better_half_difference(query_profiles, reference, turned.heading_rad));
   }
   found.difference = differences.front();
-  found.tenth_difference = tenth_smallest(std::move(differences));
-  found.chance = chance_difference(query, query_profiles, {});
+  found.tenth_best_difference = tenth_smallest(std::move(differences));
+  found.chance = max_chance_difference(query, query_profiles, {});
   return found;
 }
 

@@ -128,9 +128,9 @@ class PlaceCriterion {
   [[nodiscard]] ColumnProfiles profiles(ViewId view,
                                         std::span<const std::uint8_t> allowed_rows) const;
   /// Returns `PlaceEvidence::chance`; 0 for a query without structure.
-  [[nodiscard]] double chance_difference(const PackedSignature& query,
-                                         const ColumnProfiles& query_profiles,
-                                         const SearchMask& mask) const;
+  [[nodiscard]] double max_chance_difference(const PackedSignature& query,
+                                             const ColumnProfiles& query_profiles,
+                                             const SearchMask& mask) const;
 
   const ColumnRanking* ranking_ = nullptr;  // null: the memory is not held in RAM
   int views_ = 0;  // size of the memory at construction; 0: the ranking's memory

@@ -169,7 +169,7 @@ class Arranger {
     measure(proposals_);
     const double unit = lattice_.errors.phase_unit;
     auto grown = grow_components(size(), measured_.springs(), unit, layout_, step_callback_);
-    layout_ = std::move(grown.start);
+    layout_ = std::move(grown.layout);
     proposals_ = std::move(grown.proposals);
     lattice_.energy = grown.energy;
     lattice_.iterations += grown.iterations;
@@ -346,7 +346,8 @@ void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor) {
 CoarseMotion make_coarse_motion(ViewId from, ViewId to, const Pose2& step,
                                 const CoarseMotionOptions& options) {
   validate(options);
-  // A robot that turns on the spot still has deviations above 0.
+  // The standard deviation of the distance is a share of the travel. This minimum keeps it above 0
+  // when the robot turns on the spot.
   constexpr double min_travel_m = 0.01;
   const double travel_m = std::max(min_travel_m, std::hypot(step.x_m, step.y_m));
   return {.from = from,

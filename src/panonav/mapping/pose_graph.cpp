@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t unknowns = 3;  // x, y, heading of each node
 
-void check(std::span<const Pose2> nodes, std::span<const PoseEdge> edges) {
+void validate_graph(std::span<const Pose2> nodes, std::span<const PoseEdge> edges) {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (!is_finite(nodes[i])) {
       throw ContractError("node " + std::to_string(i), "not finite", "a finite pose");
@@ -61,17 +61,17 @@ double squared_norm(const EdgeError& error) {
 /// fixed one.
 std::vector<std::uint8_t> choose_fixed_nodes(std::size_t nodes, std::span<const PoseEdge> edges,
                                              std::span<const std::uint8_t> fixed) {
-  std::vector<std::uint8_t> held(nodes, 0);
-  std::ranges::copy(fixed, held.begin());
+  std::vector<std::uint8_t> all_fixed(nodes, 0);
+  std::ranges::copy(fixed, all_fixed.begin());
   const auto components = connected_components(nodes, edges);
-  std::vector<std::uint8_t> is_held(nodes, 0);  // by component
-  for (std::size_t i = 0; i < nodes; ++i) is_held[components[i]] |= held[i];
+  std::vector<std::uint8_t> has_fixed_node(nodes, 0);  // by component
+  for (std::size_t i = 0; i < nodes; ++i) has_fixed_node[components[i]] |= all_fixed[i];
   for (std::size_t i = 0; i < nodes; ++i) {
-    if (is_held[components[i]] != 0) continue;
-    held[i] = 1;
-    is_held[components[i]] = 1;
+    if (has_fixed_node[components[i]] != 0) continue;
+    all_fixed[i] = 1;
+    has_fixed_node[components[i]] = 1;
   }
-  return held;
+  return all_fixed;
 }
 
 /// The graph as a problem for `minimise`. Each step narrows the loss of doubtful edges (graduated
@@ -95,8 +95,8 @@ class Graph {
     equations.reset(static_cast<int>(nodes_.size() * unknowns));
     for (std::size_t i = 0; i < nodes_.size() * unknowns; ++i) {
       // A small diagonal entry keeps nodes in place whose edges have almost no weight.
-      const double held = fixed_[i / unknowns] != 0 ? 1.0 : 1e-9;
-      equations.add(static_cast<int>(i), static_cast<int>(i), held);
+      const double diagonal = fixed_[i / unknowns] != 0 ? 1.0 : 1e-9;
+      equations.add(static_cast<int>(i), static_cast<int>(i), diagonal);
     }
     for (std::size_t i = 0; i < edges_.size(); ++i) add_edge(i, equations);
     for (std::size_t i = 0; i < nodes_.size() * unknowns; ++i) {
@@ -233,7 +233,7 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
                                     const PoseGraphOptions& options,
                                     std::span<const std::uint8_t> fixed) {
   validate(options);
-  check(nodes, edges);
+  validate_graph(nodes, edges);
   require(fixed.empty() || fixed.size() == nodes.size(), "entries of fixed",
           static_cast<double>(fixed.size()), "none, or as many as nodes");
   PoseGraphReport report;

@@ -21,8 +21,8 @@ constexpr double match_heading_deviation_rad = 0.05;
 /// per metre (m/m, rad/m), and both at length 0 (m, rad). The first two are a quarter and a
 /// half of those of a single step (`MappingOptions`), as steps and closures around have corrected
 /// it.
-constexpr double edge_position_deviation = 0.02;
-constexpr double edge_turn_deviation = 0.01;
+constexpr double edge_position_deviation_per_m = 0.02;
+constexpr double edge_heading_deviation_rad_per_m = 0.01;
 constexpr double min_edge_position_deviation_m = 0.005;
 constexpr double min_edge_heading_deviation_rad = 0.003;
 
@@ -285,8 +285,9 @@ TopologicalMap join_sessions(const TopologicalMap& first, const TopologicalMap& 
       const Pose2 motion = inverse(pose_of(edge.a)) * pose_of(edge.b);
       edges.push_back(
           {number(edge.a), number(edge.b), motion,
-           edge_position_deviation * translation_m(motion) + min_edge_position_deviation_m,
-           edge_turn_deviation * translation_m(motion) + min_edge_heading_deviation_rad});
+           edge_position_deviation_per_m * translation_m(motion) + min_edge_position_deviation_m,
+           edge_heading_deviation_rad_per_m * translation_m(motion) +
+               min_edge_heading_deviation_rad});
       joined.edges.push_back(edge);
     }
   };

@@ -20,11 +20,11 @@ constexpr double min_position_deviation_m = 0.005;
 constexpr double min_heading_deviation_rad = 0.003;
 /// Standard deviation of the position by a closure: per unit of its residual, in units of R, as
 /// residuals shorten the displacement between views; and in metres without a residual.
-constexpr double closure_deviation = 1.0;
+constexpr double closure_deviation_per_residual = 1.0;
 constexpr double closure_position_deviation_m = 0.02;
 /// Standard deviation of the heading by a closure: in rad per metre between the views, and in rad
 /// for views at one place.
-constexpr double closure_turn_deviation = 0.05;
+constexpr double closure_heading_deviation_rad_per_m = 0.05;
 constexpr double closure_heading_deviation_rad = 0.01;
 /// Number of latest steps from which scale and turn error of the views are learnt; both change from
 /// room to room. 10 to 40 give the same result (docs/decisions.md).
@@ -221,8 +221,9 @@ class TopologicalMapper::Implementation {
       const double length_m = length(closure.earlier_from_later);
       edges_.push_back(
           {closure.earlier, closure.later, closure.earlier_from_later,
-           closure_deviation * closure.residual * scale_m + closure_position_deviation_m,
-           closure_turn_deviation * length_m + closure_heading_deviation_rad, true});
+           closure_deviation_per_residual * closure.residual * scale_m +
+               closure_position_deviation_m,
+           closure_heading_deviation_rad_per_m * length_m + closure_heading_deviation_rad, true});
       weights_.push_back(1.0);
     }
     if (update.closures.empty()) return;

@@ -113,7 +113,7 @@ class VisualMemory {
   /// exists already, or info that `validate` (reference_validation.hpp) rejects; the memory is then
   /// unchanged.
   ViewId append(const PackedSignature& signature, ReferenceInfo info);
-  /// Packs with the memory's full scale, then appends.
+  /// Packs the signature (a magnitude of `full_scale()` becomes 255) and appends it as above.
   ViewId append(const FourierSignature& signature, ReferenceInfo info);
   /// Appends a view with this id, which must be larger than all earlier ids; for readers of files.
   void append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info);

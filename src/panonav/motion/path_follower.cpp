@@ -26,12 +26,12 @@ PathFollower::PathFollower(std::span<const Point2> path, const PathFollowerOptio
     : options_(options), path_(path.begin(), path.end()) {
   validate(options);
   if (path.size() < 2) {
-    throw ContractError("places of the path", static_cast<double>(path.size()), "2 or more");
+    throw ContractError("points of the path", static_cast<double>(path.size()), "2 or more");
   }
   path_length_to_point_m_.push_back(0.0);
   for (std::size_t i = 0; i < path.size(); ++i) {
     if (!std::isfinite(path[i].x_m) || !std::isfinite(path[i].y_m)) {
-      throw ContractError("place of the path", "not finite", "finite numbers");
+      throw ContractError("point of the path", "not finite", "finite numbers");
     }
     if (i > 0)
       path_length_to_point_m_.push_back(path_length_to_point_m_.back() +
@@ -114,9 +114,9 @@ std::optional<Point2> PathFollower::next_target(Point2 robot) {
   advance_to_nearest(robot);
   // A robot within `arrived_m` of the end has also arrived if its position on the path is almost at
   // the end.
-  const double left_m = length_m() - along_m_;
+  const double remaining_m = length_m() - along_m_;
   const bool near = distance(robot, path_.back()) <= options_.arrived_m;
-  if (left_m <= 1e-9 || (near && left_m <= options_.look_ahead_m)) return std::nullopt;
+  if (remaining_m <= 1e-9 || (near && remaining_m <= options_.look_ahead_m)) return std::nullopt;
   return find_target();
 }
 

@@ -32,7 +32,7 @@ void require_valid(const NavigationGraph::Edge& edge) {
 /// half of the quarter rotation after which rooms look similar.
 constexpr float max_heading_error_rad = 0.5F;
 
-bool motions_agree(const Pose2& a, const Pose2& b) {
+bool is_similar_motion(const Pose2& a, const Pose2& b) {
   const double turned = angle_difference(a.heading_rad, b.heading_rad);
   const double aside = angle_difference(std::atan2(a.y_m, a.x_m), std::atan2(b.y_m, b.x_m));
   return std::abs(turned) <= max_disagreement_rad && std::abs(aside) <= max_disagreement_rad;
@@ -55,7 +55,7 @@ bool is_supported(const NavigationGraph& graph, const NavigationGraph::Edge& edg
     const auto c_from_b = graph.motion_from(first.node, second->edge);
     if (!a_from_c || !c_from_b) continue;
     ++readable;
-    closed += static_cast<int>(motions_agree(*edge.a_from_b, *a_from_c * *c_from_b));
+    closed += static_cast<int>(is_similar_motion(*edge.a_from_b, *a_from_c * *c_from_b));
   }
   return triangles == 0 || 2 * closed > readable;
 }

@@ -23,10 +23,10 @@ constexpr double max_correction_rad = std::numbers::pi / 3.0;
 /// A detour by a larger angle is not counted as an attempt at the edge ahead, as it advances along
 /// the edge by half a step or less.
 constexpr double max_attempt_detour_rad = 1.0;
-/// Length, in typical edge lengths, from which an edge is followed to its end, because no
-/// references are along it.
+/// Length, in median edge lengths, from which an edge is followed to its end, because no references
+/// are along it.
 constexpr double min_long_edge_factor = 2.0;
-/// Number of steps per typical edge length: `step_m` is about half of that length.
+/// Number of steps per median edge length: `step_m` is about half of that length.
 constexpr double steps_per_edge_length = 2.0;
 /// Smallest number of components from which a home vector can be computed.
 constexpr int min_components = 3;
@@ -314,7 +314,7 @@ bool Navigator::Core::follow_route(Step& step) {
 // [M04 section 3.5]
 void Navigator::Core::decide(Step& step) {
   locate(step);
-  if (state == NavigationDecision::State::moving) update_progress(step);
+  if (state == NavigationDecision::State::moving) block_failed_edges(step);
   if (state == NavigationDecision::State::moving && !guide().is_reachable() &&
       !relocalise_with_path(step)) {
     unblock_edges_or_end(step, NavigationDecision::State::unreachable);
@@ -399,7 +399,7 @@ std::string describe(const NavigationDecision& decision) {
   }
   if (decision.next) line += " to view " + std::to_string(decision.next->value);
   line += " in area " + std::to_string(decision.area);
-  line += ", way left " + to_general_text(decision.path_length, 4) + ", difference " +
+  line += ", path left " + to_general_text(decision.path_length, 4) + ", difference " +
           to_fixed_text(decision.difference, 3);
   if (decision.advance_m > 0.0) {
     const char* how = decision.homing ? "home" : decision.on_route ? "along a route" : "go";

@@ -24,12 +24,12 @@ void interpolate_gap(std::span<float> row, int from, int length) {
 void fill_hidden_in_row(std::span<float> row, std::span<const std::uint8_t> hidden,
                         float mean_value) {
   const int columns = static_cast<int>(row.size());
-  const auto seen = std::ranges::find(hidden, std::uint8_t{0});
-  if (seen == hidden.end()) {
+  const auto visible = std::ranges::find(hidden, std::uint8_t{0});
+  if (visible == hidden.end()) {
     std::ranges::fill(row, mean_value);
     return;
   }
-  const int first_visible = static_cast<int>(seen - hidden.begin());
+  const int first_visible = static_cast<int>(visible - hidden.begin());
   int from = first_visible;
   for (int i = 1; i <= columns; ++i) {
     if (hidden[static_cast<std::size_t>((first_visible + i) % columns)] != 0) continue;
@@ -42,19 +42,19 @@ void fill_hidden_in_row(std::span<float> row, std::span<const std::uint8_t> hidd
 
 std::vector<std::uint8_t> find_hidden_values(ImageView mask, const Unwarper& unwarper) {
   require(mask.channels == 1, "channels of the mask", mask.channels, "1");
-  Image seen(mask.width, mask.height);
+  Image visible_mask(mask.width, mask.height);
   for (int v = 0; v < mask.height; ++v) {
     for (int u = 0; u < mask.width; ++u) {
-      seen.at(u, v) = mask.data[v * mask.stride + u] == 0 ? 0 : 255;
+      visible_mask.at(u, v) = mask.data[v * mask.stride + u] == 0 ? 0 : 255;
     }
   }
-  const Panorama visible_share = unwarper.unwrap(seen.view());
+  const Panorama visible_share = unwarper.unwrap(visible_mask.view());
   std::vector<std::uint8_t> hidden;
   hidden.reserve(visible_share.values().size());
   // The unwarper scales the brighter of two lenses down to the darker one, so a white image does
   // not become 1 everywhere; compare with its values.
-  std::ranges::fill(seen.pixels(), std::uint8_t{255});
-  const Panorama all = unwarper.unwrap(seen.view());
+  std::ranges::fill(visible_mask.pixels(), std::uint8_t{255});
+  const Panorama all = unwarper.unwrap(visible_mask.view());
   // A value is hidden if masked pixels have more than 0.1 % of its weight, less than half a grey
   // level.
   for (std::size_t i = 0; i < all.values().size(); ++i) {
@@ -71,14 +71,14 @@ void fill_hidden_values(Panorama& panorama, std::span<const std::uint8_t> hidden
   require(hidden.size() == values.size(), "number of entries of hidden",
           static_cast<double>(hidden.size()), std::to_string(values.size()));
   double sum = 0.0;
-  std::size_t seen = 0;
+  std::size_t visible_count = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (hidden[i] != 0) continue;
     sum += static_cast<double>(values[i]);
-    ++seen;
+    ++visible_count;
   }
-  require(seen > 0, "number of seen values", 0.0, "1 or more");
-  const auto mean = static_cast<float>(sum / static_cast<double>(seen));
+  require(visible_count > 0, "number of visible values", 0.0, "1 or more");
+  const auto mean = static_cast<float>(sum / static_cast<double>(visible_count));
   const auto columns = static_cast<std::size_t>(panorama.columns());
   for (std::size_t at = 0; at < values.size(); at += columns) {
     fill_hidden_in_row(values.subspan(at, columns), hidden.subspan(at, columns), mean);

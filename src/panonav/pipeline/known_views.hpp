@@ -16,9 +16,9 @@ namespace panonav {
 /// recordings with the same file names are not mixed. Compares the poses and stamps of all such
 /// (known) views. Also compares their images, unless names, poses, sizes and modification times of
 /// all files equal those of a recording memorised before. Throws FileError at the first view that
-/// differs or whose image cannot be read. Cost: reading size and time of each file; for a changed
-/// or copied recording, encoding the known views. `compared` receives the number of images compared
-/// since its last call.
+/// differs or whose image cannot be read. Cost: a query of the size and modification time of each
+/// file; for a changed or copied recording, encoding the known views. `compared` receives the
+/// number of images compared since its last call.
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
                        const std::function<void(std::size_t)>& compared = {});

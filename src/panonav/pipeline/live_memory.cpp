@@ -24,7 +24,7 @@ namespace panonav {
 namespace {
 
 /// True if the file has views. A writer that was killed may have left a file without any.
-bool holds_views(Memoriser& memoriser) {
+bool has_stored_views(Memoriser& memoriser) {
   return memoriser.file() != nullptr && !memoriser.file()->views().empty();
 }
 
@@ -33,7 +33,7 @@ class ViewStorer {
  public:
   /// `has_views`: the memory holds views already.
   ViewStorer(Memoriser& memoriser, bool has_views)
-      : memoriser_(memoriser), has_views_(has_views), thread_([this] { work(); }) {}
+      : memoriser_(memoriser), has_views_(has_views), thread_([this] { store_until_finished(); }) {}
   ~ViewStorer() { join(); }
   ViewStorer(const ViewStorer&) = delete;
   ViewStorer& operator=(const ViewStorer&) = delete;
@@ -68,7 +68,7 @@ class ViewStorer {
     changed_.notify_one();
     if (thread_.joinable()) thread_.join();
   }
-  void work() {
+  void store_until_finished() {
     lower_thread_priority();
     std::unique_lock lock(mutex_);
     while (true) {
@@ -80,7 +80,7 @@ class ViewStorer {
       std::exception_ptr failure;
       try {
         memoriser_.add(std::move(next));
-        has_views = has_views || holds_views(memoriser_);
+        has_views = has_views || has_stored_views(memoriser_);
       } catch (...) {
         failure = std::current_exception();
       }
@@ -128,7 +128,7 @@ struct LiveMemory::Implementation {
     if (options.update && exists && (!options.add || can_be_updated())) {
       updater.emplace(path, options.update_options);
     }
-    if (exists && (!options.add || holds_views(*memoriser))) recogniser = make_recogniser();
+    if (exists && (!options.add || has_stored_views(*memoriser))) recogniser = make_recogniser();
     if (memoriser && !options.in_step) {
       storer.emplace(*memoriser, recogniser != nullptr);  // now only `storer` uses the file
     }
@@ -151,7 +151,7 @@ struct LiveMemory::Implementation {
 
   /// Starts learning from all views on another thread when at least 16 and a fifth of them are new.
   /// Until the new models are ready, the earlier ones are used.
-  void refresh_recogniser() {
+  void refresh_recogniser_if_needed() {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;
     const bool due = !recogniser || added.size() >= std::max(min_new, views / 5);
@@ -170,7 +170,9 @@ struct LiveMemory::Implementation {
     for (const auto& [info, signature] : added) recogniser->append(info, signature);
   }
 
-  [[nodiscard]] bool has_views() { return storer ? storer->has_views() : holds_views(*memoriser); }
+  [[nodiscard]] bool has_views() {
+    return storer ? storer->has_views() : has_stored_views(*memoriser);
+  }
 
   std::filesystem::path path;
   LiveMemoryOptions options;
@@ -195,7 +197,7 @@ LiveMemory& LiveMemory::operator=(LiveMemory&&) noexcept = default;
 
 LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   auto& self = *implementation_;
-  if (self.options.add) self.refresh_recogniser();
+  if (self.options.add) self.refresh_recogniser_if_needed();
   Answer answer;
   self.panorama.reset();
   if (self.recogniser) {

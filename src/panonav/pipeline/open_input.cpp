@@ -180,7 +180,7 @@ Dataset open_pictures(const fs::path& path, const InputOptions& options) {
   } else if (options.recursive) {
     throw OptionError(path.string() +
                       " is one image; the option recursive can only be used with a folder");
-  } else if (options.selection.selects_by_time() || options.selection.every > 1) {
+  } else if (options.selection.has_time_selection() || options.selection.every > 1) {
     throw OptionError(
         path.string() +
         " is one image; 'from_s', 'to_s' and the option every can only be used with a recording");

@@ -53,10 +53,10 @@ class ObservationQuery {
 };
 
 void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& header,
-                   bool is_held) {
+                   bool is_memory_held) {
   validate(options.localiser);
   const int max_components = header.shape.components;
-  if (options.areas && !is_held) {
+  if (options.areas && !is_memory_held) {
     throw ContractError("areas", "asked for",
                         "none in a memory that is not held: they take the positions of all views");
   }
@@ -201,7 +201,7 @@ Place PlaceRecogniser::localise(const Observation& observation,
   const Implementation& own = *implementation_;
   const std::shared_ptr<const Localiser> localiser = own.localiser();
   ObservationQuery query(own.encoder, observation);
-  const PackedSignature signature = query.signature(localiser->is_ranked_by_features());
+  const PackedSignature signature = query.signature(localiser->should_rank_by_features());
   const std::unique_ptr<ViewIndex> index = own.index();
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
@@ -216,7 +216,7 @@ Place PlaceRecogniser::localise(const Observation& observation,
   return place;
 }
 
-bool PlaceRecogniser::is_held() const noexcept {
+bool PlaceRecogniser::is_memory_held() const noexcept {
   return implementation_->memory.has_value();
 }
 std::size_t PlaceRecogniser::size() const {

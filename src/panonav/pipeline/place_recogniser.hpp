@@ -71,8 +71,8 @@ class PlaceRecogniser {
   [[nodiscard]] Place localise(const Observation& observation,
                                std::span<const std::string> excluded_names = {}) const;
 
-  [[nodiscard]] bool is_held() const noexcept;  ///< False: the server is searched.
-  [[nodiscard]] std::size_t size() const;       ///< Returns the number of views that can be found.
+  [[nodiscard]] bool is_memory_held() const noexcept;  ///< False: the server is searched.
+  [[nodiscard]] std::size_t size() const;  ///< Returns the number of views that can be found.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Returns the encoder.
 
   /// Adds a view that can be found from now on, without changing the file or the models. No other

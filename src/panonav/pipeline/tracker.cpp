@@ -53,8 +53,8 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& m
 /// Returns the model of a memory that is not held. A small memory uses the current stored model or
 /// learns from all views. A large one uses the model stored last, else learns from a part of the
 /// views.
-ObservationModel find_model(const MemoryFile& file, const IndexedMemory& memory,
-                            const TrackerOptions& options) {
+ObservationModel load_or_learn_model(const MemoryFile& file, const IndexedMemory& memory,
+                                     const TrackerOptions& options) {
   const std::vector<ViewId> views = memory.views();
   const std::unique_ptr<ViewIndex> index = memory.index();
   const bool is_small = views.size() <= options.max_learnt_views;
@@ -76,7 +76,7 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const IndexedMemory& 
   validate(options.filter);
   try {
     return {[&memory] { return memory.index(); }, file.header().shape,
-            find_model(file, memory, options), options.filter, options.odometry};
+            load_or_learn_model(file, memory, options), options.filter, options.odometry};
   } catch (const ContractError& error) {  // too few views with positions, or all in one place
     throw FileError(file.path().string(), error.what());
   }
@@ -153,11 +153,11 @@ bool Tracker::refresh() {
   return true;
 }
 
-bool Tracker::is_held() const noexcept {
+bool Tracker::is_memory_held() const noexcept {
   return implementation_->memory.has_value();
 }
 const VisualMemory& Tracker::memory() const {
-  if (!is_held()) throw ContractError("memory", "not held", "one that is held");
+  if (!is_memory_held()) throw ContractError("memory", "not held", "one that is held");
   return *implementation_->memory;
 }
 std::unique_ptr<ViewIndex> Tracker::index() const {

@@ -71,8 +71,8 @@ class Tracker {
   bool refresh();
 
   /// True if all views are held in RAM.
-  [[nodiscard]] bool is_held() const noexcept;
-  /// Returns the held views. Throws ContractError if they are not held.
+  [[nodiscard]] bool is_memory_held() const noexcept;
+  /// Returns the views. Throws ContractError if they are not held in RAM (`is_memory_held`).
   [[nodiscard]] const VisualMemory& memory() const;
   /// Opens an index of the views for one query. Throws FileError if the server cannot be reached.
   [[nodiscard]] std::unique_ptr<ViewIndex> index() const;

@@ -344,10 +344,10 @@ void PairOfViews::move_current(const PairSolution& solution) {
 // Replaces the current view by the expected image at a displacement [S06 eq. 3].
 void PairOfViews::displace_current(const DisplacementStart& start) {
   const auto count = static_cast<std::size_t>(known_) + 1;
-  std::array<float, max_displaced_frequencies + 1> a{};
-  std::array<float, max_displaced_frequencies + 1> b{};
-  std::array<float, max_displaced_frequencies + 1> to_a{};
-  std::array<float, max_displaced_frequencies + 1> to_b{};
+  std::array<float, max_displaced_frequency + 1> a{};
+  std::array<float, max_displaced_frequency + 1> b{};
+  std::array<float, max_displaced_frequency + 1> to_a{};
+  std::array<float, max_displaced_frequency + 1> to_b{};
   for (std::size_t y = 0; y < rows_; ++y) {
     for (int k = 0; k <= known_; ++k) {
       a[static_cast<std::size_t>(k)] = c_.current_a(k)[y];

@@ -36,13 +36,13 @@ float refine_peak(const TurnCorrelation& correlation, float turn_rad,
   return turn;
 }
 
-struct Circle {
+struct CircleTable {
   std::array<float, max_points> cosine, sine;
 };
 
-const Circle& unit_circle() {
-  static const Circle made = [] {
-    Circle table{};
+const CircleTable& unit_circle() {
+  static const CircleTable made = [] {
+    CircleTable table{};
     for (int i = 0; i < max_points; ++i) {
       const double angle = 2.0 * std::numbers::pi * i / max_points;
       table.cosine[static_cast<std::size_t>(i)] = static_cast<float>(std::cos(angle));
@@ -99,7 +99,7 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
   std::size_t count = 16;
   while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
   const std::size_t stride = max_points / count;
-  const Circle& table = unit_circle();
+  const CircleTable& table = unit_circle();
   std::array<float, max_points> cosine, sine, real, imaginary;
   for (std::size_t i = 0; i < count; ++i) {
     cosine[i] = table.cosine[i * stride];

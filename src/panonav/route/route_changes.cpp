@@ -22,10 +22,10 @@ constexpr double max_deviations = 3.0;
 
 bool RouteChanges::update_nearest_line(Point2 position) {
   if (lines_.empty()) return true;
-  const auto off_m = [&](const Pose2& line) { return distance(line.position(), position); };
+  const auto distance_m = [&](const Pose2& line) { return distance(line.position(), position); };
   const auto nearest =
-      static_cast<std::size_t>(std::ranges::min_element(lines_, {}, off_m) - lines_.begin());
-  return std::exchange(line_, nearest) != nearest;
+      static_cast<std::size_t>(std::ranges::min_element(lines_, {}, distance_m) - lines_.begin());
+  return std::exchange(nearest_line_, nearest) != nearest;
 }
 
 std::vector<RouteChanges::AzimuthRange> RouteChanges::add(const RouteFix& fix) {
@@ -45,15 +45,17 @@ std::vector<RouteChanges::AzimuthRange> RouteChanges::add(const RouteFix& fix) {
     unexplained[sector] += value > limit ? 1 : 0;
   }
   // An object next to the route moves from sector to sector as the robot passes it.
-  const auto before = images_;
+  const auto before = unexplained_images_;
   const int increment = update_nearest_line(fix.pose.position()) ? 1 : 0;
   for (std::size_t s = 0; s < sectors; ++s) {
     const bool is_unexplained = all[s] > 0 && 2 * unexplained[s] >= all[s];
     const int so_far =
         std::max({before[(s + sectors - 1) % sectors], before[s], before[(s + 1) % sectors]});
-    images_[s] = is_unexplained ? std::max(1, so_far + increment) : 0;
+    unexplained_images_[s] = is_unexplained ? std::max(1, so_far + increment) : 0;
   }
-  const auto changed = [&](std::size_t s) { return images_[s % sectors] >= min_images; };
+  const auto changed = [&](std::size_t s) {
+    return unexplained_images_[s % sectors] >= min_images;
+  };
   std::vector<RouteChanges::AzimuthRange> ranges;
   for (std::size_t s = 0; s < sectors; ++s) {
     if (!changed(s) || changed(s + sectors - 1)) continue;

@@ -34,8 +34,8 @@ class RouteChanges {
   std::vector<AzimuthRange> add(const RouteFix& fix);
   /// Starts counting again, after an image without a fix.
   void reset() noexcept {
-    images_.fill(0);
-    line_.reset();
+    unexplained_images_.fill(0);
+    nearest_line_.reset();
   }
 
  private:
@@ -43,9 +43,9 @@ class RouteChanges {
   [[nodiscard]] bool update_nearest_line(Point2 position);
 
   std::array<int, sectors>
-      images_{};  // by direction in the world: number of successive unexplained ones
+      unexplained_images_{};  // by direction in the world: number of successive unexplained ones
   std::vector<Pose2> lines_;
-  std::optional<std::size_t> line_;  // nearest to the last image
+  std::optional<std::size_t> nearest_line_;  // nearest to the last image
 };
 
 }  // namespace panonav

@@ -85,9 +85,10 @@ class RouteLines::FitProblem {
         line_(smooth_line(line, level.sigma)),
         window_(window),
         pose_(pose),
-        settled_(&level == &route.levels_.back() ? 3e-4
-                                                 : 0.05 * typical_distance_m * level.sigma * 2.0 *
-                                                       std::numbers::pi / route.columns_) {}
+        settled_tolerance_(&level == &route.levels_.back()
+                               ? 3e-4
+                               : 0.05 * typical_distance_m * level.sigma * 2.0 * std::numbers::pi /
+                                     route.columns_) {}
 
   /// Returns the equations at the present pose.
   [[nodiscard]] std::optional<Linearised> compute_equations() {
@@ -106,7 +107,7 @@ class RouteLines::FitProblem {
     pose_.x_m += scale * change[0];
     pose_.y_m += scale * change[1];
     pose_.heading_rad = wrap_angle(pose_.heading_rad + scale * change[2]);
-    return length_m < settled_ && std::abs(change[2]) < settled_;
+    return length_m < settled_tolerance_ && std::abs(change[2]) < settled_tolerance_;
   }
 
  private:
@@ -115,7 +116,7 @@ class RouteLines::FitProblem {
   std::vector<float> line_;
   const Window& window_;
   Pose2& pose_;
-  double settled_;  // in metres and radians
+  double settled_tolerance_;  // in metres and radians
   std::vector<Term> terms_;
 };
 
@@ -254,11 +255,13 @@ bool RouteLines::Linearised::fit_gain_and_offset(const std::vector<Term>& terms)
 }
 
 void RouteLines::Linearised::estimate_noise(const std::vector<Term>& terms) {
-  std::vector<float> sizes;
-  sizes.reserve(terms.size());
-  for (const Term& term : terms) sizes.push_back(std::abs(static_cast<float>(residual(term))));
-  noise = std::max(min_noise,
-                   sigma_over_mad * static_cast<double>(upper_median_in_place(std::span(sizes))));
+  std::vector<float> absolute_residuals;
+  absolute_residuals.reserve(terms.size());
+  for (const Term& term : terms)
+    absolute_residuals.push_back(std::abs(static_cast<float>(residual(term))));
+  noise = std::max(
+      min_noise,
+      sigma_over_mad * static_cast<double>(upper_median_in_place(std::span(absolute_residuals))));
 }
 
 void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool robust) {

@@ -29,7 +29,7 @@ struct CrossSpectrum {
   [[nodiscard]] std::complex<double> term(int k) const { return {real[k], imaginary[k]}; }
 };
 
-int resolve_components(SignatureShape query, SignatureShape reference, int components) {
+int resolve_common_components(SignatureShape query, SignatureShape reference, int components) {
   require(query.rows == reference.rows, "rows of the query", query.rows,
           std::to_string(reference.rows) + " (as the reference)");
   const int common = std::min(query.components, reference.components);
@@ -59,7 +59,7 @@ inline SineCosine approximate_sine_cosine(float angle_rad) {
 
 std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
                                             const FourierSignature& reference, int components) {
-  components = resolve_components(query.shape(), reference.shape(), components);
+  components = resolve_common_components(query.shape(), reference.shape(), components);
   const auto rows = static_cast<std::size_t>(query.rows());
   CrossSpectrum spectrum(components);
   std::vector<float> cosines(rows);
@@ -99,7 +99,7 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
 
 std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
                                             const PackedSignature& reference, int components) {
-  components = resolve_components(query.shape, reference.shape, components);
+  components = resolve_common_components(query.shape, reference.shape, components);
   for (const PackedSignature* packed : {&query, &reference}) {
     require(packed->magnitudes.size() == packed->shape.size() &&
                 packed->phases.size() == packed->shape.size(),

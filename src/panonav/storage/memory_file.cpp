@@ -75,10 +75,10 @@ struct MemoryFile::Implementation {
   [[nodiscard]] VisualMemory make_empty_memory() const {
     return {header.shape, header.full_scale, header.elevations};
   }
-  /// Appends a row to a memory. Throws DamageError as `checked`, and for a row that repeats
+  /// Appends a row to a memory. Throws DamageError as `check_row`, and for a row that repeats
   /// another.
   void append_row(const ViewRow& row, VisualMemory& memory) {
-    const auto signature = tables->checked(row, header.shape, scratch).signature;
+    const auto signature = tables->check_row(row, header.shape, scratch).signature;
     unpack_signature(signature, header.shape, packed);
     try {
       memory.append_with_id(row.id, packed, row.info);
@@ -89,7 +89,7 @@ struct MemoryFile::Implementation {
   /// Appends a link to a memory, unless one of its views was left out. Throws as `append_row`.
   void append_link(const LinkRow& row, VisualMemory& memory) const {
     if (tables->is_left_out(row.a) || tables->is_left_out(row.b)) return;
-    const Link link = tables->checked(row);
+    const Link link = tables->check_row(row);
     if (!memory.contains(link.a) || !memory.contains(link.b)) tables->fail_link_without_view(link);
     memory.link(link);
   }
@@ -106,7 +106,7 @@ struct MemoryFile::Implementation {
       std::optional<ReferenceInfo> info;
       std::int64_t new_checksum = 0;
       tables->read_views(std::span(&view, 1), [&](const ViewRow& row) {
-        info = tables->checked(row, header.shape, scratch).info;
+        info = tables->check_row(row, header.shape, scratch).info;
         change(*info);
         new_checksum = view_checksum(scratch, view, *info, row.signature);
       });
@@ -191,7 +191,7 @@ void MemoryFile::change(const std::function<void()>& changes,
                         const std::optional<std::string>& undo) {
   implementation_->write([&](MemoryTables& tables) {
     if (undo) {
-      tables.run_with_undo(changes, *undo);
+      tables.run_undoably(changes, *undo);
     } else {
       changes();
     }
@@ -441,7 +441,7 @@ std::vector<Link> MemoryFile::links() const {
     std::vector<Link> links;
     tables.read_links([&](const LinkRow& row) {
       if (tables.is_left_out(row.a) || tables.is_left_out(row.b)) return;
-      tables.accept_row(std::nullopt, [&] { links.push_back(tables.checked(row)); });
+      tables.accept_row(std::nullopt, [&] { links.push_back(tables.check_row(row)); });
     });
     return links;
   });

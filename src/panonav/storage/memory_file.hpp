@@ -188,10 +188,11 @@ class MemoryFile {
   /// Returns the names, ascending.
   [[nodiscard]] std::vector<std::string> map_names() const;
 
-  /// Appends lines to the route of that name, which is created if it is missing; all of them or
-  /// none. First lines within a millimetre of the last stored line are skipped. Returns the
-  /// number of added lines. Throws ContractError on an empty name, no lines, or another number of
-  /// columns than the stored route's. Cost: that of the lines and of at most 256 more.
+  /// Appends the lines of `more` to the route of that name, which is created if it is missing. If
+  /// an error occurs, no line is appended. First lines within a millimetre of the last stored line
+  /// are skipped. Returns the number of added lines. Throws ContractError on an empty name, no
+  /// lines, or another number of columns than the stored route's. Cost: that of writing these lines
+  /// and at most 256 stored ones.
   std::size_t append_route(std::string_view name, const RoutePanorama& more);
   /// Returns exactly the lines that were appended; nullopt if there is no route of that name.
   [[nodiscard]] std::optional<RoutePanorama> route(std::string_view name) const;

@@ -138,7 +138,7 @@ class PostgresqlConnection {
 
 /// Appends a number in the byte order of PostgreSQL: most significant byte first.
 void append_big_endian(std::string& bytes, std::uint64_t value, int size);
-/// Reads a number of up to eight bytes.
+/// Reads an unsigned big-endian number that has up to eight bytes.
 [[nodiscard]] std::uint64_t read_big_endian(std::string_view bytes);
 
 /// Rows in COPY's binary form, for `copy_in`.

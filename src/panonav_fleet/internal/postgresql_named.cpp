@@ -96,8 +96,7 @@ std::vector<std::string> PostgresqlTables::list_routes_with_blocks() {
   return query_texts("SELECT DISTINCT route FROM panonav.route_blocks WHERE memory = $1");
 }
 
-void PostgresqlTables::run_with_undo(const std::function<void()>& changes,
-                                     const std::string& what) {
+void PostgresqlTables::run_undoably(const std::function<void()>& changes, const std::string& what) {
   run("DELETE FROM panonav.undo_rows WHERE memory = $1");
   connection_.execute("SELECT set_config('panonav.undo', 'on', true)");
   changes();

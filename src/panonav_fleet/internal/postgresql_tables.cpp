@@ -332,14 +332,15 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
   record_changed_area(info.pose);
 }
 
-void PostgresqlTables::read_views(const Consume<ViewRow>& consume) {
+void PostgresqlTables::read_views(const RowCallback<ViewRow>& consume) {
   connection_.stream("SELECT " + std::string(view_fields) +
                          " FROM panonav.views v WHERE v.memory = $1 ORDER BY v.id",
                      Values().add(memory_),
                      [&](const Rows& rows) { consume(read_view_row(rows)); });
 }
 
-void PostgresqlTables::read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) {
+void PostgresqlTables::read_views(std::span<const ViewId> views,
+                                  const RowCallback<ViewRow>& consume) {
   const auto numbers = to_numbers(views);
   connection_.stream("SELECT " + std::string(view_fields) +
                          ", w.id FROM unnest($2) WITH ORDINALITY w(id, place) LEFT JOIN "
@@ -354,7 +355,7 @@ void PostgresqlTables::read_views(std::span<const ViewId> views, const Consume<V
 }
 
 void PostgresqlTables::read_available_views(std::span<const ViewId> views,
-                                            const Consume<ViewRow>& consume) {
+                                            const RowCallback<ViewRow>& consume) {
   const auto numbers = to_numbers(views);
   connection_.stream("SELECT " + std::string(view_fields) +
                          " FROM panonav.views v WHERE v.memory = $1 AND v.id = ANY($2)",
@@ -364,7 +365,7 @@ void PostgresqlTables::read_available_views(std::span<const ViewId> views,
 
 // Reads by COPY, which is faster than a statement that returns rows.
 void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                                       const Consume<MagnitudesRow>& consume) {
+                                       const RowCallback<MagnitudesRow>& consume) {
   const std::string sql = "COPY (SELECT id, x_m, y_m, substr(signature, 1, " +
                           std::to_string(bytes) +
                           ") FROM panonav.views WHERE memory = " + std::to_string(memory_) +
@@ -483,7 +484,7 @@ void PostgresqlTables::erase_link(ViewId a, ViewId b) {
                   Values().add(memory_).add(std::int64_t{a.value}).add(std::int64_t{b.value}));
 }
 
-void PostgresqlTables::read_links(const Consume<LinkRow>& consume) {
+void PostgresqlTables::read_links(const RowCallback<LinkRow>& consume) {
   connection_.stream(
       "SELECT a, b, kind, checksum FROM panonav.links WHERE memory = $1 ORDER BY a, b",
       Values().add(memory_), [&](const Rows& rows) {

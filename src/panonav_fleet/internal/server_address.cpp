@@ -13,7 +13,7 @@ namespace {
 
 // False if libpq could take a part of an unescaped password for a host, port or database, which it
 // shows in its messages.
-bool has_escaped_password(std::string_view address) {
+bool has_unambiguous_credentials(std::string_view address) {
   const std::string_view rest = address.substr(address.find("://") + 3);
   const std::string_view authority = rest.substr(0, rest.find_first_of("/?#"));
   const std::size_t at = authority.rfind('@');
@@ -52,7 +52,7 @@ ServerAddress parse_server_address(const std::filesystem::path& memory) {
   const auto refuse = [&](const std::string& what) {
     throw FileError(address.printable.native(), what);
   };
-  if (!has_escaped_password(text)) {
+  if (!has_unambiguous_credentials(text)) {
     refuse(
         "its user and password are not written as in a URL, or its port is not a number; allowed: "
         "special characters as %40 for @ and %2F for /");

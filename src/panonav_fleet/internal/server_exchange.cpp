@@ -214,7 +214,7 @@ ServerLinks ServerExchange::read_links_in_blocks(const KeptAreas& areas,
     std::optional<std::pair<ViewId, ViewId>> ends;  // nullopt: ids that no view has
     const bool is_accepted = tables_.accept_row(std::nullopt, [&] {
       ends.emplace(read_view_id(rows, i, 0), read_view_id(rows, i, 1));
-      links.accepted.push_back(tables_.checked(
+      links.accepted.push_back(tables_.check_row(
           LinkRow{ends->first, ends->second, rows.integer(i, 2), rows.integer(i, 3)}));
     });
     if (!is_accepted && ends) links.left_out.insert(*ends);
@@ -239,7 +239,7 @@ FullServerView ServerExchange::read_full_view(const PostgresqlRows& rows, Signat
                                               RecordBytes& scratch) {
   const ServerView found = read_server_view(rows, 0);
   ViewRow row{found.id, found.info, rows.bytes(0, 7), found.checksum};
-  tables_.checked(row, shape, scratch);
+  tables_.check_row(row, shape, scratch);
   FullServerView whole{row.id, {std::move(row.info), {}, {}, {}}, row.checksum};
   unpack_signature(row.signature, shape, whole.view.signature);
   const auto read_attachment = [&](int column, ViewAttachment table,

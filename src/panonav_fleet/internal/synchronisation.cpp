@@ -150,7 +150,7 @@ std::optional<Synchronisation::LocalRow> Synchronisation::read_local_row(ViewId 
   if (!local_checksums_.contains(view)) return std::nullopt;
   LocalRow read;
   file_.read_views(std::span(&view, 1), [&](const ViewRow& found) {
-    const ViewRow& row = file_.checked(found, header_.shape, scratch_);
+    const ViewRow& row = file_.check_row(found, header_.shape, scratch_);
     read = {row.info, row.checksum, Bytes(row.signature.begin(), row.signature.end())};
   });
   return read;
@@ -189,7 +189,7 @@ std::uint32_t Synchronisation::read_last_view_id() {
 SynchronisedLinks Synchronisation::read_local_links() {
   SynchronisedLinks links;
   file_.read_links([&](const LinkRow& row) {
-    const Link link = file_.checked(row);
+    const Link link = file_.check_row(row);
     const auto a = synchronised_.find(link.a);
     const auto b = synchronised_.find(link.b);
     if (a == synchronised_.end() || b == synchronised_.end()) return;

@@ -43,7 +43,8 @@ class Synchronisation {
   /// Throws FileError if the file belongs to another memory, ContractError if its views cannot be
   /// compared with the server's.
   void match_with_server();
-  /// Loads the file's record of the server, and the checksums of its views.
+  /// Loads from the local file what it has stored about the views and links on the server, and the
+  /// checksums of the file's own views.
   void load_file_state();
   void set_row(ViewId view, const SynchronisedView& row);
   void drop_row(ViewId view);
@@ -87,7 +88,7 @@ class Synchronisation {
   /// Returns the server's views that have one of these names, by name.
   std::map<std::string, ServerView> find_server_views(const std::map<ViewId, std::string>& names);
   /// Records that the view is being sent, or that the server already has it as `same`.
-  void mark_as_sent(ViewId view, const LocalRow& row, const ServerView* same);
+  void mark_as_being_sent(ViewId view, const LocalRow& row, const ServerView* same);
   [[nodiscard]] bool is_synchronised_as(ViewId view, ViewId server_view) const;
   /// True if neither view has a counterpart on the other side yet and their signatures are the
   /// same.

@@ -76,7 +76,7 @@ std::map<std::string, ServerView> Synchronisation::find_server_views(
   return views;
 }
 
-void Synchronisation::mark_as_sent(ViewId view, const LocalRow& row, const ServerView* same) {
+void Synchronisation::mark_as_being_sent(ViewId view, const LocalRow& row, const ServerView* same) {
   const auto known = synchronised_.find(view);
   SynchronisedView next;
   if (known != synchronised_.end()) {
@@ -123,7 +123,7 @@ void Synchronisation::prepare_upload() {
       ++report_.renamed;
     }
     const auto same = server_views.find(name);
-    mark_as_sent(view, *row, same == server_views.end() ? nullptr : &same->second);
+    mark_as_being_sent(view, *row, same == server_views.end() ? nullptr : &same->second);
   }
   if (report_.renamed > 0) clear_recordings();
   store_and_commit(*writing);

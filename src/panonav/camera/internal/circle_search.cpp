@@ -71,7 +71,7 @@ class SectorScore {
     ++samples_[sector];
     ++visible_;
   }
-  [[nodiscard]] CircleScore result(int count, EdgeAveraging averaging) const {
+  [[nodiscard]] CircleScore score(int count, EdgeAveraging averaging) const {
     if (visible_ == 0) return {};
     const double visible = static_cast<double>(visible_) / count;
     if (averaging == EdgeAveraging::mean) {
@@ -79,13 +79,13 @@ class SectorScore {
               visible};
     }
     float roots = 0;
-    int seen = 0;
+    int visible_sectors = 0;
     for (std::size_t i = 0; i < sectors; ++i) {
       if (samples_[i] == 0) continue;
-      ++seen;
+      ++visible_sectors;
       if (sum_[i] > 0) roots += std::sqrt(sum_[i] / static_cast<float>(samples_[i]));
     }
-    const double mean_root = static_cast<double>(roots) / seen;
+    const double mean_root = static_cast<double>(roots) / visible_sectors;
     return {mean_root * mean_root, visible};
   }
 
@@ -108,7 +108,7 @@ double coarse_merit(const EdgeField& field, const std::array<Direction, coarse_d
     total.add(i, coarse_directions,
               field.cosine[at] * ray.double_cosine + field.sine[at] * ray.double_sine);
   }
-  return figure_of_merit(total.result(coarse_directions, range.averaging), range);
+  return figure_of_merit(total.score(coarse_directions, range.averaging), range);
 }
 
 /// Computes the merit of circles of one radius around all pixels at once: sums copies of the field
@@ -335,7 +335,7 @@ CircleScore score_circle(const EdgeField& field, const FieldCircle& circle,
               sample_bilinear(field, field.cosine, u, v) * across +
                   sample_bilinear(field, field.sine, u, v) * along);
   }
-  return total.result(count, averaging);
+  return total.score(count, averaging);
 }
 
 std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleRange& range,

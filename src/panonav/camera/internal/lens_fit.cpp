@@ -35,7 +35,7 @@ Vector2d residual(const std::vector<PosedLens>& lenses, const Match& match) {
 /// Returns the index, in the vector of unknowns, of a parameter of a point.
 int parameter_index(const ImagePoint& point, int parameter) {
   return parameter < lens_parameter_count
-             ? lens_at(point.lens) + parameter
+             ? lens_offset(point.lens) + parameter
              : rotation_offset(point.picture) + parameter - lens_parameter_count;
 }
 
@@ -187,9 +187,9 @@ void LensFit::solve(const std::vector<Match>& matches) {
 }
 
 bool LensFit::set_max_angles(const std::array<double, 2>& radii_px) {
-  const State now = state();
+  const State current_state = state();
   for (int i = 0; i < 2; ++i) {
-    FisheyeLens lens = now.lenses[i];
+    FisheyeLens lens = current_state.lenses[i];
     // Excludes the last percent of the radius, the blurred edge of the circle.
     const double end_px = 0.99 * radii_px[i];
     constexpr double step_rad = 0.02;
@@ -206,16 +206,16 @@ bool LensFit::set_max_angles(const std::array<double, 2>& radii_px) {
 }
 
 MatrixXd LensFit::covariance(const std::vector<Match>& matches) const {
-  const State now = state();
+  const State current_state = state();
   VectorXd right;
-  const MatrixXd inverse = compute_normal_equations(now, matches, right).inverse();
+  const MatrixXd inverse = compute_normal_equations(current_state, matches, right).inverse();
   const VectorXd prior_gradient = -prior_information_.cwiseProduct(current_.offset);
   MatrixXd spread = prior_information_.asDiagonal();
   for (int region = 0; region < regions; ++region) {
     std::vector<Match> part;
     std::ranges::copy_if(matches, std::back_inserter(part),
                          [&](const Match& match) { return match.region == region; });
-    static_cast<void>(compute_normal_equations(now, part, right));
+    static_cast<void>(compute_normal_equations(current_state, part, right));
     right -= prior_gradient;
     spread += right * right.transpose();
   }

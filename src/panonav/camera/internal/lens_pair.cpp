@@ -50,7 +50,7 @@ void add_to_parameter(RigRotation& rotation, int parameter, double change) {
 State apply_change(State state, const Eigen::VectorXd& change) {
   for (int lens = 0; lens < 2; ++lens) {
     for (int i = 0; i < lens_parameter_count; ++i)
-      add_to_parameter(state.lenses[lens], i, change[lens_at(lens) + i]);
+      add_to_parameter(state.lenses[lens], i, change[lens_offset(lens) + i]);
   }
   for (int p = 0; p < static_cast<int>(state.rotations.size()); ++p) {
     for (int i = 0; i < rotation_parameter_count; ++i)

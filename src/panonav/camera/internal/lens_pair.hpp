@@ -28,7 +28,7 @@ inline constexpr int rotation_parameter_count = 3;
 
 /// Returns the index of a lens's first parameter in the vector of unknowns, which begins with both
 /// lenses.
-[[nodiscard]] constexpr int lens_at(int lens) {
+[[nodiscard]] constexpr int lens_offset(int lens) {
   return lens * lens_parameter_count;
 }
 /// Returns the index of the first parameter of a picture's rotation.

@@ -87,7 +87,7 @@ Correlation correlate(const Patch& a, const Patch& b, int dx, int dy) {
 
 /// Computes a matrix that weights position errors: 1 across the patch's main edge direction, less
 /// along it. nullopt if the contrast is too low.
-std::optional<Eigen::Matrix2d> compute_whitener(const Patch& patch) {
+std::optional<Eigen::Matrix2d> compute_error_weights(const Patch& patch) {
   double n = 0, sum = 0, squares = 0;
   Eigen::Matrix2d tensor = Eigen::Matrix2d::Zero();
   for (int y = -patch_radius; y <= patch_radius; ++y) {
@@ -259,23 +259,25 @@ class PatchMatcher::Search {
   void add_match(int a, int b, Matching& found) {
     const auto pixel = views_[a].pixel(direction_.middle);
     if (!pixel || !views_[b].pixel(direction_.middle)) return;
-    const auto whitener = compute_whitener(get_or_create_area(a));
+    const auto whitener = compute_error_weights(get_or_create_search_area(a));
     if (!whitener) return;
-    const std::vector<Correlation> at = correlate_all_offsets(a, b);
-    const auto best =
-        static_cast<int>(std::ranges::max_element(at, {}, &Correlation::value) - at.begin());
-    if (at[best].value < -0.5) return;  // view b does not show the patch, or has no contrast there
+    const std::vector<Correlation> correlations = correlate_all_offsets(a, b);
+    const auto best = static_cast<int>(
+        std::ranges::max_element(correlations, {}, &Correlation::value) - correlations.begin());
+    if (correlations[best].value < -0.5)
+      return;  // view b does not show the patch, or has no contrast there
     ++found.textured_count;
     const int width = 2 * search_steps_ + 1;
     const int x = best % width;
     const int y = best / width;
-    if (at[best].value < min_correlation || x == 0 || y == 0 || x == width - 1 || y == width - 1) {
+    if (correlations[best].value < min_correlation || x == 0 || y == 0 || x == width - 1 ||
+        y == width - 1) {
       return;
     }
     const auto vertex = [&](int stride) {  // of the parabola through three values
-      const double low = at[best - stride].value;
-      const double high = at[best + stride].value;
-      const double bend = low + high - 2 * at[best].value;
+      const double low = correlations[best - stride].value;
+      const double high = correlations[best + stride].value;
+      const double bend = low + high - 2 * correlations[best].value;
       return bend < 0 ? std::clamp(0.5 * (low - high) / bend, -0.5, 0.5) : 0.0;
     };
     const auto& [middle, east, north, region] = direction_;
@@ -288,13 +290,13 @@ class PatchMatcher::Search {
                              north,
                              *whitener,
                              std::hypot(dx, dy),
-                             at[best].log_gain,
+                             correlations[best].log_gain,
                              region});
   }
 
  private:
   /// Returns the search area of a view, cut from the image at the first call.
-  [[nodiscard]] const Patch& get_or_create_area(int view) {
+  [[nodiscard]] const Patch& get_or_create_search_area(int view) {
     if (!search_areas_[view]) {
       search_areas_[view] = cut_patch(views_[view], direction_.middle, direction_.east,
                                       direction_.north, step_rad_, patch_radius + search_steps_);
@@ -304,13 +306,13 @@ class PatchMatcher::Search {
   /// Correlates the patch of view a with view b at every offset of the search window; the result is
   /// row-major.
   [[nodiscard]] std::vector<Correlation> correlate_all_offsets(int a, int b) {
-    std::vector<Correlation> at;
+    std::vector<Correlation> correlations;
     const int width = 2 * search_steps_ + 1;
     for (int i = 0; i < width * width; ++i) {
-      at.push_back(correlate(get_or_create_area(a), get_or_create_area(b),
-                             i % width - search_steps_, i / width - search_steps_));
+      correlations.push_back(correlate(get_or_create_search_area(a), get_or_create_search_area(b),
+                                       i % width - search_steps_, i / width - search_steps_));
     }
-    return at;
+    return correlations;
   }
 
   const std::vector<View>& views_;
@@ -333,8 +335,8 @@ Matching PatchMatcher::match(const State& state, double step_rad, int search_ste
   const auto directions_size = static_cast<std::size_t>(directions);
   std::vector<Matching> found(directions_size);
   executor_.for_each_chunk(directions_size, 1, [&](std::size_t begin, std::size_t, std::size_t) {
-    Search here(views, make_direction(begin, directions), step_rad, search_steps);
-    for (const auto& [a, b] : pairs) here.add_match(a, b, found[begin]);
+    Search search(views, make_direction(begin, directions), step_rad, search_steps);
+    for (const auto& [a, b] : pairs) search.add_match(a, b, found[begin]);
   });
   Matching all;
   for (Matching& part : found) {

@@ -69,7 +69,7 @@ void on_progress(j_common_ptr jpeg) {
   std::longjmp(reader->on_failure, 1);
 }
 
-bool open_steps(Reader& reader, const std::uint8_t* data, std::size_t size) {
+bool try_open(Reader& reader, const std::uint8_t* data, std::size_t size) {
   if (setjmp(reader.on_failure)) return false;
   jpeg_create_decompress(&reader.jpeg);
   reader.created = true;
@@ -135,7 +135,7 @@ ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_
   reader.errors.output_message = on_output;
   reader.progress.progress_monitor = on_progress;
   reader.jpeg.client_data = &reader;
-  if (!open_steps(reader, bytes.data(), bytes.size())) fail(reader, name);
+  if (!try_open(reader, bytes.data(), bytes.size())) fail(reader, name);
   const ImageSize size{static_cast<int>(reader.jpeg.image_width),
                        static_cast<int>(reader.jpeg.image_height)};
   check_image_size(size, name, limits);
@@ -164,7 +164,7 @@ struct Writer {
   std::longjmp(writer->on_failure, 1);
 }
 
-bool write_steps(Writer& writer, const ImageView& image, int quality) {
+bool try_write(Writer& writer, const ImageView& image, int quality) {
   if (setjmp(writer.on_failure)) return false;
   jpeg_create_compress(&writer.jpeg);
   jpeg_mem_dest(&writer.jpeg, &writer.bytes, &writer.size);
@@ -198,7 +198,7 @@ std::vector<std::uint8_t> encode_jpeg(ImageView image, int quality) {
   writer.errors.error_exit = on_write_error;
   writer.errors.output_message = on_output;
   writer.jpeg.client_data = &writer;
-  if (!write_steps(writer, image, quality)) {
+  if (!try_write(writer, image, quality)) {
     throw Error(std::string("cannot make a JPEG: ") + writer.message);
   }
   return {writer.bytes, writer.bytes + writer.size};

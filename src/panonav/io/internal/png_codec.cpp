@@ -46,7 +46,7 @@ void on_read(png_structp png, png_bytep to, png_size_t count) {
   reader->left -= count;
 }
 
-bool open_steps(Reader& reader, ImageSize& size) {
+bool try_open(Reader& reader, ImageSize& size) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   // Sizes are checked by the caller, which has a clearer message. Ancillary chunks must not take
   // much memory.
@@ -115,7 +115,7 @@ ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_
   reader.info = reader.png == nullptr ? nullptr : png_create_info_struct(reader.png);
   if (reader.info == nullptr) throw FileError(name, "cannot be read: out of memory");
   ImageSize size;
-  if (!open_steps(reader, size)) fail(reader, name);
+  if (!try_open(reader, size)) fail(reader, name);
   check_image_size(size, name, limits);
   return size;
 }
@@ -151,7 +151,7 @@ void on_write(png_structp png, png_bytep from, png_size_t count) {
 
 void on_flush(png_structp /*png*/) {}
 
-bool write_steps(Writer& writer, const ImageView& image) {
+bool try_write(Writer& writer, const ImageView& image) {
   if (setjmp(png_jmpbuf(writer.png))) return false;
   png_set_write_fn(writer.png, &writer, on_write, on_flush);
   // Level 3 takes a quarter of the time of level 6 and makes files a few percent larger.
@@ -203,7 +203,7 @@ std::vector<std::uint8_t> encode_png(ImageView image) {
   Writer writer;
   writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writer, on_write_error, on_warning);
   writer.info = writer.png == nullptr ? nullptr : png_create_info_struct(writer.png);
-  if (writer.info == nullptr || !write_steps(writer, image)) {
+  if (writer.info == nullptr || !try_write(writer, image)) {
     throw Error(std::string("cannot make a PNG: ") +
                 (writer.info == nullptr ? "out of memory" : writer.message));
   }

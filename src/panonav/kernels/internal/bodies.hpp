@@ -99,7 +99,7 @@ struct RowTransformBody {
 
 template <Instructions set>
 struct SimilarityBody {
-  static void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall,
+  static void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Decay& decay,
                                  const float* x_m, const float* y_m, const float* heading_rad,
                                  float* explained, int count);
   static void exponentials(const float* logarithms, float scale, float* values, int count);

@@ -22,7 +22,7 @@ inline float approximate_exp(float x, float min_exponent) {
   return series * power;
 }
 
-inline float wrap_angle(float angle_rad) {
+inline float wrap_angle_branchless(float angle_rad) {
   constexpr float turn_rad = 6.28318530717959F;
   const float turns = (angle_rad * (1.0F / turn_rad) + rounder) - rounder;
   return angle_rad - turn_rad * turns;
@@ -32,8 +32,8 @@ inline float wrap_angle(float angle_rad) {
 constexpr int poses_per_block = 16;
 
 inline void explain_similarity_lanes(const SimilarityLanes& lanes,
-                                     const SimilarityLanes::Fall& fall, const float* __restrict x_m,
-                                     const float* __restrict y_m,
+                                     const SimilarityLanes::Decay& decay,
+                                     const float* __restrict x_m, const float* __restrict y_m,
                                      const float* __restrict heading_rad,
                                      float* __restrict explained) {
   constexpr float min_exponent = -60.0F;  // squares stay normal numbers; denormal ones are slow
@@ -43,10 +43,10 @@ inline void explain_similarity_lanes(const SimilarityLanes& lanes,
     for (int p = 0; p < poses_per_block; ++p) {
       const float dx = lanes.x_m[i] - x_m[p];
       const float dy = lanes.y_m[i] - y_m[p];
-      const float apart = __builtin_sqrtf(dx * dx + dy * dy + fall.blur_square_m2);
-      const float expected = approximate_exp(-apart * fall.per_metre, min_exponent);
-      const float turn = wrap_angle(heading_rad[p] - lanes.heading_rad[i]);
-      const float other_turn = wrap_angle(heading_rad[p] - lanes.other_heading_rad[i]);
+      const float apart = __builtin_sqrtf(dx * dx + dy * dy + decay.blur_square_m2);
+      const float expected = approximate_exp(-apart * decay.per_metre, min_exponent);
+      const float turn = wrap_angle_branchless(heading_rad[p] - lanes.heading_rad[i]);
+      const float other_turn = wrap_angle_branchless(heading_rad[p] - lanes.other_heading_rad[i]);
       const float best_exponent = lanes.log_similarity[i] + turn * turn * lanes.per_square_turn[i];
       const float second_exponent =
           lanes.other_log_similarity[i] + other_turn * other_turn * lanes.per_square_turn[i];
@@ -68,14 +68,14 @@ inline void explain_similarity_lanes(const SimilarityLanes& lanes,
 
 template <Instructions set>
 void SimilarityBody<set>::explain_similarity(const SimilarityLanes& lanes,
-                                             const SimilarityLanes::Fall& fall,
+                                             const SimilarityLanes::Decay& decay,
                                              const float* __restrict x_m,
                                              const float* __restrict y_m,
                                              const float* __restrict heading_rad,
                                              float* __restrict explained, int count) {
   int done = 0;
   for (; done + poses_per_block <= count; done += poses_per_block) {
-    explain_similarity_lanes(lanes, fall, x_m + done, y_m + done, heading_rad + done,
+    explain_similarity_lanes(lanes, decay, x_m + done, y_m + done, heading_rad + done,
                              explained + done);
   }
   if (done == count) return;
@@ -88,7 +88,7 @@ void SimilarityBody<set>::explain_similarity(const SimilarityLanes& lanes,
     y[p - done] = y_m[p];
     heading[p - done] = heading_rad[p];
   }
-  explain_similarity_lanes(lanes, fall, x, y, heading, last);
+  explain_similarity_lanes(lanes, decay, x, y, heading, last);
   for (int p = done; p < count; ++p) explained[p] = last[p - done];
 }
 

@@ -19,8 +19,8 @@ class HeldViews final : public ComparedViews {
         .search(view, {.top = count, .components = ranking_->components()})
         .matches;
   }
-  void load(std::span<const ViewId> views, const ProfileCallback& take) override {
-    for (std::size_t i = 0; i < views.size(); ++i) take(i, ranking_->profiles(views[i]));
+  void load(std::span<const ViewId> views, const ProfileCallback& consume) override {
+    for (std::size_t i = 0; i < views.size(); ++i) consume(i, ranking_->profiles(views[i]));
   }
 
  private:
@@ -37,10 +37,10 @@ class IndexedViews final : public ComparedViews {
   [[nodiscard]] std::vector<Match> search(const PackedSignature& view, int count) override {
     return index().search(view, {.top = count}, {}).matches;
   }
-  void load(std::span<const ViewId> views, const ProfileCallback& take) override {
+  void load(std::span<const ViewId> views, const ProfileCallback& consume) override {
     const VisualMemory loaded = index().load(views);
     for (std::size_t i = 0; i < views.size(); ++i) {
-      if (loaded.contains(views[i])) take(i, ColumnProfiles(loaded.packed(views[i])));
+      if (loaded.contains(views[i])) consume(i, ColumnProfiles(loaded.packed(views[i])));
     }
   }
   void release() override { index_.reset(); }

@@ -25,8 +25,8 @@ class ComparedViews {
   [[nodiscard]] virtual std::vector<PosedView> posed_views() = 0;
   /// Returns the most similar views, at most `count`.
   [[nodiscard]] virtual std::vector<Match> search(const PackedSignature& view, int count) = 0;
-  /// Passes the column profiles of each of these views that exists to `take`.
-  virtual void load(std::span<const ViewId> views, const ProfileCallback& take) = 0;
+  /// Passes the column profiles of each of these views that exists to `consume`.
+  virtual void load(std::span<const ViewId> views, const ProfileCallback& consume) = 0;
   /// Ends the work with one image; changes by other users become visible at the next image.
   virtual void release() {}
 };

@@ -108,8 +108,9 @@ int ExplainedInjection::inject(Particles& particles, double probability, Random&
   return static_cast<int>(fresh.size());
 }
 
-double kidnap_probability(double prior, double log_elsewhere, double log_here) {
-  const double log_odds = std::clamp(log_elsewhere - log_here, -max_log_odds, max_log_odds);
+double kidnap_probability(double prior, double log_ratio_elsewhere, double log_ratio_here) {
+  const double log_odds =
+      std::clamp(log_ratio_elsewhere - log_ratio_here, -max_log_odds, max_log_odds);
   const double odds = prior / (1.0 - prior) * std::exp(log_odds);
   return odds / (1.0 + odds);
 }

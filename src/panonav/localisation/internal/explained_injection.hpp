@@ -46,6 +46,7 @@ class ExplainedInjection {
 
 /// Returns the probability that the robot was kidnapped, from its prior and the logarithms of the
 /// view's likelihood elsewhere and here.
-[[nodiscard]] double kidnap_probability(double prior, double log_elsewhere, double log_here);
+[[nodiscard]] double kidnap_probability(double prior, double log_ratio_elsewhere,
+                                        double log_ratio_here);
 
 }  // namespace panonav

@@ -29,7 +29,7 @@ struct ResemblingViews {
   /// position of view j.
   Eigen::MatrixXd squared_mutual_differences;
 };
-/// Compares the first `PositionModel::candidates` posed views of the matches with each other.
+/// Compares the first `PositionModel::max_candidates` posed views of the matches with each other.
 [[nodiscard]] ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
                                                       std::span<const RankedMatch> matches);
 

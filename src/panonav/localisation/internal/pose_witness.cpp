@@ -39,7 +39,7 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
     return distance(poses[a].position(), poses[b].position()) <=
                0.5 * spacing_m + odometry_error_share * travelled_m &&
            std::abs(angle_difference(poses[a].heading_rad, poses[b].heading_rad)) <=
-               agreeing_heading_tolerance_rad;
+               heading_agreement_tolerance_rad;
   };
   std::vector<std::size_t> best;
   for (std::size_t a = 0; a < poses.size(); ++a) {
@@ -80,7 +80,7 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
     const Point2 middle{mean.x_m / weights, mean.y_m / weights};
     if (distance(own->pose.position(), middle) <= 0.5 * spacing_m &&
         std::abs(angle_difference(own->pose.heading_rad, middle_rad)) <=
-            agreeing_heading_tolerance_rad) {
+            heading_agreement_tolerance_rad) {
       add(own->pose, *own);
     }
   }

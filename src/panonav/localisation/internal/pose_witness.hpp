@@ -10,7 +10,7 @@ namespace panonav {
 
 /// Largest difference of two headings that agree: four times the compass's error between
 /// neighbouring views, far below the quarter rotation after which rooms look similar.
-inline constexpr double agreeing_heading_tolerance_rad = radians(20.0);
+inline constexpr double heading_agreement_tolerance_rad = radians(20.0);
 
 /// A sure localisation of one image of a run, used as evidence of the pose of another image.
 struct PoseWitness {

@@ -38,7 +38,7 @@ class ViewLikelihood {
     float heading_rad;            ///< of the robot at the compared view, absolute; NaN: unknown
     float similarity;             ///< 0: dissimilar, or not compared
     float log_similarity;
-    float other_heading_rad;  ///< the second heading that fits (`match_columns_two_best`)
+    float other_heading_rad;  ///< the second heading that fits (`find_two_best_column_matches`)
     float other_similarity;   ///< in the second heading
     float other_log_similarity;
     std::uint32_t compared_view_number;  ///< number of the view last compared to it
@@ -69,7 +69,7 @@ class ViewLikelihood {
   void reorder_by_cell(Particles& particles);
 
   [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
-  /// Returns at most 12 nearest sites of a position; none if all references are far away.
+  /// Returns the sites nearest to a position, at most 12; none if all sites are far away.
   [[nodiscard]] std::span<const std::uint32_t> sites_near(Point2 position) const noexcept;
   /// Returns the sites around which the particles have a weight of at least `min_weight`, heaviest
   /// first, at most `max_sites`.
@@ -126,7 +126,7 @@ class ViewLikelihood {
   std::optional<PackedSignature> signature_;  ///< of the view
   std::optional<ColumnProfiles> view_;
   double max_similarity_ = 0.0;
-  kernels::SimilarityLanes::Fall decay_{1.0F, 0.0F};
+  kernels::SimilarityLanes::Decay decay_{1.0F, 0.0F};
   std::uint32_t view_number_ = 0;
   double cell_m_ = 1.0;
   double cells_per_metre_ = 1.0;

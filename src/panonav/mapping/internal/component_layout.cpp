@@ -129,11 +129,11 @@ ComponentLayout::ComponentLayout(std::size_t nodes, std::vector<LatticeLink> lin
   for (const LatticeLink& link : links_) {
     if (link.probability > 0.5 && link.length > 0.0) lengths.push_back(link.length);
   }
-  typical_ = lengths.empty() ? 1.0 : upper_median(lengths);
+  typical_length_ = lengths.empty() ? 1.0 : upper_median(lengths);
   // Links between images of one place have no direction and no length; they get a length of
   // adjacent views.
   for (LatticeLink& link : links_) {
-    if (link.length == 0.0) link.length = adjacent_distance_in_links * typical_;
+    if (link.length == 0.0) link.length = adjacent_distance_in_links * typical_length_;
   }
   std::map<std::size_t, std::size_t> first;  // view of each component
   for (std::size_t i = 0; i < nodes; ++i) {

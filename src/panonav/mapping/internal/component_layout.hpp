@@ -38,7 +38,7 @@ class ComponentLayout {
   }
   [[nodiscard]] int iterations() const { return iterations_; }
   /// Median length of the links with a probability above one half.
-  [[nodiscard]] double typical_length() const { return typical_; }
+  [[nodiscard]] double typical_length() const { return typical_length_; }
 
   [[nodiscard]] bool is_inside(const LatticeLink& link) const {
     return component_[link.a] == component_[link.b];
@@ -71,7 +71,7 @@ class ComponentLayout {
   std::vector<std::size_t>
       size_at_last_average_;  // number of views of each component at its last average
   int iterations_ = 0;
-  double typical_ = 1.0;
+  double typical_length_ = 1.0;
 };
 
 }  // namespace panonav

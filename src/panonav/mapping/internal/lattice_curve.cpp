@@ -12,8 +12,9 @@ namespace {
 
 /// Smallest relative error of lengths from phases, as phases are packed in steps of 0.025 rad.
 constexpr double min_phase_length_error = 0.02;
-/// Number of random pairs for the dissimilarity of far views. The farther quarter is averaged,
-/// whose mean errs by 1/20 of the spread.
+/// Number of random pairs from which the dissimilarity of far views is estimated. It is the mean
+/// over the quarter of the pairs that are farthest apart; the standard error of this mean is 1/20
+/// of their standard deviation.
 constexpr std::size_t far_pairs = 2000;
 
 double layout_distance(std::span<const Pose2> poses, std::size_t a, std::size_t b) {

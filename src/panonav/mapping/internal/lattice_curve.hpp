@@ -11,8 +11,9 @@ namespace panonav {
 inline constexpr double min_curve_weight = 0.25;
 
 /// Makes the curve for the first layout: distance proportional to dissimilarity [M04 section 3.2].
-/// Distances are in metres with motions, else in the unit of the phases, else in units of the
-/// median distance between a view and its nearest one. Sets `errors.phase_unit` if motions show it.
+/// Distances are in metres if there are motions, otherwise in the unit of the phases. Without
+/// phases, the median distance between a view and its nearest one is 1. Sets `errors.phase_unit` if
+/// motions show it.
 [[nodiscard]] DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
                                                   const NodeMotions& motions,
                                                   const SpringViews& views,

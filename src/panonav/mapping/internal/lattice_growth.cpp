@@ -48,7 +48,7 @@ class Grower {
         layout_.average(p);
     }
     set_weights_and_energy(result);
-    fill_layout(result.start);
+    fill_layout(result.layout);
     result.iterations = layout_.iterations();
     return result;
   }
@@ -167,17 +167,17 @@ class Grower {
     }
   }
 
-  void fill_layout(LatticeLayout& start) const {
+  void fill_layout(LatticeLayout& layout) const {
     std::vector<GraphEdge> edges;
     for (std::size_t p = 0; p < layout_.size(); ++p) {
       for (const std::size_t view : layout_.members(p)) {
         if (view != p) edges.push_back({p, view, 1.0});
       }
     }
-    start.components = LatticeGraph(layout_.size(), edges).components();
-    start.poses.assign(layout_.poses().begin(), layout_.poses().end());
-    start.handedness_known.assign(layout_.size(), 0);
-    for (const GraphEdge& edge : edges) start.handedness_known[start.components[edge.a]] = 1;
+    layout.components = LatticeGraph(layout_.size(), edges).components();
+    layout.poses.assign(layout_.poses().begin(), layout_.poses().end());
+    layout.handedness_known.assign(layout_.size(), 0);
+    for (const GraphEdge& edge : edges) layout.handedness_known[layout.components[edge.a]] = 1;
   }
 
   const LatticeStepCallback& step_callback_;

@@ -12,7 +12,7 @@
 namespace panonav {
 
 struct GrownLayout {
-  LatticeLayout start;
+  LatticeLayout layout;
   /// Agreement of each spring inside a component with the layout: 1 if the poses are as its phases
   /// measured them, 0.25 at the limit of agreement.
   std::map<std::pair<std::size_t, std::size_t>, double> weights;

@@ -51,7 +51,7 @@ struct Strain {
   }
   [[nodiscard]] std::span<const Entry> used() const { return std::span(entries).first(rows); }
   /// Returns the squared strain of each group; nullopt where the spring has none.
-  [[nodiscard]] std::array<std::optional<double>, groups> squares() const {
+  [[nodiscard]] std::array<std::optional<double>, groups> sum_squares_by_group() const {
     std::array<std::optional<double>, groups> sums;
     for (const Entry& entry : used()) {
       sums[entry.group] = sums[entry.group].value_or(0.0) + entry.value * entry.value;
@@ -161,9 +161,9 @@ class SpringEnergy {
     widths_.fill(final_width);
     for (const SpringTerm& spring : springs_) {
       if (spring.is_certain) continue;
-      const auto squares = squared_strains(spring);
+      const auto sum_squares_by_group = squared_strains(spring);
       for (std::size_t g = 0; g < groups; ++g) {
-        widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(squares[g].value_or(0.0)));
+        widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(sum_squares_by_group[g].value_or(0.0)));
       }
     }
   }
@@ -171,19 +171,19 @@ class SpringEnergy {
   /// Halves the widths, down to three deviations, or to more if the median strain shows that the
   /// deviations are too small. Returns false if no width has changed.
   bool narrow_losses() {
-    std::array<std::vector<double>, groups> squares;
+    std::array<std::vector<double>, groups> sum_squares_by_group;
     for (const SpringTerm& spring : springs_) {
       if (spring.is_certain) continue;
       const auto all = squared_strains(spring);
       for (std::size_t g = 0; g < groups; ++g) {
-        if (all[g]) squares[g].push_back(*all[g]);
+        if (all[g]) sum_squares_by_group[g].push_back(*all[g]);
       }
     }
     bool narrowed = false;
     for (std::size_t g = 0; g < groups; ++g) {
       double min_width = final_width;
-      if (!squares[g].empty()) {
-        const double middle = upper_median_in_place(std::span(squares[g]));
+      if (!sum_squares_by_group[g].empty()) {
+        const double middle = upper_median_in_place(std::span(sum_squares_by_group[g]));
         min_width *= std::max(1.0, std::sqrt(middle / median_square[g]));
       }
       if (widths_[g] <= min_width) continue;
@@ -197,9 +197,9 @@ class SpringEnergy {
   [[nodiscard]] std::vector<double> weights() const {
     std::vector<double> result(springs_.size(), 1.0);
     for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const auto squares = squared_strains(springs_[s]);
-      const Group group = squares[phases] ? phases : length;
-      result[s] = weight(s, group, squares[group].value_or(0.0));
+      const auto sum_squares_by_group = squared_strains(springs_[s]);
+      const Group group = sum_squares_by_group[phases] ? phases : length;
+      result[s] = weight(s, group, sum_squares_by_group[group].value_or(0.0));
     }
     return result;
   }
@@ -219,15 +219,15 @@ class SpringEnergy {
   [[nodiscard]] double cost() const {
     double sum = 0.0;
     for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const auto squares = squared_strains(springs_[s]);
+      const auto sum_squares_by_group = squared_strains(springs_[s]);
       for (const Group group : {phases, length, length_by_phases}) {
-        if (!squares[group]) continue;
+        if (!sum_squares_by_group[group]) continue;
         const double width = widths_[group] * widths_[group];
-        const double share = *squares[group] / width;
+        const double share = *sum_squares_by_group[group] / width;
         if (springs_[s].is_certain) {
-          sum += *squares[group];
+          sum += *sum_squares_by_group[group];
         } else if (group == phases || !length_weights_[s]) {
-          sum += *squares[group] / (1.0 + share);
+          sum += *sum_squares_by_group[group] / (1.0 + share);
         } else {
           sum += *length_weights_[s] * 2.0 * width * (std::sqrt(1.0 + share) - 1.0);
         }
@@ -253,7 +253,7 @@ class SpringEnergy {
  private:
   [[nodiscard]] std::array<std::optional<double>, groups> squared_strains(
       const SpringTerm& spring) const {
-    return compute_strain(spring, poses_[spring.a], poses_[spring.b]).squares();
+    return compute_strain(spring, poses_[spring.a], poses_[spring.b]).sum_squares_by_group();
   }
 
   /// Returns the weight of a group of a spring's strains. If a spring has phases, their weight also
@@ -279,13 +279,13 @@ class SpringEnergy {
     const int second = unknown_[spring.b];
     if (first < 0 && second < 0) return;
     const Strain strain = compute_strain(spring, poses_[spring.a], poses_[spring.b]);
-    const auto squares = strain.squares();
+    const auto sum_squares_by_group = strain.sum_squares_by_group();
     const auto column = [&](int i) {
       const int base = i < 3 ? first : second;
       return base < 0 ? -1 : base + i % 3;
     };
     for (const auto& entry : strain.used()) {
-      const double w = weight(s, entry.group, *squares[entry.group]);
+      const double w = weight(s, entry.group, *sum_squares_by_group[entry.group]);
       for (int i = 0; i < 6; ++i) {
         const double si = entry.slope[static_cast<std::size_t>(i)];
         const int ci = column(i);

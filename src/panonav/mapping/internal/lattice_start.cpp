@@ -118,14 +118,14 @@ LatticeLayout lay_out_by_springs(std::size_t nodes, std::span<const Lattice::Spr
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
   const LatticeGraph graph(nodes, edges);
-  LatticeLayout start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
-  set_headings(graph, springs, start.poses);
+  LatticeLayout layout{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
+  set_headings(graph, springs, layout.poses);
   std::vector<std::size_t> local(nodes);
-  for (const auto& members : members_of(start.components)) {
+  for (const auto& members : members_of(layout.components)) {
     for (std::size_t i = 0; i < members.size(); ++i) local[members[i]] = i;
     std::vector<GraphEdge> own;
     for (const GraphEdge& edge : edges) {
-      if (start.components[edge.a] != start.components[members.front()]) continue;
+      if (layout.components[edge.a] != layout.components[members.front()]) continue;
       own.push_back({local[edge.a], local[edge.b], edge.length});
     }
     std::vector<double> distances;
@@ -133,13 +133,13 @@ LatticeLayout lay_out_by_springs(std::size_t nodes, std::span<const Lattice::Spr
                                          static_cast<std::size_t>(landmarks), distances);
     const auto points = multidimensional_scaling(chosen, members.size(), distances);
     for (std::size_t i = 0; i < members.size(); ++i) {
-      start.poses[members[i]].x_m = points[i].x_m;
-      start.poses[members[i]].y_m = points[i].y_m;
+      layout.poses[members[i]].x_m = points[i].x_m;
+      layout.poses[members[i]].y_m = points[i].y_m;
     }
-    start.handedness_known.push_back(
-        align_to_directions(members, start.components, springs, start.poses) ? 1 : 0);
+    layout.handedness_known.push_back(
+        align_to_directions(members, layout.components, springs, layout.poses) ? 1 : 0);
   }
-  return start;
+  return layout;
 }
 
 bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion) {
@@ -162,9 +162,9 @@ LatticeLayout lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> m
   std::vector<GraphEdge> edges;
   for (const auto& motion : motions) edges.push_back({motion.a, motion.b, 1.0});
   const LatticeGraph graph(nodes, edges);
-  LatticeLayout start{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
+  LatticeLayout layout{.poses = std::vector<Pose2>(nodes), .components = graph.components()};
   std::vector<unsigned char> done(nodes);
-  start.handedness_known.assign(members_of(start.components).size(), 0);
+  layout.handedness_known.assign(members_of(layout.components).size(), 0);
   for (std::size_t first = 0; first < nodes; ++first) {
     if (done[first] != 0) continue;
     // Breadth first, so that errors of as few steps as possible add up.
@@ -191,14 +191,15 @@ LatticeLayout lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> m
             }
           }
         }
-        start.poses[neighbour.node] = start.poses[from] * (from == moved.a ? step : inverse(step));
+        layout.poses[neighbour.node] =
+            layout.poses[from] * (from == moved.a ? step : inverse(step));
         done[neighbour.node] = 1;
-        start.handedness_known[start.components[from]] = 1;
+        layout.handedness_known[layout.components[from]] = 1;
         open.push(neighbour.node);
       }
     }
   }
-  return start;
+  return layout;
 }
 
 }  // namespace panonav

@@ -19,16 +19,16 @@ QueryView::QueryView(const FourierSignature& signature, float full_scale, int co
   if (components_ != 0) view = first_components(view, components_);
 }
 
-AreaViews::LoadedArea AreaViews::make_unloaded_area(const NavigationGraph& graph,
-                                                    const SubAreas& areas, std::size_t area) const {
-  LoadedArea listed{.area = area};
+AreaViews::AreaCache AreaViews::make_area_cache(const NavigationGraph& graph, const SubAreas& areas,
+                                                std::size_t area) const {
+  AreaCache cache{.area = area};
   for (const std::size_t node : nodes_around(graph, areas.nodes.at(area), links_)) {
-    listed.views.push_back(graph.view(node));
+    cache.views.push_back(graph.view(node));
   }
-  return listed;
+  return cache;
 }
 
-void AreaViews::load(LoadedArea& area, std::size_t max_views) const {
+void AreaViews::load(AreaCache& area, std::size_t max_views) const {
   const std::size_t count = std::min(max_views, area.views.size() - area.loaded);
   if (count == 0) return;
   const auto views = std::span(area.views).subspan(area.loaded, count);
@@ -40,7 +40,7 @@ void AreaViews::load(LoadedArea& area, std::size_t max_views) const {
 void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area) {
   if (current_.area == area) return;
   current_ =
-      prefetched_.area == area ? std::move(prefetched_) : make_unloaded_area(graph, areas, area);
+      prefetched_.area == area ? std::move(prefetched_) : make_area_cache(graph, areas, area);
   prefetched_ = {};
   load(current_, current_.views.size());
 }
@@ -48,7 +48,7 @@ void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::
 void AreaViews::prefetch(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
                          int max_views) {
   if (current_.area == area) return;
-  if (prefetched_.area != area) prefetched_ = make_unloaded_area(graph, areas, area);
+  if (prefetched_.area != area) prefetched_ = make_area_cache(graph, areas, area);
   load(prefetched_, static_cast<std::size_t>(max_views));
 }
 

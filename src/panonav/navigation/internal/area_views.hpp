@@ -73,23 +73,23 @@ class AreaViews {
 
  private:
   /// An area whose first `loaded` views are loaded, in several parts.
-  struct LoadedArea {
+  struct AreaCache {
     std::optional<std::size_t> area;
     std::vector<ViewId> views;  // ascending
     std::size_t loaded = 0;
     std::vector<VisualMemory> parts;            // ascending
     std::map<ViewId, HomingView> coefficients;  // of all parts
   };
-  [[nodiscard]] LoadedArea make_unloaded_area(const NavigationGraph& graph, const SubAreas& areas,
-                                              std::size_t area) const;
-  void load(LoadedArea& area, std::size_t max_views) const;
+  [[nodiscard]] AreaCache make_area_cache(const NavigationGraph& graph, const SubAreas& areas,
+                                          std::size_t area) const;
+  void load(AreaCache& area, std::size_t max_views) const;
   [[nodiscard]] const VisualMemory* find_part(ViewId view) const;
   [[nodiscard]] const VisualMemory& part_of(ViewId view) const;
 
   const ViewSource* source_;
   int links_;
-  LoadedArea current_;
-  LoadedArea prefetched_;
+  AreaCache current_;
+  AreaCache prefetched_;
   std::uint64_t bytes_read_ = 0;
 };
 

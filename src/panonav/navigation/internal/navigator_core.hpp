@@ -174,7 +174,7 @@ struct Navigator::Core {
   void prefetch_next_area();
 
   // Progress and obstacles (navigator_progress.cpp).
-  void update_progress(Step& step);
+  void block_failed_edges(Step& step);
   void detect_obstruction(Step& step);
   void update_path_length();
   void block_edge(std::size_t edge, Step& step);

@@ -142,8 +142,9 @@ void Navigator::Core::detect_obstruction(Step& step) {
   obstruction.is_present = step.report.obstacle;
   if (last.direction_rad && last.view) {
     const HomeVector back = home_vector_unchecked(*last.view, step.view.view, short_displacement);
-    // If the views before and after hardly differ, the robot did not move. Not tested on a route
-    // leg, where steps may be short and scanlines determine the position.
+    // If the views before and after the step hardly differ, the robot did not move. This is not
+    // tested while the robot follows a stored route: its steps may be short there, and the
+    // scanlines of the route determine its position.
     obstruction.is_present |=
         !pilot.is_on_leg() && back.confidence < min_vector_confidence &&
         image_difference(*last.view, step.view.view) <
@@ -173,7 +174,7 @@ void Navigator::Core::detect_obstruction(Step& step) {
 
 // Updates progress after the last step. Blocks an edge if all detours failed, or the most tried
 // edge if there was no progress for too long.
-void Navigator::Core::update_progress(Step& step) {
+void Navigator::Core::block_failed_edges(Step& step) {
   detect_obstruction(step);
   if (homing) return;
   update_path_length();

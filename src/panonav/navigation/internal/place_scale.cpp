@@ -51,14 +51,14 @@ PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& gr
   if (!linked.empty()) scale.neighbour_difference = median_difference(source, linked, components);
   // Pairs each view with the one half of all views later, since nearly all of these pairs are far
   // from each other.
-  std::vector<ViewPair> strange;
+  std::vector<ViewPair> distant_pairs;
   const std::size_t half = graph.size() / 2;
   for (std::size_t i = 0; i < std::min(max_pairs, half); ++i) {
     const std::size_t first = i * half / std::min(max_pairs, half);
-    strange.emplace_back(graph.view(first), graph.view(first + half));
+    distant_pairs.emplace_back(graph.view(first), graph.view(first + half));
   }
-  if (!strange.empty())
-    scale.random_pair_difference = median_difference(source, strange, components);
+  if (!distant_pairs.empty())
+    scale.distant_pair_difference = median_difference(source, distant_pairs, components);
   return scale;
 }
 

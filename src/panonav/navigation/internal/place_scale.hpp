@@ -8,13 +8,13 @@ namespace panonav {
 /// Typical differences (`image_difference`) between views of one memory, which determine the
 /// threshold at which a reference matches the robot's place.
 struct PlaceScale {
-  double neighbour_difference = 0.0;    ///< median between views with an edge
-  double random_pair_difference = 1.0;  ///< median between random views
+  double neighbour_difference = 0.0;     ///< median between views with an edge
+  double distant_pair_difference = 1.0;  ///< median between views half the graph apart
 
   /// Largest difference between a view and the reference of its place: the mean of the two medians.
   /// A robot between references is nearer to one of them than they are to each other.
   [[nodiscard]] double max_difference() const noexcept {
-    return 0.5 * (neighbour_difference + random_pair_difference);
+    return 0.5 * (neighbour_difference + distant_pair_difference);
   }
 };
 

@@ -15,7 +15,7 @@ namespace panonav {
 namespace {
 
 /// Frequencies of the tables, 0 included.
-constexpr std::size_t size = max_displaced_frequencies + 1;
+constexpr std::size_t size = max_displaced_frequency + 1;
 
 /// Relative penalty on the difference of displacements at the first ring; at ring n it is n^2
 /// times as large. Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office
@@ -153,8 +153,7 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
   float min_difference = std::numeric_limits<float>::infinity();
   std::array<float, size> a;
   std::array<float, size> b;
-  const auto compared =
-      static_cast<std::size_t>(std::min(frequencies, max_searched_frequencies)) + 1;
+  const auto compared = static_cast<std::size_t>(std::min(frequencies, max_searched_frequency)) + 1;
   float home_energy = 0.0F;
   for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row) {
     for (std::size_t k = 1; k < compared; ++k) {
@@ -201,7 +200,7 @@ DisplacementStart find_displacement_start(const HomingView& home, const HomingVi
   constexpr std::size_t max_bands = 8;
   const auto rows = static_cast<std::size_t>(home.rows());
   // Expected images need more frequencies of the current view than are compared.
-  const int frequencies = std::min(known, 2 * max_searched_frequencies);
+  const int frequencies = std::min(known, 2 * max_searched_frequency);
   const std::size_t bands = std::min(max_bands, rows);
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
   std::vector<float> values(4 * bands * stride);

@@ -24,10 +24,10 @@ struct Displacement {
 
 /// Highest frequency that the search compares. Half way between two rings, R / 12 from each, its
 /// phase is off by at most 8 / 12 rad, well within the linear range.
-inline constexpr int max_searched_frequencies = 8;
+inline constexpr int max_searched_frequency = 8;
 
 /// Highest frequency of `displace`.
-inline constexpr int max_displaced_frequencies = 63;
+inline constexpr int max_displaced_frequency = 63;
 
 /// Computes the coefficients of the expected image [S06 eq. 3, no turn] for one row: the view at
 /// the displacement when all things are at distance R. `from_a`, `from_b`: frequencies 0 ..

@@ -16,7 +16,7 @@ ViewId MemoryTables::to_view_id(std::int64_t number) const {
   return {static_cast<std::uint32_t>(number)};
 }
 
-Link MemoryTables::checked(const LinkRow& row) const {
+Link MemoryTables::check_row(const LinkRow& row) const {
   Link link{row.a, row.b, Link::Kind::sequence};
   if (row.kind < 0 || row.kind > static_cast<int>(Link::Kind::closure)) {
     fail_damaged("a link of unknown kind");
@@ -33,8 +33,8 @@ Link MemoryTables::checked(const LinkRow& row) const {
   return link;
 }
 
-const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
-                                     RecordBytes& scratch) const {
+const ViewRow& MemoryTables::check_row(const ViewRow& row, SignatureShape shape,
+                                       RecordBytes& scratch) const {
   if (row.signature.size() != 2 * shape.size() ||
       row.checksum != view_checksum(scratch, row.id, row.info, row.signature)) {
     fail_damaged("view " + std::to_string(row.id.value) + " does not match its checksum");

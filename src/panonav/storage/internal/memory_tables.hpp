@@ -86,7 +86,7 @@ class MemoryTables {
     virtual void commit() = 0;
   };
   template <class Row>
-  using Consume = std::function<void(const Row&)>;
+  using RowCallback = std::function<void(const Row&)>;
   /// Runs a part of `verify` and collects the error that it throws.
   using Check = std::function<void(const std::function<void()>&)>;
 
@@ -139,13 +139,13 @@ class MemoryTables {
   [[nodiscard]] ViewId to_view_id(std::int64_t number) const;
   /// Checks a row and returns it. Throws DamageError if it does not match its checksum, and as
   /// `check_info`.
-  const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
+  const ViewRow& check_row(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
   /// Throws DamageError on values out of range (`validate` of reference_validation.hpp).
   void check_info(ViewId view, const ReferenceInfo& info) const;
   /// Throws DamageError if the bytes do not match their checksum.
   void check_attachment(ViewAttachment table, ViewId view, const StoredBytes& stored) const;
   /// Returns the link of the row. Throws DamageError if its checksum or its values are wrong.
-  [[nodiscard]] Link checked(const LinkRow& row) const;
+  [[nodiscard]] Link check_row(const LinkRow& row) const;
   [[nodiscard]] virtual std::unique_ptr<Transaction> transaction(Kind kind) = 0;
 
   /// Returns all settings, after checking their checksums.
@@ -165,16 +165,16 @@ class MemoryTables {
   /// Replaces name, pose, stamp and checksum of a view. Throws as `throw_used_name`.
   virtual void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) = 0;
   /// Reads all views, by ascending id.
-  virtual void read_views(const Consume<ViewRow>& consume) = 0;
+  virtual void read_views(const RowCallback<ViewRow>& consume) = 0;
   /// Reads these views, in this order. Throws as `throw_unknown_view`.
-  virtual void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) = 0;
+  virtual void read_views(std::span<const ViewId> views, const RowCallback<ViewRow>& consume) = 0;
   /// Reads those of the views that exist, in any order.
   virtual void read_available_views(std::span<const ViewId> views,
-                                    const Consume<ViewRow>& consume) = 0;
+                                    const RowCallback<ViewRow>& consume) = 0;
   /// Reads the first `bytes` bytes of the signatures of the views with ids first .. last, by
   /// ascending id.
   virtual void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                               const Consume<MagnitudesRow>& consume) = 0;
+                               const RowCallback<MagnitudesRow>& consume) = 0;
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
   /// Returns the names of all views by ascending id.
   [[nodiscard]] virtual std::vector<std::string> names() = 0;
@@ -195,7 +195,7 @@ class MemoryTables {
   virtual void write_links(std::span<const Link> links) = 0;
   virtual void erase_link(ViewId a, ViewId b) = 0;
   /// Reads all links, ascending.
-  virtual void read_links(const Consume<LinkRow>& consume) = 0;
+  virtual void read_links(const RowCallback<LinkRow>& consume) = 0;
 
   virtual void write_map(std::string_view name, const MapRow& row) = 0;
   [[nodiscard]] virtual std::optional<MapRow> map(std::string_view name) = 0;
@@ -221,7 +221,7 @@ class MemoryTables {
 
   /// Runs `changes` within a writing transaction, and keeps the rows that they add, replace or
   /// remove, so that `undo` can restore them.
-  virtual void run_with_undo(const std::function<void()>& changes, const std::string& what) = 0;
+  virtual void run_undoably(const std::function<void()>& changes, const std::string& what) = 0;
   /// Returns the kept changes, newest first.
   [[nodiscard]] virtual std::vector<MemoryFile::KeptChange> history() = 0;
   /// Undoes the newest change, within a writing transaction.

@@ -63,7 +63,7 @@ class MemoryVerification {
   void verify_views() {
     RecordBytes scratch;
     const auto verify_row = [&](const ViewRow& row) {
-      tables_.checked(row, header_.shape, scratch);
+      tables_.check_row(row, header_.shape, scratch);
     };
     for (const ViewId view : views_) {
       check([&] { tables_.read_views(std::span(&view, 1), verify_row); }, view);
@@ -90,7 +90,7 @@ class MemoryVerification {
       const std::pair ends(row.a, row.b);
       if (ends <= std::exchange(before, ends)) tables_.fail_damaged("links are out of order");
       check([&] {
-        const Link link = tables_.checked(row);
+        const Link link = tables_.check_row(row);
         if (!views_.contains(link.a) || !views_.contains(link.b))
           tables_.fail_link_without_view(link);
       });

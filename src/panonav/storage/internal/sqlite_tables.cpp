@@ -142,9 +142,20 @@ void SqliteTables::insert_attachment(ViewAttachment table, ViewId view,
 void SqliteTables::require_views(std::span<const ViewId> views) {
   Statement statement(database_, "SELECT 1 FROM views WHERE id = ?");
   for (const ViewId view : views) {
-    if (!statement.bind(1, view).step()) throw_unknown_view(view);
+    if (!statement.bind(1, view).step()) fail_missing_view(view);
     statement.reset();
   }
+}
+
+void SqliteTables::fail_missing_view(ViewId view) {
+  // A damaged table can list a view that a search for its id does not find, and the index of the
+  // names, which is on other pages, still has rows that the table has lost.
+  Statement listed(database_,
+                   "SELECT 1 FROM views NOT INDEXED WHERE +id = ?1 UNION ALL "
+                   "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?1",
+                   view);
+  if (!listed.step()) throw_unknown_view(view);
+  fail_damaged("view " + std::to_string(view.value) + " is missing");
 }
 
 void SqliteTables::remove(std::span<const ViewId> views) {
@@ -168,7 +179,7 @@ void SqliteTables::write_info(ViewId view, const ReferenceInfo& info, std::int64
   if (write.run() != 0) throw_used_name("view", info.name, path_);
 }
 
-void SqliteTables::read_views(const Consume<ViewRow>& consume) {
+void SqliteTables::read_views(const RowCallback<ViewRow>& consume) {
   std::int64_t read = 0;
   Statement rows(database_,
                  "SELECT id, name, x_m, y_m, heading_rad, stamp_s, signature, checksum FROM views "
@@ -183,23 +194,17 @@ void SqliteTables::read_views(const Consume<ViewRow>& consume) {
   }
 }
 
-void SqliteTables::read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) {
+void SqliteTables::read_views(std::span<const ViewId> views, const RowCallback<ViewRow>& consume) {
   for (const ViewId view : views) {
     find_view_.reset();  // an earlier `consume` may have thrown
-    if (!find_view_.bind(1, view).step()) {
-      // The index of the names is on other pages and still has rows that the table has lost.
-      Statement named(database_,
-                      "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?", view);
-      if (!named.step()) throw_unknown_view(view);
-      fail_damaged("view " + std::to_string(view.value) + " is missing");
-    }
+    if (!find_view_.bind(1, view).step()) fail_missing_view(view);
     consume(read_view_row(find_view_));
   }
   find_view_.reset();
 }
 
 void SqliteTables::read_available_views(std::span<const ViewId> views,
-                                        const Consume<ViewRow>& consume) {
+                                        const RowCallback<ViewRow>& consume) {
   for (const ViewId view : views) {
     find_view_.reset();
     if (find_view_.bind(1, view).step()) consume(read_view_row(find_view_));
@@ -208,7 +213,7 @@ void SqliteTables::read_available_views(std::span<const ViewId> views,
 }
 
 void SqliteTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                                   const Consume<MagnitudesRow>& consume) {
+                                   const RowCallback<MagnitudesRow>& consume) {
   Statement rows(database_,
                  "SELECT id, x_m, y_m, signature FROM views WHERE id BETWEEN ? AND ? ORDER BY id",
                  first, last);
@@ -308,7 +313,7 @@ void SqliteTables::erase_link(ViewId a, ViewId b) {
   run_statement(database_, "DELETE FROM links WHERE a = ? AND b = ?", a, b);
 }
 
-void SqliteTables::read_links(const Consume<LinkRow>& consume) {
+void SqliteTables::read_links(const RowCallback<LinkRow>& consume) {
   Statement check(database_, "PRAGMA quick_check(links)");
   if (!check.step() || check.text(0) != "ok") fail_damaged("table links");
   check.reset();

@@ -30,12 +30,12 @@ class SqliteTables final : public MemoryTables {
   void require_views(std::span<const ViewId> views) override;
   void remove(std::span<const ViewId> views) override;
   void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) override;
-  void read_views(const Consume<ViewRow>& consume) override;
-  void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) override;
+  void read_views(const RowCallback<ViewRow>& consume) override;
+  void read_views(std::span<const ViewId> views, const RowCallback<ViewRow>& consume) override;
   void read_available_views(std::span<const ViewId> views,
-                            const Consume<ViewRow>& consume) override;
+                            const RowCallback<ViewRow>& consume) override;
   void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                       const Consume<MagnitudesRow>& consume) override;
+                       const RowCallback<MagnitudesRow>& consume) override;
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
   [[nodiscard]] std::vector<std::string> names() override;
   [[nodiscard]] std::vector<ViewId> views() override;
@@ -46,7 +46,7 @@ class SqliteTables final : public MemoryTables {
 
   void write_links(std::span<const Link> links) override;
   void erase_link(ViewId a, ViewId b) override;
-  void read_links(const Consume<LinkRow>& consume) override;
+  void read_links(const RowCallback<LinkRow>& consume) override;
 
   void write_map(std::string_view name, const MapRow& row) override;
   [[nodiscard]] std::optional<MapRow> map(std::string_view name) override;
@@ -65,7 +65,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::int64_t route_bytes(std::string_view route) override;
   [[nodiscard]] std::vector<std::string> list_routes_with_blocks() override;
 
-  void run_with_undo(const std::function<void()>& changes, const std::string& what) override;
+  void run_undoably(const std::function<void()>& changes, const std::string& what) override;
   [[nodiscard]] std::vector<MemoryFile::KeptChange> history() override;
   void undo() override;
 
@@ -80,6 +80,9 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] ViewRow read_view_row(const Statement& row) const;
   void insert_attachment(ViewAttachment table, ViewId view, std::span<const std::uint8_t> bytes);
   [[nodiscard]] std::vector<std::string> query_texts(const char* sql);
+  /// Throws for a view that a search for its id did not find: DamageError if the file lists it all
+  /// the same, and otherwise as `throw_unknown_view`. Cost: one pass over all views.
+  [[noreturn]] void fail_missing_view(ViewId view);
   /// Removes kept changes beyond the limits of `MemoryFile::change`.
   void shorten_history();
   /// Throws FileError if rows that `undo` has restored cannot be read.

@@ -55,7 +55,7 @@ std::span<const std::uint8_t> read_changes(const Statement& row) {
 
 // Steps to the next change and returns its rows; nullopt if there is none. It checks the change
 // first, so that SQLite's own reader gets only valid ones.
-std::optional<UndoneRows> step_checked(Database& database, Statement& row) {
+std::optional<UndoneRows> step_to_next_change(Database& database, Statement& row) {
   if (!row.step()) return std::nullopt;
   const auto changes = read_changes(row);
   if (row.integer(4) != undo_checksum(row.text(1), row.real(2), changes)) {
@@ -88,7 +88,7 @@ int on_conflict(void* conflicting_table, int, sqlite3_changeset_iter* change) {
 
 }  // namespace
 
-void SqliteTables::run_with_undo(const std::function<void()>& changes, const std::string& what) {
+void SqliteTables::run_undoably(const std::function<void()>& changes, const std::string& what) {
   const auto check = [&](int code) {
     if (code != SQLITE_OK) database_.fail(code);
   };
@@ -149,7 +149,7 @@ void SqliteTables::shorten_history() {
 std::vector<MemoryFile::KeptChange> SqliteTables::history() {
   std::vector<MemoryFile::KeptChange> changes;
   Statement row(database_, select_history);
-  while (step_checked(database_, row)) {
+  while (step_to_next_change(database_, row)) {
     changes.push_back(
         {std::string(row.text(1)), row.real(2), read_changes(row).size(), !row.is_null(3)});
   }
@@ -162,7 +162,7 @@ void SqliteTables::require_intact(UndoneRows rows) {
   try {
     const SignatureShape shape = to_header(settings()).shape;
     RecordBytes scratch;
-    read_available_views(rows.views, [&](const ViewRow& row) { checked(row, shape, scratch); });
+    read_available_views(rows.views, [&](const ViewRow& row) { check_row(row, shape, scratch); });
     for (const std::string& name : rows.maps) static_cast<void>(read_map(*this, name));
     for (const std::string& name : rows.routes) static_cast<void>(read_route(*this, name));
   } catch (const ContractError& error) {
@@ -175,7 +175,7 @@ void SqliteTables::undo() {
   std::optional<UndoneRows> rows;
   {
     Statement row(database_, select_history);
-    rows = step_checked(database_, row);
+    rows = step_to_next_change(database_, row);
     if (!rows || row.is_null(3)) fail_damaged("table history");
     id = row.integer(0);
     const auto changes = row.blob(3);
