@@ -22,7 +22,7 @@ std::string shape_text(const py::array& array) {
   return shape_text(std::vector<py::ssize_t>(array.shape(), array.shape() + array.ndim()));
 }
 
-py::array as_array(const py::handle& value, const char* what) {
+py::array require_array(const py::handle& value, const char* what) {
   if (!py::isinstance<py::array>(value)) {
     throw ContractError(what, std::string(py::str(py::type::of(value).attr("__name__"))),
                         "a numpy array");
@@ -43,7 +43,7 @@ std::string dtype_text(const py::array& array) {
 }  // namespace
 
 PictureArray::PictureArray(const py::handle& value, const char* what)
-    : array_(as_array(value, what)) {
+    : array_(require_array(value, what)) {
   if (!has_dtype<std::uint8_t>(array_)) {
     throw ContractError(std::string("dtype of ") + what, dtype_text(array_), "uint8");
   }
@@ -77,7 +77,7 @@ Image PictureArray::image() const {
 
 Panorama panorama_from_array(const py::handle& value,
                              const std::optional<ElevationBand>& elevations) {
-  const py::array array = as_array(value, "values");
+  const py::array array = require_array(value, "values");
   if (array.ndim() != 2 || array.shape(0) > 1 << 24 || array.shape(1) > 1 << 24) {
     throw ContractError("shape of values", shape_text(array), "(rows, columns)");
   }
@@ -105,7 +105,7 @@ template <class Value>
 py::array_t<Value, py::array::c_style> require_exact_array(const py::handle& value,
                                                            const char* what,
                                                            std::vector<py::ssize_t> shape) {
-  const py::array array = as_array(value, what);
+  const py::array array = require_array(value, what);
   if (!has_dtype<Value>(array)) {
     throw ContractError(std::string("dtype of ") + what, dtype_text(array),
                         std::string(py::str(py::dtype::of<Value>())));
@@ -188,12 +188,12 @@ py::array_t<double> to_pose_rows(std::span<const Pose2> poses) {
   return rows;
 }
 
-Observation to_observation(const py::handle& seen) {
-  if (py::isinstance<Observation>(seen)) return seen.cast<const Observation&>();
-  if (py::isinstance<Panorama>(seen)) return Observation(seen.cast<const Panorama&>());
-  const bool is_path = py::isinstance<py::str>(seen) || py::hasattr(seen, "__fspath__");
-  if (!is_path) return Observation(PictureArray(seen, "picture").image());
-  const auto file = seen.cast<std::filesystem::path>();
+Observation to_observation(const py::handle& value) {
+  if (py::isinstance<Observation>(value)) return value.cast<const Observation&>();
+  if (py::isinstance<Panorama>(value)) return Observation(value.cast<const Panorama&>());
+  const bool is_path = py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
+  if (!is_path) return Observation(PictureArray(value, "picture").image());
+  const auto file = value.cast<std::filesystem::path>();
   const py::gil_scoped_release free;
   Observation observation(read_image(file));
   observation.name = file.filename().string();

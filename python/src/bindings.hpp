@@ -75,7 +75,7 @@ template <class Value>
 [[nodiscard]] ColumnDirection parse_direction(const std::string& name);
 
 /// Converts an `Observation`, a `Panorama`, an array of pixels, or the path of an image.
-[[nodiscard]] Observation to_observation(const py::handle& seen);
+[[nodiscard]] Observation to_observation(const py::handle& value);
 
 // Options.
 

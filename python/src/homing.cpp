@@ -41,9 +41,11 @@ void bind_vectors(py::module_& m) {
       .field("direction_a_rad", &PhaseReading::direction_a_rad, "Towards b, in the frame of a.")
       .field("direction_b_rad", &PhaseReading::direction_b_rad, "Towards a, in the frame of b.")
       .field("length", &PhaseReading::length, "In units of R.")
-      .field("disagreement_rad", &PhaseReading::disagreement_rad, "Of the two directions.")
-      .field("turn_disagreement_rad", &PhaseReading::turn_disagreement_rad, "Of the two turns.")
-      .field("points", &PhaseReading::has_direction, "False for images of one place.")
+      .field("disagreement_rad", &PhaseReading::disagreement_rad,
+             "Difference of the two directions.")
+      .field("turn_disagreement_rad", &PhaseReading::turn_disagreement_rad,
+             "Difference of the two turns.")
+      .field("has_direction", &PhaseReading::has_direction, "False for images of one place.")
       .field("residual", &PhaseReading::residual,
              "Share of the energy of both views that is left unexplained, 0 to 1.");
   py::class_<HomingView>(m, "HomingView", "A view, prepared for homing.")
@@ -114,7 +116,7 @@ std::unique_ptr<HomingGuide> make_homing_guide(const py::object& goal, const py:
   return make(MemoryFile::open(path, Access::read_only));
 }
 
-NamedHomingResult compute_home_result(const HomingGuide& guide, const Observation& observation) {
+NamedHomingResult compute_homing_result(const HomingGuide& guide, const Observation& observation) {
   return {guide.home(observation), observation.name};
 }
 
@@ -250,7 +252,7 @@ void bind_catchment(py::module_& m) {
 void bind_homing(py::module_& m) {
   bind_vectors(m);
   bind_catchment(m);
-  Record<NamedHomingResult>(m, "WayHome", "The direction home computed from an observation.")
+  Record<NamedHomingResult>(m, "HomingResult", "The direction home computed from an observation.")
       .field("name", &NamedHomingResult::name, "Name of the image, if it has one.")
       .field("known", &NamedHomingResult::known, "True if the views match better than chance.")
       .field("direction_rad", &NamedHomingResult::direction_rad,
@@ -280,7 +282,7 @@ void bind_homing(py::module_& m) {
           [](const HomingGuide& guide, const py::object& observation) {
             const Observation seen = to_observation(observation);
             const py::gil_scoped_release free;
-            return compute_home_result(guide, seen);
+            return compute_homing_result(guide, seen);
           },
           py::arg("observation"), "Computes the direction home for an observation.")
       .def(
@@ -294,7 +296,7 @@ void bind_homing(py::module_& m) {
             process_in_order(
                 dataset.entries.size(), executor,
                 [&](std::size_t i) {
-                  return compute_home_result(guide, read_observation(dataset.entries[i]));
+                  return compute_homing_result(guide, read_observation(dataset.entries[i]));
                 },
                 [&](std::size_t, NamedHomingResult&& result) {
                   results.push_back(std::move(result));

@@ -359,7 +359,7 @@ void bind_tracker(py::module_& m) {
 void bind_updater(py::module_& m) {
   using Changes = MemoryUpdater::Changes;
   Record<Changes>(m, "MemoryUpdaterChanges", "Changes of a memory by a run.")
-      .field("seen", &Changes::observations, "Number of observations with odometry.")
+      .field("observations", &Changes::observations, "Number of observations with odometry.")
       .field("certain", &Changes::certain, "Number of these whose place was certain and new.")
       .field("reinforced", &Changes::reinforced, "Number of views that matched the robot's images.")
       .field("added", &Changes::added, "Number of added views.")
@@ -386,7 +386,7 @@ void bind_updater(py::module_& m) {
                {options_of<MemoryUpdateOptions>()})
                .c_str())
       .def(
-          "see",
+          "observe",
           [](SharedUpdater& updater, const py::object& observation, const Panorama& panorama,
              const NamedPlace& place) {
             const Observation seen = to_observation(observation);
@@ -396,7 +396,7 @@ void bind_updater(py::module_& m) {
           "Adds the next observation of the run, which needs odometry (without it, it is "
           "ignored), with its panorama (PlaceRecogniser.panorama) and its answer.")
       .def_property_readonly(
-          "near_known_places",
+          "is_near_known_place",
           [](const SharedUpdater& updater) {
             return updater.read([](const MemoryUpdater& u) { return u.is_near_known_place(); });
           },

@@ -17,7 +17,7 @@ constexpr std::array<const char*, 3> link_names{"sequence", "neighbour", "closur
 
 /// Returns rows of x_m, y_m, heading_rad, one per node.
 template <class Nodes>
-py::array_t<double> to_pose_rows_of_nodes(const Nodes& nodes) {
+py::array_t<double> to_node_pose_rows(const Nodes& nodes) {
   std::vector<Pose2> poses;
   for (const auto& node : nodes) poses.push_back(node.pose);
   return to_pose_rows(poses);
@@ -71,7 +71,7 @@ void bind_maps(py::module_& m) {
       .field("edges", &TopologicalMap::edges, "Each connects two nodes of the map.")
       .type()
       .def(
-          "poses", [](const TopologicalMap& map) { return to_pose_rows_of_nodes(map.nodes); },
+          "poses", [](const TopologicalMap& map) { return to_node_pose_rows(map.nodes); },
           "Returns (n, 3) of x_m, y_m, heading_rad, one row per node.");
   Record<Mapper::Result>(m, "MappedRun", "The map of a Mapper's observations.")
       .field("map", &Mapper::Result::map, "All nodes and edges.")
@@ -158,7 +158,7 @@ void bind_lattices(py::module_& m) {
              "Sum over springs of weight times squared strain in deviations.")
       .type()
       .def(
-          "poses", [](const Lattice& lattice) { return to_pose_rows_of_nodes(lattice.nodes); },
+          "poses", [](const Lattice& lattice) { return to_node_pose_rows(lattice.nodes); },
           "Returns (n, 3) of x, y, heading_rad, one row per node.");
   m.def(
       "arrange",

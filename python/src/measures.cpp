@@ -15,7 +15,7 @@ std::vector<Point2> to_points(const Rows& rows) {
   return points;
 }
 
-Rows to_rows(const std::vector<StampedPose>& poses) {
+Rows to_stamped_pose_rows(const std::vector<StampedPose>& poses) {
   Rows rows({static_cast<py::ssize_t>(poses.size()), py::ssize_t{4}});
   auto row = rows.mutable_unchecked<2>();
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -106,7 +106,7 @@ void bind_measures(py::module_& m) {
           .c_str());
   m.def(
       "read_trajectory",
-      [](const std::filesystem::path& path) { return to_rows(read_trajectory(path)); },
+      [](const std::filesystem::path& path) { return to_stamped_pose_rows(read_trajectory(path)); },
       py::arg("path"), "Reads TUM text or CSV: (n, 4) of stamp_s, x_m, y_m, heading_rad.");
 }
 

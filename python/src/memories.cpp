@@ -71,7 +71,7 @@ void extend(SharedMemory& memory, const py::object& given_magnitudes,
 }
 
 /// Returns rows of x_m, y_m, heading_rad, one per view in the order of ids; nan is unknown.
-py::array_t<double> poses_of(const SharedMemory& memory) {
+py::array_t<double> make_pose_rows(const SharedMemory& memory) {
   std::vector<double> rows;
   memory.read([&](const VisualMemory& m) {
     constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
@@ -198,7 +198,8 @@ void bind_visual_memory(py::module_& m) {
           },
           py::arg("view"),
           "Returns the signature as real numbers, with the precision of the packed form.")
-      .def("poses", &poses_of, "(n, 3) of x_m, y_m, heading_rad by ascending id; nan: unknown.")
+      .def("poses", &make_pose_rows,
+           "(n, 3) of x_m, y_m, heading_rad by ascending id; nan: unknown.")
       .def(
           "link",
           [](SharedMemory& s, ViewId a, ViewId b, const std::string& kind) {
@@ -253,7 +254,8 @@ void bind_memory_file(py::module_& m) {
       .field("maps", &MemoryFile::Info::maps, "Kept by name.")
       .field("routes", &MemoryFile::Info::routes, "Kept by name.")
       .field("file_bytes", &MemoryFile::Info::file_bytes, "Size including the write-ahead log.")
-      .field("format_version", &MemoryFile::Info::format_version, "Of the file, >= 1.");
+      .field("format_version", &MemoryFile::Info::format_version,
+             "Version of the file format, >= 1.");
   Record<MemoryFile::Fault>(m, "MemoryFault", "A fault in a memory file.")
       .field("view", &MemoryFile::Fault::view, "Id of the view, or None.")
       .field("what", &MemoryFile::Fault::what, "Description in one line.");
@@ -367,7 +369,7 @@ void bind_memory_file(py::module_& m) {
           [](SharedFile& s) { return s.change([](MemoryFile& f) { return f.route_names(); }); },
           "Returns the names of the routes, ascending.")
       .def(
-          "keep_models",
+          "learn_and_store_models",
           [](SharedFile& s) { s.change([](MemoryFile& f) { learn_and_store_models(f); }); },
           "Learns the models for localisation from the views and stores them in the file. Call it "
           "when views or poses have changed.")

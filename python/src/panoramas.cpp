@@ -161,8 +161,8 @@ void bind_cameras(py::module_& m) {
                "sees at every azimuth.",
                {options_of<UnwarperOptions>()})
                .c_str())
-      .def_property_readonly("rows", &Unwarper::rows, "Of its panoramas.")
-      .def_property_readonly("columns", &Unwarper::columns, "Of its panoramas.")
+      .def_property_readonly("rows", &Unwarper::rows, "Rows of its panoramas.")
+      .def_property_readonly("columns", &Unwarper::columns, "Columns of its panoramas.")
       .def_property_readonly("elevations", &Unwarper::elevations,
                              "(bottom, top) of its panoramas in radians.")
       .def(
@@ -223,7 +223,7 @@ void bind_panoramas(py::module_& m) {
       .attr("__hash__") = py::none();
   m.def(
       "level_panorama",
-      [](const Panorama& seen, const Tilt& tilt) { return level_panorama(seen, tilt); },
+      [](const Panorama& panorama, const Tilt& tilt) { return level_panorama(panorama, tilt); },
       py::arg("panorama"), py::arg("tilt"), py::call_guard<py::gil_scoped_release>(),
       "Removes the tilt of the robot from a panorama; `tilt` is (roll, pitch) in radians.");
   m.def(

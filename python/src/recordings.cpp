@@ -33,7 +33,7 @@ Dataset to_dataset(const py::handle& recording, const std::optional<PictureSourc
     options.default_source = default_source;
     return open_with_warnings(recording.cast<std::filesystem::path>(), options);
   }
-  if (source) throw OptionError("a Dataset says how its pictures lie; leave out 'source'");
+  if (source) throw OptionError("a Dataset has its own image layout; leave out 'source'");
   return recording.cast<const Dataset&>();
 }
 

@@ -20,18 +20,18 @@ World make_world(const std::string& scene, simulation::SimulatedWorldOptions opt
       .options(options.free_space)
       .options(options.odometry, "odometry")
       .finish();
-  std::vector<std::string> chosen;
+  std::vector<std::string> explicit_options;
   for (const char* name : {"scene_seed", "moved_objects", "moved_seed", "camera_height_m",
                            "robot_radius_m", "robot_height_m", "step_height_m", "cell_m"}) {
-    if (parsed.has(name)) chosen.emplace_back(name);
+    if (parsed.has(name)) explicit_options.emplace_back(name);
   }
   const py::gil_scoped_release free;
   InterruptibleExecutor executor(threads);
   return std::make_shared<const simulation::SimulatedWorld>(
       scene, std::move(options),
       [&](const std::string&, const std::string& name) {
-        const auto found = std::ranges::find(chosen, name);
-        return found == chosen.end() ? std::nullopt : std::optional(*found);
+        const auto found = std::ranges::find(explicit_options, name);
+        return found == explicit_options.end() ? std::nullopt : std::optional(*found);
       },
       executor);
 }
@@ -45,7 +45,7 @@ simulation::SimulatedWorldOptions read_recording_options(Keywords& parsed) {
   return options;
 }
 
-std::optional<Trajectory> parse_trajectory(const py::object& rows) {
+std::optional<Trajectory> to_optional_trajectory(const py::object& rows) {
   if (rows.is_none()) return std::nullopt;
   auto trajectory = to_trajectory(to_number_rows(rows, "trajectory", 4));
   require(!trajectory.empty(), "poses of trajectory", 0, ">= 1");
@@ -76,8 +76,8 @@ py::array_t<double> to_point_rows(std::span<const Point2> points) {
 }
 
 /// Renders the image at a pose of the world.
-Image take_picture_at(const simulation::SimulatedWorld& world, const Pose2& pose,
-                      std::uint64_t seed) {
+Image capture_image_at(const simulation::SimulatedWorld& world, const Pose2& pose,
+                       std::uint64_t seed) {
   Executor executor(1);
   return world.capture_image(pose, seed, executor);
 }
@@ -174,11 +174,11 @@ void bind_worlds(py::module_& m) {
           py::arg("start"), py::arg("end"),
           "Waypoints of a short free path, (n, 2) of x_m, y_m; None if there is none.")
       .def(
-          "take_picture",
+          "capture_image",
           [](const simulation::SimulatedWorld& w, const Pose2& pose, std::uint64_t seed) {
             const Image picture = [&] {
               const py::gil_scoped_release free;
-              return take_picture_at(w, pose, seed);
+              return capture_image_at(w, pose, seed);
             }();
             return to_array(picture);
           },
@@ -210,7 +210,7 @@ void bind_worlds(py::module_& m) {
             Keywords parsed(keywords);
             const auto options = read_recording_options(parsed);
             parsed.finish();
-            const auto along = parse_trajectory(trajectory);
+            const auto along = to_optional_trajectory(trajectory);
             const py::gil_scoped_release free;
             return record(
                 w.with(options.recording, seed.value_or(w.options().simulation.scene.seed)), folder,
@@ -236,7 +236,7 @@ void bind_worlds(py::module_& m) {
         Keywords parsed(keywords);
         auto options = read_recording_options(parsed);
         options.mirror = mirror;
-        const auto along = parse_trajectory(trajectory);
+        const auto along = to_optional_trajectory(trajectory);
         const World world = make_world(scene, std::move(options), parsed, threads);
         const py::gil_scoped_release free;
         return record(*world, folder, along, threads);
@@ -307,7 +307,7 @@ void bind_robots(py::module_& m) {
           [](SharedRobot& robot) {
             return robot.change([](Robot& r) {
               Observation observation(
-                  take_picture_at(*r.world, r.base.pose(), Random(r.seed, ++r.pictures).next()));
+                  capture_image_at(*r.world, r.base.pose(), Random(r.seed, ++r.pictures).next()));
               const Pose2& pose = r.base.pose();
               observation.stamp_s = r.time_s;
               observation.odometry = r.base.odometry();
@@ -318,7 +318,7 @@ void bind_robots(py::module_& m) {
           "Takes an image with stamp, odometry and the true pose, which no "
           "estimate uses.")
       .def(
-          "carry_to",
+          "teleport_to",
           [](SharedRobot& robot, const Pose2& pose) {
             robot.change([&](Robot& r) {
               r.base.teleport_to(choose_free_start(*r.world, pose, 0));

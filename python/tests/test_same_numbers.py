@@ -86,9 +86,9 @@ def test_a_run_teaches_the_same(office, tmp_path):
         panonav.MemoryUpdater(ours, appearances=0)
     for entry in panonav.Dataset(run).entries:
         seen = entry.observation()
-        updater.see(seen, recogniser.panorama(seen), recogniser.localise(seen))
+        updater.observe(seen, recogniser.panorama(seen), recogniser.localise(seen))
     changes = updater.finish(f"update from {run}")
-    assert changes.seen == 40 and changes.certain > 0 and changes.added + changes.reinforced > 0
+    assert changes.observations == 40 and changes.certain > 0 and changes.added + changes.reinforced > 0
     with pytest.raises(ValueError, match="finished"):
         updater.finish("again")
     one, other = panonav.MemoryFile(ours), panonav.MemoryFile(printed)

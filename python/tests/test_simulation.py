@@ -38,9 +38,9 @@ def test_worlds(tmp_path):
     world = panonav.SimulatedWorld("office", **SMALL)
     pose = world.random_pose(4)
     assert world.is_free((pose.x_m, pose.y_m)) and not world.is_free((99, 99)) and world.clearance_m((99, 99)) == 0
-    picture = world.take_picture(pose, seed=2)
-    assert picture.shape == (32, 128) and numpy.array_equal(picture, world.take_picture(pose, seed=2))
-    assert not numpy.array_equal(picture, world.take_picture(pose, seed=3))
+    picture = world.capture_image(pose, seed=2)
+    assert picture.shape == (32, 128) and numpy.array_equal(picture, world.capture_image(pose, seed=2))
+    assert not numpy.array_equal(picture, world.capture_image(pose, seed=3))
     way = world.shortest_path(world.tour[0], world.tour[3])
     assert numpy.allclose(way[0], world.tour[0], atol=0.05) and world.shortest_path((99, 99), (0, 0)) is None
     plan = world.floor_plan()
@@ -49,7 +49,7 @@ def test_worlds(tmp_path):
                         (lambda: panonav.SimulatedWorld("office", ligt=1), "did you mean 'light'"),
                         (lambda: panonav.SimulatedWorld("office", light=0), "light is 0"),
                         (lambda: panonav.SimulatedWorld(str(tmp_path / "a.obj"), scene_seed=2), "neither a file"),
-                        (lambda: world.take_picture((math.nan, 0, 0)), "nan"),
+                        (lambda: world.capture_image((math.nan, 0, 0)), "nan"),
                         (lambda: world.record(tmp_path / "x", spacing_m=0), "spacing_m is 0"),
                         (lambda: world.record(tmp_path / "x", trajectory=numpy.zeros((0, 4))), "poses of trajectory"),
                         (lambda: panonav.SimulatedRobot(world, (99, 99, 0)), "a free place")]:
@@ -80,7 +80,7 @@ def test_a_robot_drives_until_something_is_in_its_way():
         assert world.is_free((robot.pose.x_m, robot.pose.y_m))
     stopped = robot.pose
     assert not robot.drive(0.3, 0.1, 1.0) and (robot.pose.x_m, robot.pose.y_m) == (stopped.x_m, stopped.y_m)
-    robot.carry_to((x, y, 1.0))
+    robot.teleport_to((x, y, 1.0))
     assert robot.pose == panonav.Pose2(x, y, 1.0) and robot.odometry.x_m > 0.2
     for wrong in ({"forward_m_s": math.nan}, {"forward_m_s": 0.1, "seconds": -1}):
         with pytest.raises(panonav.ContractError):
@@ -115,7 +115,7 @@ def test_navigator(office):
 
 def test_calibration_finds_the_mirror(tmp_path):
     world = panonav.SimulatedWorld("office")
-    picture = world.take_picture(world.random_pose(1))
+    picture = world.capture_image(world.random_pose(1))
     panonav.write_png(tmp_path / "seen.png", picture)
     printed = command_json("calibrate", tmp_path / "seen.png", "-o", tmp_path / "theirs.toml", "--profile",
                            "hyperboloidal", "--overlay", tmp_path / "overlay.png")[0]

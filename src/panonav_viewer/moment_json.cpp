@@ -134,11 +134,11 @@ std::string retained_to_json(const recordings::RunMoment& moment) {
   return json.is_null() ? std::string() : to_text_with_valid_utf8(json);
 }
 
-void RetainedParts::take(const recordings::RunMoment& from) {
+void RetainedParts::update_from(const recordings::RunMoment& from) {
   const auto replace = [this](auto& kept, const auto& update) {
     if (update.empty()) return;
     kept = update;
-    ++times;
+    ++replacement_count;
   };
   if (!from.references.empty()) moment.reference_views = from.reference_views;
   replace(moment.references, from.references);
@@ -149,7 +149,7 @@ void RetainedParts::take(const recordings::RunMoment& from) {
   replace(moment.directions, from.directions);
   if (from.goal) {
     moment.goal = from.goal;
-    ++times;
+    ++replacement_count;
   }
 }
 

@@ -25,9 +25,9 @@ namespace panonav::viewer {
 /// number of replacements.
 struct RetainedParts {
   recordings::RunMoment moment;
-  std::size_t times = 0;
+  std::size_t replacement_count = 0;
 
-  void take(const recordings::RunMoment& from);
+  void update_from(const recordings::RunMoment& from);
 };
 
 /// Values of a past moment that the page keeps for the path and the timeline.

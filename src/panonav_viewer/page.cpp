@@ -143,7 +143,7 @@ void RunPage::add(const recordings::RunMoment& moment) {
   const std::size_t number = moments_.size();
   moments_.push_back(moment_to_json(moment, number));
   pictures_.emplace_back();
-  retained_.take(moment);
+  retained_.update_from(moment);
   // Store changes of retained parts with the moment at which they occur.
   recordings::RunMoment changed;
   changed.plan = moment.plan;

@@ -243,9 +243,9 @@ struct ViewServer::Implementation {
           if (!all_.frames.empty()) next_ = all_.frames.back()->number();
           greeted_ = true;
         }
-        if (retained_ != all_.retained.times) {
+        if (retained_ != all_.retained.replacement_count) {
           text += format_event("retained", retained_to_json(all_.retained.moment));
-          retained_ = all_.retained.times;
+          retained_ = all_.retained.replacement_count;
         }
         for (const auto& frame : all_.frames) {
           if (frame->number() >= next_) unsent.push_back(frame);
@@ -377,7 +377,7 @@ struct ViewServer::Implementation {
         for (std::size_t i = 1; 2 * i < past.size(); ++i) past[i] = std::move(past[2 * i]);
         past.resize(max_past / 2);
       }
-      retained.take(moment);
+      retained.update_from(moment);
       frames.push_back(std::make_shared<Frame>(std::move(moment), number++));
       kept_bytes += frames.back()->bytes();
       // Keep some frames, because a viewer requests the pictures of a moment some time after its

@@ -23,7 +23,7 @@ double log_ratio(ViewLikelihood& likelihood, const Pose2& pose) {
   return ratio;
 }
 
-PackedSignature seen(const RememberedRoom& place, const Pose2& pose) {
+PackedSignature observed_signature(const RememberedRoom& place, const Pose2& pose) {
   return pack(compute_signature(place.room.see(pose)), place.memory.full_scale());
 }
 
@@ -34,7 +34,7 @@ ViewLikelihood make_likelihood(const RememberedRoom& place, bool compass) {
 }
 
 /// Compares the view with the references of every `step`-th site.
-void compare_every(ViewLikelihood& likelihood, std::uint32_t step) {
+void compare_every_nth_site(ViewLikelihood& likelihood, std::uint32_t step) {
   std::vector<std::uint32_t> sites;
   for (std::uint32_t site = 0; site < likelihood.sites().size(); site += step) {
     sites.push_back(site);
@@ -65,7 +65,7 @@ TEST(ObservationModel, LearnsHowLikenessFallsWithDistance) {
   const double far = of_fine.far_difference * of_fine.far_difference;
   for (int i = 0; i < 40; ++i) {
     const Pose2 pose = fine.room.between(fine.grid, fine.step_m, random);
-    const ColumnProfiles view(seen(fine, pose));
+    const ColumnProfiles view(observed_signature(fine, pose));
     for (const ViewId reference : fine.memory.views()) {
       const double distance_m =
           distance(fine.memory.info(reference).pose->position(), pose.position());
@@ -103,8 +103,8 @@ TEST(ViewLikelihood, IsGreatestNearTheTruthAndInItsHeading) {
   constexpr int queries = 40;
   for (int i = 0; i < queries; ++i) {
     const Pose2 truth = place.room.between(place.grid, place.step_m, random);
-    likelihood.set_view(seen(place, truth));
-    compare_every(likelihood, 1);
+    likelihood.set_view(observed_signature(place, truth));
+    compare_every_nth_site(likelihood, 1);
     const double there = log_ratio(likelihood, truth);
     EXPECT_GT(there,
               log_ratio(likelihood, {truth.x_m, truth.y_m, wrap_angle(truth.heading_rad + 1.0)}));
@@ -131,8 +131,9 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   const RememberedRoom place(64, {}, 0.4);
   ViewLikelihood likelihood = make_likelihood(place, true);
   Random random(2);
-  likelihood.set_view(seen(place, place.room.between(place.grid, place.step_m, random)));
-  compare_every(likelihood, 2);
+  likelihood.set_view(
+      observed_signature(place, place.room.between(place.grid, place.step_m, random)));
+  compare_every_nth_site(likelihood, 2);
   Particles particles;
   for (int i = 0; i < 500; ++i) {
     particles.add({random.uniform(-3.0, 9.0), random.uniform(-3.0, 9.0),
@@ -183,8 +184,8 @@ TEST(ViewLikelihood, WithoutTheCompassHeadingsDoNotCount) {
   ViewLikelihood likelihood = make_likelihood(place, false);
   Random random(3);
   const Pose2 truth = place.room.between(place.grid, place.step_m, random);
-  likelihood.set_view(seen(place, truth));
-  compare_every(likelihood, 1);
+  likelihood.set_view(observed_signature(place, truth));
+  compare_every_nth_site(likelihood, 1);
   const double ahead = log_ratio(likelihood, truth);
   EXPECT_GT(ahead, 0.0);
   EXPECT_NEAR(log_ratio(likelihood, {truth.x_m, truth.y_m, wrap_angle(truth.heading_rad + 2.0)}),
@@ -196,13 +197,13 @@ TEST(ViewLikelihood, ANewViewForgetsTheLast) {
   ViewLikelihood likelihood = make_likelihood(place, true);
   Random random(4);
   const Pose2 truth = place.room.between(place.grid, place.step_m, random);
-  likelihood.set_view(seen(place, truth));
+  likelihood.set_view(observed_signature(place, truth));
   const std::vector<std::uint32_t> twice{0, 0};
   likelihood.compare(twice);
   likelihood.compare(twice);  // once is enough
   EXPECT_EQ(likelihood.compared_sites().size(), 1U);
   EXPECT_TRUE(likelihood.min_difference(likelihood.compared_sites()));
-  likelihood.set_view(seen(place, truth));
+  likelihood.set_view(observed_signature(place, truth));
   EXPECT_FALSE(likelihood.is_compared(0));
   EXPECT_FALSE(likelihood.min_difference(std::vector<std::uint32_t>{0}));
   EXPECT_EQ(log_ratio(likelihood, truth), 0.0);  // nothing compared, nothing explained

@@ -33,7 +33,7 @@
 namespace panonav::testing {
 namespace {
 
-Observation observe(const ToyWorld& world, const Pose2& pose, std::size_t number) {
+Observation make_observation(const ToyWorld& world, const Pose2& pose, std::size_t number) {
   Observation seen(landmark_picture(world, pose));
   seen.name = "view " + std::to_string(number);
   return seen;
@@ -80,7 +80,7 @@ class MemoryUpdating : public ::testing::Test {
     Memoriser memoriser(path, {.source = landmark_panoramas()});
     std::size_t number = 0;
     for (const Pose2& pose : grid_poses(6)) {
-      Observation seen = observe(world, pose, number++);
+      Observation seen = make_observation(world, pose, number++);
       seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
       memoriser.add(std::move(seen));
     }
@@ -332,7 +332,7 @@ TEST_F(MemoryUpdating, NoiseInTheMidstOfARunDropsNothingAndHasNoAnswersOfItsOwn)
 TEST_F(MemoryUpdating, WithoutOdometryNothingIsSaidAndNothingLearnt) {
   const PlaceRecogniser recogniser(path);
   MemoryUpdater updater(path);
-  const Observation seen = observe(world, {1.0, 1.0, 0.0}, 0);
+  const Observation seen = make_observation(world, {1.0, 1.0, 0.0}, 0);
   updater.observe(seen, recogniser.encoder().panorama(seen), recogniser.localise(seen));
   const auto changes = updater.finish("nothing");
   EXPECT_EQ(changes.observations, 0U);
@@ -364,7 +364,7 @@ TEST_F(MemoryUpdating, ALiveMemoryKeepsKnownPlacesTrueByOdometry) {
                          .memoriser = {.source = landmark_panoramas()}});
   for (std::size_t i = 0; i < 21; ++i) {
     const Pose2 pose{0.125 * static_cast<double>(i), 1.05, 0.0};
-    Observation seen = observe(i >= 9 && i < 13 ? changed : world, pose, 100 + i);
+    Observation seen = make_observation(i >= 9 && i < 13 ? changed : world, pose, 100 + i);
     seen.odometry = pose;
     const auto answer = live.answer(seen);
     EXPECT_FALSE(answer.is_new) << i;  // placed at the end, by odometry

@@ -58,10 +58,10 @@ TEST(MomentJson, TellsWhatStays) {
   EXPECT_EQ(parsed["walls"], json::parse("[[0.0, 0.0, 5.0, 0.0]]"));
   // Other references without names have not those of the ones before.
   RetainedParts retained;
-  retained.take(moment);
+  retained.update_from(moment);
   recordings::RunMoment later{.stamp_s = 1.0};
   later.references = {{5.0, 6.0}};
-  retained.take(later);
+  retained.update_from(later);
   const json kept = json::parse(retained_to_json(retained.moment));
   EXPECT_EQ(kept["references"], json::parse("[5.0, 6.0]"));
   EXPECT_FALSE(kept.contains("names"));

@@ -123,13 +123,13 @@ TEST_F(ReportPages, AStoryBeginsThePageAndLinksToItsParts) {
                   {.title = "taken",
                    .shown = ReportPicture{make_data_url("image/png", {}), "hall"},
                    .value = "2 m",
-                   .meaning = "way"}},
+                   .meaning = "path length"}},
                  "Begin here", {"panonav demo"});
   const std::string written = write(page);
   EXPECT_EQ(plots_of(written), std::vector<std::string>{"a map"});
   EXPECT_TRUE(contains(written, "<h2><a href=\"#part3\">drawn</a></h2>"));
   EXPECT_TRUE(contains(written, "<h2><a href=\"#part1\">taken</a></h2>"));
-  EXPECT_TRUE(contains(written, "<p><b>2 m</b> way</p>"));
+  EXPECT_TRUE(contains(written, "<p><b>2 m</b> path length</p>"));
   EXPECT_TRUE(contains(written, "<h2>Begin here</h2><pre>panonav demo\n</pre>"));
   EXPECT_LT(written.find("Begin here"), written.find("<p>afterwards</p>"));
 }
