@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <atomic>
 
+#include "cli/option_values.hpp"
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
 #include "panonav_ros2/localisation_node.hpp"
