@@ -1,8 +1,8 @@
 // Learns the coefficients of `place_probability` on built-in scenes and prints them: 32 places,
 // each remembered with all and with few references, of all and of few
-// components, asked for its own places, as memorised and with other light and a tenth hidden, for
-// places of other variants of its scene and for places of other scenes. Logistic regression; own
-// places, variants and other scenes count a third each. First the coefficients of the columns,
+// components, queried with its own places, as memorised and with other light and a tenth hidden,
+// for places of other variants of its scene and for places of other scenes. Logistic regression;
+// own places, variants and other scenes count a third each. First the coefficients of the columns,
 // then those of the local features, from the queries at which the columns leave doubt by the
 // coefficients that are in use: where the former have changed, run again with them. About eight
 // minutes.

@@ -34,7 +34,7 @@ class People {
   struct Person {
     Point2 position;
     std::vector<Point2> path;  // remaining way points, the next one last
-    float brightness = 0.0F;   // of the clothes
+    float brightness = 0.0F;   // brightness of the clothes
     double waited_s = 0.0;
   };
   void choose_path(Person& person);

@@ -98,7 +98,7 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
   const std::string path = normalise_path(written);
   const auto found = find_texture_file(path, directory);
   if (!found) {
-    if (reported_.emplace(path, true).second) {
+    if (reported_paths_.insert(path).second) {
       warnings_.push_back(directory.string() + ": texture \"" + path +
                           "\" was not found; a plain colour is shown instead");
     }
@@ -107,7 +107,7 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
   const std::string file_name = found->filename().string();
   const std::string name = fs::path(path).filename().string();
   if (file_name != name && to_lower_case(file_name) == to_lower_case(name) &&
-      reported_.emplace(path, true).second) {
+      reported_paths_.insert(path).second) {
     warnings_.push_back(directory.string() + ": texture \"" + path +
                         "\" was not found; taken instead, with letters of other case: " +
                         found->lexically_normal().string());

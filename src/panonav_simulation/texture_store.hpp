@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,7 +45,7 @@ class TextureStore {
  private:
   TextureOptions options_;
   std::map<std::string, std::shared_ptr<const Image>> images_;  // by path; null: unreadable
-  std::map<std::string, bool> reported_;
+  std::set<std::string> reported_paths_;
   std::vector<std::string> warnings_;
 };
 

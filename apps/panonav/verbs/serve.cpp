@@ -110,8 +110,8 @@ Run declare_serve(Arguments& arguments) {
   arguments.option("--token-file FILE", values->token_file,
                    "Answer only clients that send the first line of this file as bearer token");
   arguments.option("--max-waiting", values->max_waiting, 1,
-                   "Largest number of images that wait for an answer; if more images arrive, their "
-                   "clients are asked to retry");
+                   "Largest number of images that wait for an answer; more images are "
+                   "answered with status 503 (retry later)");
   arguments.option("--max-held-views", values->max_held_views, 0,
                    "Load a memory from a PostgreSQL server completely if it has at most this "
                    "number of views (2700 bytes per view); larger memories need only 350 bytes per "

@@ -276,6 +276,7 @@ class Localiser::Query {
 
   /// Adds evidence of features only where columns are inconclusive (a sequential test).
   void estimate_known_probability() {
+    place_.known_probability = place_probability(place_.evidence);
     is_known_by_columns_ = is_known();
     if (make_features_ && localiser_.features_ && is_inconclusive(place_.evidence)) {
       if (!features_) features_ = compute_features(Handedness::original);
@@ -283,12 +284,12 @@ class Localiser::Query {
       if (features_ && mirrored) {
         place_.evidence.features = compared_->criterion.feature_evidence(
             *features_, *mirrored, localiser_.features_, ranked_, mask_);
+        place_.known_probability = place_probability(place_.evidence);
       }
     }
-    place_.known_probability = place_probability(place_.evidence);
     place_.known = is_known();
   }
-  [[nodiscard]] bool is_known() const { return place_probability(place_.evidence) >= 0.5; }
+  [[nodiscard]] bool is_known() const { return place_.known_probability >= 0.5; }
 
   /// Lists the matches with the heading relative to each, by the visual compass.
   void list_matches() {

@@ -78,7 +78,7 @@ class Localiser {
   // its own views.
   std::shared_ptr<const ComparedViews> held_;
   std::shared_ptr<const VisualMemory> sampled_;  // null: the memory is held in RAM
-  double spacing_m_ = 0.0;                       // of the references; only if not held
+  double spacing_m_ = 0.0;                       // spacing of the references; used if not held
   PlaceModel place_model_;
   PositionModel position_model_;
   FeatureSource features_;  // empty if features are not used

@@ -38,10 +38,10 @@ constexpr double min_difference_unit = 1e-4;
 /// Views left out of the memory in turn, and the views that resemble them.
 struct LeftOutViews {
   std::vector<Point2> true_positions;
-  /// All matches of the search, lookalikes included. The interpolation is learnt from these, since
-  /// they matter if there are few views.
+  /// All matches of the search, aliased views included. The interpolation is learnt from these,
+  /// since they matter if there are few views.
   std::vector<ResemblingViews> found;
-  /// Matches without lookalikes, ranked as for a query; the radius is learnt from these.
+  /// Matches without aliased views, ranked as for a query; the radius is learnt from these.
   std::vector<ResemblingViews> answered;
 
   [[nodiscard]] std::size_t size() const { return true_positions.size(); }
@@ -56,11 +56,11 @@ struct LeftOutViews {
 };
 
 // Returns the best match at each place farther than `elsewhere_spacings` from `truth` and from the
-// others: the view's lookalikes.
-std::vector<ViewId> find_lookalikes(const VisualMemory& memory, Point2 truth,
-                                    std::span<const RankedMatch> ranked, double spacing_m) {
+// others: perceptual aliasing.
+std::vector<ViewId> find_aliased_views(const VisualMemory& memory, Point2 truth,
+                                       std::span<const RankedMatch> ranked, double spacing_m) {
   std::vector<Point2> places{truth};
-  std::vector<ViewId> lookalikes;
+  std::vector<ViewId> aliased;
   for (const RankedMatch& match : ranked) {
     const auto& pose = memory.info(match.match.view).pose;
     if (!pose || std::ranges::any_of(places, [&](Point2 place) {
@@ -69,9 +69,9 @@ std::vector<ViewId> find_lookalikes(const VisualMemory& memory, Point2 truth,
       continue;
     }
     places.push_back(pose->position());
-    lookalikes.push_back(match.match.view);
+    aliased.push_back(match.match.view);
   }
-  return lookalikes;
+  return aliased;
 }
 
 void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& support, ViewId view,
@@ -88,7 +88,7 @@ void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& sup
       std::span(found.matches)
           .first(std::min<std::size_t>(found.matches.size(), PositionModel::max_candidates));
   const std::vector<RankedMatch> all = ranking.rank(own, nearest);
-  for (const ViewId other : find_lookalikes(memory, truth, ranked, spacing_m)) {
+  for (const ViewId other : find_aliased_views(memory, truth, ranked, spacing_m)) {
     excluded.push_back(other);
     std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
   }

@@ -37,7 +37,7 @@ struct PositionModel {
   double spacing_m = 0.0;  ///< of the posed views
   /// The position may be that of a lookalike if the best match's difference is at least this
   /// share of the difference of the best match elsewhere (more than 3 spacings away). nullopt if
-  /// lookalikes are rare.
+  /// aliased views are rare.
   std::optional<double> ambiguous_from;
   double ambiguous_radius_m = 0.0;  ///< lower limit of the radius from `ambiguous_from` on
   double median_error_m = 0.0;      ///< median position error of the views left out

@@ -10,7 +10,7 @@ namespace panonav::fleet {
 
 namespace {
 
-constexpr std::size_t codes_per_cell = 16;  // of four bits
+constexpr std::size_t codes_per_cell = 16;  // each code has four bits
 constexpr std::size_t sums_per_step = 8;    // that share a step
 
 std::size_t round_up(std::size_t count, std::size_t multiple) {

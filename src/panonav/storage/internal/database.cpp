@@ -87,13 +87,16 @@ Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::m
   execute("PRAGMA cell_size_check=ON");
 }
 
+std::filesystem::path with_suffix(std::filesystem::path path, const char* suffix) {
+  path += suffix;
+  return path;
+}
+
 std::int64_t Database::file_bytes() const {
   std::int64_t bytes = 0;
   for (const char* suffix : {"", "-wal"}) {
-    std::filesystem::path file = path_;
-    file += suffix;
     std::error_code missing;
-    const auto size = std::filesystem::file_size(file, missing);
+    const auto size = std::filesystem::file_size(with_suffix(path_, suffix), missing);
     if (!missing) bytes += static_cast<std::int64_t>(size);
   }
   return bytes;

@@ -23,6 +23,9 @@ enum class DatabaseMode {
   immutable,  ///< a file that nobody can change
 };
 
+/// Returns the name of a file that SQLite keeps beside `path`, such as its log with "-wal".
+[[nodiscard]] std::filesystem::path with_suffix(std::filesystem::path path, const char* suffix);
+
 /// A connection to an SQLite file. Functions throw FileError of one line that names the file if
 /// SQLite refuses anything.
 class Database {

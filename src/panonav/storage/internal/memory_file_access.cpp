@@ -33,12 +33,6 @@ fs::path parent_folder(const fs::path& path) {
   return folder.empty() ? fs::path(".") : folder;
 }
 
-fs::path with_suffix(const fs::path& path, const char* suffix) {
-  fs::path result = path;
-  result += suffix;
-  return result;
-}
-
 bool is_writable(const fs::path& path) {
   return ::faccessat(AT_FDCWD, path.c_str(), W_OK, AT_EACCESS) == 0;
 }

@@ -162,11 +162,6 @@ bool is_own_log(const fs::path& file, const fs::path& log) {
 
 void require_own_log(const fs::path& file) {
   std::error_code missing;
-  const auto with_suffix = [&](const char* suffix) {
-    fs::path path = file;
-    path += suffix;
-    return path;
-  };
   const auto size = [&](const fs::path& path) {
     const auto bytes = fs::file_size(path, missing);
     return missing ? 0 : bytes;
@@ -178,10 +173,10 @@ void require_own_log(const fs::path& file) {
                         "log belongs to");
   };
   // A journal belongs to another program, whose changes have no marks.
-  const fs::path journal = with_suffix("-journal");
+  const fs::path journal = with_suffix(file, "-journal");
   if (size(journal) > 0 && std::ifstream(journal).peek() != 0) refuse(journal);
 
-  const fs::path log = with_suffix("-wal");
+  const fs::path log = with_suffix(file, "-wal");
   // Repeated, because a writer may move its log into the file between the two checks.
   constexpr int max_attempts = 20;
   constexpr std::chrono::milliseconds pause(20);
