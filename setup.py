@@ -1,6 +1,7 @@
 """The Python package, built by the library's own CMake: `pip install --no-build-isolation .`
 
-PANONAV_BUILD names a build folder that is there already, such as build/release; else build/python is made.
+PANONAV_BUILD names an existing build folder, such as build/release; otherwise the library is built in build/python.
+The command is not part of the Python package.
 """
 import os
 import pathlib
@@ -12,6 +13,8 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 ROOT = pathlib.Path(__file__).resolve().parent
+# Parts of the build that the Python package does not need.
+LEFT_OUT = ("BUILD_COMMAND", "BUILD_TESTS", "LAB", "ROS2", "SERVER", "VIEWER")
 
 
 class CMakeBuild(build_ext):
@@ -20,9 +23,9 @@ class CMakeBuild(build_ext):
         if not (build / "CMakeCache.txt").exists():
             subprocess.run(
                 ["cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON",
-                 "-DPANONAV_BUILD_TESTS=OFF", "-DPANONAV_ROS2=OFF", f"-DPython_EXECUTABLE={sys.executable}"],
+                 f"-DPython_EXECUTABLE={sys.executable}", *(f"-DPANONAV_{part}=OFF" for part in LEFT_OUT)],
                 check=True)
-        subprocess.run(["cmake", "--build", build, "--target", "panonav_python", "panonav_command"], check=True)
+        subprocess.run(["cmake", "--build", build, "--target", "panonav_python"], check=True)
         folder = ROOT / "python" if self.inplace else pathlib.Path(self.build_lib).resolve()
         subprocess.run(["cmake", "--install", build, "--component", "python", "--prefix", folder], check=True)
 

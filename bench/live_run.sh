@@ -15,7 +15,7 @@ cd "$folder"
 if [ ! -e references.panonav ]; then
   "$panonav" simulate hall references --grid 0.07 --rows 128 --columns 256 "${sphere[@]}"
   sed -i 's/"panorama"/"equirectangular"/; /elevation_deg/d' references/dataset.toml
-  "$panonav" memorise references references.panonav --quiet
+  "$panonav" memorise references.panonav references --quiet
 fi
 for scene in hall office; do
   [ -e $scene ] && continue

@@ -98,7 +98,7 @@ def main():
         toml = folder / "references" / "dataset.toml"
         text = toml.read_text().replace('"panorama"', '"equirectangular"')
         toml.write_text("".join(line for line in text.splitlines(True) if "elevation_deg" not in line))
-        panonav("memorise", "references", "references.panonav")
+        panonav("memorise", "references.panonav", "references")
         panonav("simulate", "hall", "walk", "--path", "walk", "--poses", "20", "--rows", "640", "--columns", "1280",
                 *SPHERE[:-1])
         subprocess.run(["ffmpeg", "-v", "error", "-i", "walk/view_%05d.png", "-q:v", "3", "%05d.jpg"], check=True,

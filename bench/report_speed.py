@@ -40,7 +40,7 @@ def main():
         panonav("simulate", "hall", folder / "grid", "--grid", "1", "--kind", "panorama", "--seed", "3")
         panonav("simulate", "hall", folder / "drive", "--kind", "panorama", "--seed", "3", "--path", "walk",
                 "--spacing-m", "0.06", "--poses", PICTURES)
-        panonav("memorise", folder / "grid", folder / "hall.panonav")
+        panonav("memorise", folder / "hall.panonav", folder / "grid")
         panonav("track", folder / "hall.panonav", folder / "drive", "--report", folder / "report")
         page = folder / "report" / "index.html"
         browser = Browser(folder / "profile")

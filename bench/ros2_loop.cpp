@@ -291,7 +291,16 @@ std::vector<StampedPose> taught_views(const std::string& memory) {
 
 /// After the best common motion of all.
 double rms_m(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truths) {
-  const auto error = trajectory_error(Trajectory(estimate), Trajectory(truths));
+  const Trajectory truth(truths);
+  Trajectory estimated;
+  Trajectory interpolated;
+  for (const StampedPose& each : estimate) {
+    const auto pose = truth.at(each.stamp_s, 1.0);
+    if (!pose) continue;
+    estimated.append(each);
+    interpolated.append({each.stamp_s, *pose});
+  }
+  const auto error = trajectory_error(estimated, interpolated);
   return error ? error->position_m.rms : -1.0;
 }
 

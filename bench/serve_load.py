@@ -30,7 +30,7 @@ def main() -> None:
 
         run("simulate", "office", "drive", "--grid", "0.5")
         run("simulate", "office", "queries", "--random", "60", "--seed", "7")
-        run("memorise", "drive", "office.panonav")
+        run("memorise", "office.panonav", "drive")
         pictures = [path.read_bytes() for path in sorted((folder / "queries").glob("*.png"))]
 
         process = subprocess.Popen([panonav, "localise", "office.panonav", "queries", "--json"], cwd=folder,

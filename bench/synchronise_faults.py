@@ -411,7 +411,7 @@ def measure(arguments, folder):
         run = lambda *words: json.loads(subprocess.run([str(word) for word in words] + ["--json"], check=True,
                                                        capture_output=True, text=True).stdout.splitlines()[-1])
         run(panonav, "simulate", "office", folder / "drive", "--random", "200", "--seed", "5")
-        run(panonav, "memorise", folder / "drive", folder / "office.panonav")
+        run(panonav, "memorise", folder / "office.panonav", folder / "drive")
         info = run(panonav, "info", folder / "office.panonav")
         shape = 2 * info["signature"]["rows"] * info["signature"]["components"] if "signature" in info else 0
         bare = (shape * info["views"] + info.get("feature_bytes", 0)) / info["views"]

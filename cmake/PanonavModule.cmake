@@ -1,5 +1,8 @@
 # One target per module, and one test program per module.
 
+# Builds all files that `cmake --install` installs, without the tests.
+add_custom_target(panonav_installed)
+
 # panonav_module(NAME [APART] [SOURCES ...] [DEPENDS modules of ours ...] [LINK public libraries ...]
 #                [LINK_PRIVATE libraries that no public header shows ...] [PACKAGES that find those ...])
 # Makes the static library panonav_NAME with the alias panonav::NAME of the sources beside the CMake file and in its
@@ -56,6 +59,7 @@ function(panonav_module name)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/${folder}
           COMPONENT development FILES_MATCHING PATTERN "*.hpp" PATTERN internal EXCLUDE)
   set_property(GLOBAL APPEND PROPERTY PANONAV_MODULE_NAMES ${name})
+  add_dependencies(panonav_installed ${target})
   set_property(GLOBAL PROPERTY PANONAV_DEPENDS_${name} ${ARG_DEPENDS})
   set_property(GLOBAL PROPERTY PANONAV_PACKAGES_${name} ${ARG_PACKAGES})
 endfunction()
@@ -209,6 +213,7 @@ function(panonav_one_library)
   set_target_properties(panonav_library PROPERTIES OUTPUT_NAME panonav EXPORT_NAME library
     VERSION ${PANONAV_ABI}.${PROJECT_VERSION} SOVERSION ${PANONAV_ABI} LINK_DEPENDS ${exports}
     LINKER_LANGUAGE CXX LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
+  add_dependencies(panonav_installed panonav_library)
   install(TARGETS panonav_library EXPORT panonav_library
           LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
   install(EXPORT panonav_library NAMESPACE panonav:: FILE panonav-library.cmake

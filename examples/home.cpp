@@ -22,7 +22,7 @@ int main(int argc, char** argv) try {
   Robot robot{panonav::read_dataset(argv[3])};
   while (robot.is_on()) {
     const auto way = guide.home(robot.capture());
-    if (way.direction_rad) robot.drive(*way.direction_rad, way.distance_r);
+    if (way.direction_rad) robot.drive(*way.direction_rad, way.distance_r());
   }
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';

@@ -186,9 +186,10 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
   vector.xi = static_cast<double>(positions_[best.position].xi);
   vector.eta = static_cast<double>(positions_[best.position].eta);
   vector.heading_rad = wrap_angle(2.0 * std::numbers::pi * static_cast<double>(shift) / columns_);
-  const double squared_norm = vector.xi * vector.xi + vector.eta * vector.eta;
-  // The position is uniform in its lattice cell: its variance is spacing^2 / 6.
-  vector.confidence = squared_norm / (squared_norm + spacing_ * spacing_ / 6.0);
+  // Position and turn are uniform in their cells: variances are widths^2 / 12.
+  const double column_rad = 2.0 * std::numbers::pi / columns_;
+  vector.covariance[0] = vector.covariance[4] = spacing_ * spacing_ / 12.0;
+  vector.covariance[8] = column_rad * column_rad / 12.0;
   vector.frequencies = columns_ / 2.0;
   return vector;
 }

@@ -42,10 +42,11 @@ class ExpectedImageHoming {
   }
 
   /// Conventions as `panonav::home_vector`. `residual` is the smallest sum of squared differences
-  /// over the energy of home and expected view; `confidence` accounts for the spacing of the
-  /// positions only. Of equal differences the position nearest to (0, 0) wins; views without
-  /// structure give zeros and residual 1. Throws ContractError unless both rows have `columns`
-  /// finite values. Safe to call from several threads. Cost: P N^2 multiplications and additions.
+  /// over the energy of home and expected view; `covariance` accounts for the spacing of
+  /// the positions and columns only. Of equal differences the position nearest to (0, 0) wins;
+  /// views without structure give zeros and residual 1. Throws ContractError unless both rows have
+  /// `columns` finite values. Safe to call from several threads. Cost: P N^2 multiplications and
+  /// additions.
   [[nodiscard]] HomeVector home_vector(std::span<const float> home,
                                        std::span<const float> current) const;
 

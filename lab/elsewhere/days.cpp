@@ -184,7 +184,7 @@ DayResult localise_all(const RememberedPlace& remembered,
 MemoryUpdate::LocalisedView make_localised_view(const Pose2& odometry,
                                                 const PackedSignature& signature,
                                                 const Place& answer) {
-  MemoryUpdate::LocalisedView view{odometry, signature, answer.known_probability, std::nullopt,
+  MemoryUpdate::LocalisedView view{odometry, signature, answer.probability, std::nullopt,
                                    std::nullopt};
   if (answer.position && answer.heading_rad) {
     const Point2 at = answer.position->position();

@@ -166,8 +166,8 @@ void map_indoor_walk(const MappingExperiments& f11) {
   add_row(f11.result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
           static_cast<double>(filter_closures(bridged_map).size()), "closures");
   // Map with closures by single views, for comparison.
-  const auto single = simulation::map_recording(
-      walk, {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .max_drift = 100.0}});
+  const auto single =
+      simulation::map_recording(walk, {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1}});
   auto unconfirmed = filter_closures(single);
   add_row(f11.result, "f11.indoor_walk.without_sequence",
           "indoor_walk_360: loops that single views would close, were no sequence asked for",

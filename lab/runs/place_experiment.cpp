@@ -84,6 +84,7 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
     std::size_t nearest = 0;
     std::size_t nearest_or_neighbour = 0;
     std::size_t known = 0;
+    std::size_t stated = 0;  // answers with a radius
     std::size_t inside = 0;
     std::vector<double> heading_errors;
     std::vector<double> position_errors;
@@ -105,13 +106,15 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
                                    : std::numbers::pi);
       if (!answer.position) continue;
       position_errors.push_back(distance(answer.position->position(), truth.position()));
-      inside += position_errors.back() <= answer.position->radius_m.value_or(0.0) ? 1 : 0;
+      if (!answer.position->radius_m) continue;  // states nothing
+      ++stated;
+      inside += position_errors.back() <= *answer.position->radius_m ? 1 : 0;
     }
     results.push_back({condition.name, success_rate(nearest, query_count),
                        success_rate(nearest_or_neighbour, query_count),
                        success_rate(known, query_count), quantile(heading_errors, 0.5),
                        quantile(heading_errors, 0.95), quantile(position_errors, 0.5),
-                       success_rate(inside, position_errors.size())});
+                       success_rate(inside, stated)});
   }
   return results;
 }

@@ -66,7 +66,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
     TrackedImage image;
     image.step = i;
     image.state = estimate.state;
-    image.answered = estimate.pose.has_value();
+    image.answered = estimate.position.has_value();
     image.error_m = image.nearest_mode_m = std::numeric_limits<double>::infinity();
     image.heading_error_rad = std::numbers::pi;
     if (!estimate.modes.empty()) {

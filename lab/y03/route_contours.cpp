@@ -49,7 +49,7 @@ std::vector<int> find_edge_columns(std::span<const float> edges, int max_count) 
 }
 
 // Energies of the dual active contour models [Y03 eq. 6-11]. The paper states no weights; these
-// were chosen on lab scenes of seeds 701 to 704 (docs/decisions.md). Units: lines along the path,
+// were chosen on lab scenes of seeds 701 to 704. Units: lines along the path,
 // columns of azimuth, intensities 0 to 1.
 constexpr double tension = 0.002;        // w_alpha, eq. 7
 constexpr double rigidity = 0.002;       // w_beta, eq. 7

@@ -215,6 +215,21 @@ Pose2 ScaleErrorWheels::execute(const Pose2& commanded, Random& random) const {
   return sample_step(step, noise, random);
 }
 
+namespace {
+
+/// Adds the fix of a line that was taken at the true pose `robot`; nullopt: off the route.
+void add_line(RouteRun& run, const Pose2& robot, const std::optional<RouteLineFix>& fix) {
+  run.truth.push_back(robot);
+  run.line_fixes.push_back(fix);
+  if (fix) {
+    run.position_m.push_back(distance(fix->pose.position(), robot.position()));
+  } else {
+    ++run.off_route;
+  }
+}
+
+}  // namespace
+
 RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const RouteRunOptions& options,
                       std::uint64_t seed) {
   std::vector<Pose2> poses(tracker.lines().poses().begin(), tracker.lines().poses().end());
@@ -244,18 +259,13 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   for (int step = 0; step < max_steps; ++step) {
     const auto line =
         simulation::capture_line(*place.renderer, robot, place.camera, noise_of_lines.next());
-    const auto found = tracker.track(line, commanded);
-    run.truth.push_back(robot);
+    std::optional<RouteLineFix> fix;
+    if (const auto found = tracker.track(line, commanded))
+      fix = RouteLineFix{found->pose, found->along_m};
+    lines_without_fix = fix ? 0 : lines_without_fix + 1;
     run.lateral_m.push_back(
         distance_from_expected_part_m(robot.position(), poses, follower.along_m()));
-    lines_without_fix = found ? 0 : lines_without_fix + 1;
-    run.line_fixes.emplace_back();
-    if (found) {
-      run.line_fixes.back() = RouteLineFix{found->pose, found->along_m};
-      run.position_m.push_back(distance(found->pose.position(), robot.position()));
-    } else {
-      ++run.off_route;
-    }
+    add_line(run, robot, fix);
     const Pose2 estimate = tracker.pose().value_or(start);
     const auto target = follower.next_target(estimate.position());
     if (!target) {

@@ -1,11 +1,11 @@
 """Image-based memory for robot navigation from omnidirectional images.
 
     >>> import panonav
-    >>> panonav.memorise("memory_run", "office.panonav")
+    >>> panonav.memorise("office.panonav", "memory_run")
     >>> place = panonav.localise("office.panonav", "query_run/view_00003.png")
-    >>> if place.known: print(place.position.x_m, place.position.y_m)
+    >>> if place.position: print(place.position.x_m, place.position.y_m)
 
-Pictures are arrays of uint8, (rows, columns) or (rows, columns, 3); panoramas are float32. Angles are in
+Images are arrays of uint8 or uint16, PIL images or paths; panoramas are float32. Angles are in
 radians, counter-clockwise; lengths in metres. "No answer" is None; what is wrong raises panonav.Error, which
 is a ValueError for values and an OSError for files. Results have `to_dict()`, of which pandas makes tables.
 """

@@ -1,4 +1,4 @@
-"""`python -m panonav` is the command `panonav`, which lies beside this file or on the path."""
+"""`python -m panonav` runs the command `panonav` of the same build, or else the one on the path."""
 import os
 import pathlib
 import shutil
@@ -10,7 +10,7 @@ def main() -> None:
     beside = pathlib.Path(__file__).with_name("panonav")
     command = beside if beside.exists() else shutil.which("panonav")
     if command is None:
-        sys.exit("panonav: the command is neither beside this package nor on the path")
+        sys.exit("panonav: the command panonav is not on PATH; install its Debian package, or add build/release/bin")
     # In place of this process: signals, standard input and the exit code are the command's own.
     os.execv(command, ["panonav", *sys.argv[1:]])
 

@@ -22,10 +22,13 @@ std::string shape_text(const py::array& array) {
   return shape_text(std::vector<py::ssize_t>(array.shape(), array.shape() + array.ndim()));
 }
 
+std::string type_name(const py::handle& value) {
+  return std::string(py::str(py::type::of(value).attr("__name__")));
+}
+
 py::array require_array(const py::handle& value, const char* what) {
   if (!py::isinstance<py::array>(value)) {
-    throw ContractError(what, std::string(py::str(py::type::of(value).attr("__name__"))),
-                        "a numpy array");
+    throw ContractError(what, type_name(value), "a numpy array");
   }
   return py::reinterpret_borrow<py::array>(value);
 }
@@ -42,19 +45,79 @@ std::string dtype_text(const py::array& array) {
 
 }  // namespace
 
-PictureArray::PictureArray(const py::handle& value, const char* what)
-    : array_(require_array(value, what)) {
-  if (!has_dtype<std::uint8_t>(array_)) {
-    throw ContractError(std::string("dtype of ") + what, dtype_text(array_), "uint8");
+namespace {
+
+/// Converts a PIL image to an array of grey or colour pixels, upright and without alpha channel.
+py::object to_array_of_pil_image(const py::handle& value) {
+  const py::object image = py::module_::import("PIL.ImageOps")
+                               .attr("exif_transpose")(py::reinterpret_borrow<py::object>(value));
+  const auto mode = image.attr("mode").cast<std::string>();
+  const auto pixels = [](const py::object& one) {
+    return py::module_::import("numpy").attr("asarray")(one);
+  };
+  if (mode == "L" || mode == "RGB" || mode == "F") return pixels(image);
+  if (mode.starts_with("I")) {  // PIL opens 16-bit PNG files as 32 bit
+    const py::object whole = pixels(image);
+    if (py::cast<double>(whole.attr("min")()) < 0 ||
+        py::cast<double>(whole.attr("max")()) > 65535) {
+      throw ContractError("pixels of the image", "beyond 16 bit", "0 to 65535");
+    }
+    return whole.attr("astype")("uint16");
   }
-  const auto dimensions = array_.ndim();
-  const bool fits = (dimensions == 2 || (dimensions == 3 && array_.shape(2) == 3)) &&
-                    std::all_of(array_.shape(), array_.shape() + dimensions,
-                                [](auto size) { return size >= 1 && size <= 1 << 24; });
+  return pixels(image.attr("convert")(mode == "1" || mode.starts_with("L") ? "L" : "RGB"));
+}
+
+/// Scales 16-bit pixels to 8 bit, as `read_image` does.
+py::array scale_to_8_bit(const py::array& array) {
+  const py::object wide = array.attr("astype")("uint32");
+  return (wide * py::int_(255) + py::int_(32895)).attr("__rshift__")(16).attr("astype")("uint8");
+}
+
+/// Returns uint8 pixels of (rows, columns) or (rows, columns, 3).
+py::array to_pixels(const py::handle& value, const char* what) {
+  if (is_path(value)) return to_array(read_image(to_path(value, what)));
+  if (py::isinstance<Observation>(value)) {
+    const auto* const image = std::get_if<Image>(&value.cast<const Observation&>().picture);
+    if (image == nullptr) throw ContractError(what, "a Panorama", "an image of the camera");
+    return to_array(*image);
+  }
+  const bool is_pil_image = py::hasattr(value, "getbands") && py::hasattr(value, "mode");
+  const py::object pixels =
+      is_pil_image ? to_array_of_pil_image(value) : py::reinterpret_borrow<py::object>(value);
+  if (!py::isinstance<py::array>(pixels)) {
+    throw ContractError(what, type_name(value),
+                        "a numpy array, a PIL image or the path of an image");
+  }
+  py::array array(pixels);
+  const bool is_16_bit = has_dtype<std::uint16_t>(array);
+  if (!has_dtype<std::uint8_t>(array) && !is_16_bit) {
+    throw ContractError(std::string("dtype of ") + what, dtype_text(array),
+                        "uint8, or uint16, which is scaled to 8 bit");
+  }
+  const auto dimensions = array.ndim();
+  const bool fits =
+      (dimensions == 2 ||
+       (dimensions == 3 && (array.shape(2) == 1 || array.shape(2) == 3 || array.shape(2) == 4))) &&
+      std::all_of(array.shape(), array.shape() + dimensions,
+                  [](auto size) { return size >= 1 && size <= 1 << 24; });
   if (!fits) {
-    throw ContractError(std::string("shape of ") + what, shape_text(array_),
-                        "(rows, columns) or (rows, columns, 3), no size 0");
+    throw ContractError(std::string("shape of ") + what, shape_text(array),
+                        "(rows, columns), (rows, columns, 3), or (rows, columns, 4) with alpha, "
+                        "which is ignored; no size 0");
   }
+  if (dimensions == 3 && array.shape(2) != 3) {
+    const py::object channels =
+        array.shape(2) == 1 ? py::object(py::int_(0)) : py::object(py::slice(0, 3, 1));
+    array = py::array(array[py::make_tuple(py::ellipsis(), channels)]);
+  }
+  return is_16_bit ? scale_to_8_bit(array) : array;
+}
+
+}  // namespace
+
+PictureArray::PictureArray(const py::handle& value, const char* what)
+    : array_(to_pixels(value, what)) {
+  const auto dimensions = array_.ndim();
   const int channels = dimensions == 3 ? 3 : 1;
   const bool whole_pixels =
       array_.strides(1) == channels && (channels == 1 || array_.strides(2) == 1);
@@ -160,8 +223,7 @@ py::array_t<double, py::array::c_style> to_number_rows(const py::handle& value, 
       to_unstructured_array(value, what, columns));
   if (!numbers) {
     PyErr_Clear();
-    throw ContractError(what, std::string(py::str(py::type::of(value).attr("__name__"))),
-                        "an array of numbers");
+    throw ContractError(what, type_name(value), "an array of numbers");
   }
   if (numbers.ndim() != 2 || numbers.shape(1) != columns) {
     throw ContractError(std::string("shape of ") + what, shape_text(numbers),
@@ -188,12 +250,20 @@ py::array_t<double> to_pose_rows(std::span<const Pose2> poses) {
   return rows;
 }
 
+bool is_path(const py::handle& value) {
+  return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
+}
+
+std::filesystem::path to_path(const py::handle& value, const char* what) {
+  if (!is_path(value)) throw ContractError(what, type_name(value), "a path");
+  return value.cast<std::filesystem::path>();
+}
+
 Observation to_observation(const py::handle& value) {
   if (py::isinstance<Observation>(value)) return value.cast<const Observation&>();
   if (py::isinstance<Panorama>(value)) return Observation(value.cast<const Panorama&>());
-  const bool is_path = py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
-  if (!is_path) return Observation(PictureArray(value, "picture").image());
-  const auto file = value.cast<std::filesystem::path>();
+  if (!is_path(value)) return Observation(PictureArray(value, "picture").image());
+  const auto file = to_path(value, "picture");
   const py::gil_scoped_release free;
   Observation observation(read_image(file));
   observation.name = file.filename().string();

@@ -1,5 +1,6 @@
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 
 #include "bindings.hpp"
 #include "panonav/core/error.hpp"
@@ -114,6 +115,9 @@ void bind_basics(py::module_& m) {
       PyErr_SetString(contract_error_type, e.what());
     } catch (const Error& e) {
       PyErr_SetString(error_type, e.what());
+    } catch (const std::filesystem::filesystem_error& e) {  // such as a name of 300 characters
+      const std::string line = e.path1().string() + ": cannot be used: " + e.code().message();
+      PyErr_SetString(file_error_type, line.c_str());
     }
   });
 

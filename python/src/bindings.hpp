@@ -31,8 +31,10 @@ namespace py = pybind11;
 
 // Arrays. A wrong dtype, shape or kind throws ContractError that names the argument `what`.
 
-/// Views uint8 pixels of shape (rows, columns) or (rows, columns, 3) without a copy if the
-/// pixels of each row are contiguous; otherwise copies the array. Any row stride is allowed.
+/// Pixels of an array, a PIL image, an Observation or the path of an image. Arrays are uint8 of
+/// (rows, columns) or (rows, columns, 3) with any strides, and are not copied if the pixels of each
+/// row are contiguous. 16-bit pixels are scaled to 8 bit, and a fourth channel is ignored, as by
+/// `read_image`. Throws FileError on a file that cannot be read.
 class PictureArray {
  public:
   PictureArray(const py::handle& array, const char* what);
@@ -74,7 +76,11 @@ template <class Value>
 [[nodiscard]] CameraModel make_camera_model(const std::string& name, const py::dict& parameters);
 [[nodiscard]] ColumnDirection parse_direction(const std::string& name);
 
-/// Converts an `Observation`, a `Panorama`, an array of pixels, or the path of an image.
+/// True for str and objects such as pathlib.Path.
+[[nodiscard]] bool is_path(const py::handle& value);
+/// Converts a str or an object such as pathlib.Path. Throws ContractError.
+[[nodiscard]] std::filesystem::path to_path(const py::handle& value, const char* what);
+/// Converts an `Observation`, a `Panorama`, or what `PictureArray` accepts.
 [[nodiscard]] Observation to_observation(const py::handle& value);
 
 // Options.
@@ -94,6 +100,8 @@ class Keywords {
   }
   /// True if the caller passed this argument, read or not.
   [[nodiscard]] bool has(const std::string& name) const { return all_.contains(name); }
+  /// True if an argument was not read yet.
+  [[nodiscard]] bool has_unread() const { return !unread_.empty(); }
   /// Throws OptionError, which proposes the most similar name, if an argument was not read.
   void finish() const;
 

@@ -8,10 +8,11 @@ namespace panonav::python {
 
 namespace {
 
-/// Pixel arrays and their views; keeps the arrays alive.
+/// Pixels of a list of images, and their views; keeps the arrays alive.
 class Pictures {
  public:
   explicit Pictures(const py::iterable& pictures) {
+    if (is_path(pictures)) throw ContractError("pictures", "one path", "a list of images");
     for (const py::handle& picture : pictures) arrays_.emplace_back(picture, "picture");
     for (const PictureArray& array : arrays_) views_.push_back(array.view());
   }
@@ -74,8 +75,8 @@ void bind_mirrors(py::module_& m) {
       },
       py::arg("pictures"),
       append_option_list(
-          "Finds the mirror in raw images of one camera, a list of uint8 arrays; more "
-          "images are better. None if no rim is visible.",
+          "Finds the mirror in raw images of one camera, a list of arrays, PIL images or "
+          "paths; more images are better. None if no rim is visible.",
           {options_of<MirrorCircle::SearchOptions>()})
           .c_str());
   m.def(

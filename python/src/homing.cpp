@@ -3,7 +3,7 @@
 #include "panonav/pipeline/catchment_survey.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/pipeline/observation_source.hpp"
-#include "panonav/relative_pose/chance_match.hpp"
+#include "panonav/relative_pose/pair_evidence.hpp"
 #include "panonav/relative_pose/view_pair.hpp"
 #include "recordings.hpp"
 
@@ -23,19 +23,23 @@ void bind_vectors(py::module_& m) {
       .field("heading_rad", &HomeVector::heading_rad, "Heading at home minus the current heading.")
       .field("correlation", &HomeVector::correlation, "Similarity of the views, -1 to 1.")
       .field("residual", &HomeVector::residual, "Share of the energy that stays unexplained.")
-      .field("confidence", &HomeVector::confidence, "0 to 1; near 0 at home.")
+      .field("covariance", &HomeVector::covariance,
+             "Nine numbers: of xi, eta and heading_rad, by the least squares.")
+      .field("has_direction", &HomeVector::has_direction, "False at home.")
       .field("frequencies", &HomeVector::frequencies, "Effective number of frequencies.")
       .field("length", &HomeVector::length, "In units of R.")
       .field("direction_rad", &HomeVector::direction_rad, "In the current robot frame.");
-  Record<ChanceMatch>(m, "ChanceMatch", "Match of two views, compared with noise.")
-      .field("match", &ChanceMatch::match, "Sum of the correlations of both home vectors, -2 to 2.")
-      .field("chance", &ChanceMatch::chance,
-             "Mean match with noise that has the spectrum of the current view.")
-      .field("deviation", &ChanceMatch::deviation, "Standard deviation of the match with noise.")
-      .field("beyond_chance", &ChanceMatch::is_beyond_chance,
-             "True if the match is better than chance.")
-      .field("direction_probability", &ChanceMatch::direction_probability,
-             "That the home vector points home within 45 degrees.");
+  Record<PairEvidence>(m, "PairEvidence", "Relative pose of two views and how probable it is.")
+      .field("vector", &PairEvidence::vector,
+             "Displacement and turn from the current view to home.")
+      .field("direction_deviation_rad", &PairEvidence::direction_deviation_rad,
+             "Standard deviation of the direction, if it is right.")
+      .field("turn_deviation_rad", &PairEvidence::turn_deviation_rad,
+             "Standard deviation of the turn, if it is right.")
+      .field("second", &PairEvidence::second,
+             "The best solution with another turn, the second peak; None if there is no other.")
+      .field("probability", &PairEvidence::probability,
+             "That the direction is right within 45 degrees.");
   Record<PhaseReading>(m, "PhaseReading", "Relative pose of two views from their phases.")
       .field("turn_rad", &PhaseReading::turn_rad, "Heading of b minus heading of a.")
       .field("direction_a_rad", &PhaseReading::direction_a_rad, "Towards b, in the frame of a.")
@@ -69,15 +73,16 @@ void bind_vectors(py::module_& m) {
       py::arg("home"), py::arg("current"),
       ("The home vector by Fourier homing." + option_text).c_str());
   m.def(
-      "chance_match",
+      "pair_evidence",
       [](const HomingView& home, const HomingView& current, const py::kwargs& keywords) {
         FourierHomingOptions options;
         Keywords(keywords).options(options).finish();
         const py::gil_scoped_release free;
-        return compare_with_chance(home, current, options);
+        return compute_pair_evidence(home, current, options);
       },
       py::arg("home"), py::arg("current"),
-      ("Compares the match of two views with that of noise." + option_text).c_str());
+      ("Relative pose and its probability; None for views of two buildings." + option_text)
+          .c_str());
   m.def(
       "image_difference",
       [](const HomingView& a, const HomingView& b, int highest) {
@@ -91,27 +96,33 @@ void bind_vectors(py::module_& m) {
       "Relative pose from the phases of both views; None if a view has no structure.");
 }
 
-std::unique_ptr<HomingGuide> make_homing_guide(const py::object& goal, const py::object& memory,
-                                               const std::optional<PictureSource>& source,
-                                               bool horizon, const py::kwargs& keywords) {
+/// Makes a guide to the place of an image.
+std::unique_ptr<HomingGuide> make_guide_to_image(const py::object& goal,
+                                                 const std::optional<PictureSource>& source,
+                                                 bool horizon, const py::kwargs& keywords) {
   FourierHomingOptions homing;
   HomingViewOptions views{.horizon = horizon};
   Keywords parsed(keywords);
-  parsed.options(homing);
-  if (memory.is_none()) {
-    parsed.options(views.signature).options(views.preprocessing).finish();
-    const Observation observation = to_observation(goal);
-    if (!source) throw ContractError("source", "None", "a PictureSource, without a memory");
-    const py::gil_scoped_release free;
-    return std::make_unique<HomingGuide>(observation, *source, views, homing);
-  }
-  parsed.finish();
-  const auto name = goal.cast<std::string>();
+  parsed.options(homing).options(views.signature).options(views.preprocessing).finish();
+  const Observation observation = to_observation(goal);
+  if (!source) throw ContractError("source", "None", "a PictureSource, without a memory");
+  const py::gil_scoped_release free;
+  return std::make_unique<HomingGuide>(observation, *source, views, homing);
+}
+
+/// Makes a guide to a view of a memory.
+std::unique_ptr<HomingGuide> make_guide_to_view(const py::object& memory,
+                                                const std::filesystem::path& goal,
+                                                const std::optional<PictureSource>& source,
+                                                bool horizon, const py::kwargs& keywords) {
+  FourierHomingOptions homing;
+  Keywords(keywords).options(homing).finish();
   const auto make = [&](const MemoryFile& file) {
-    return std::make_unique<HomingGuide>(file, name, source, homing, 0, horizon);
+    return std::make_unique<HomingGuide>(file, goal.string(), source, homing, 0, horizon);
   };
   if (py::isinstance<SharedFile>(memory)) return memory.cast<SharedFile&>().change(make);
-  const auto path = memory.cast<std::filesystem::path>();
+  const auto path = to_path(memory, "memory");
+  require_memory_first(path, py::str(goal.string()));
   const py::gil_scoped_release free;
   return make(MemoryFile::open(path, Access::read_only));
 }
@@ -254,28 +265,39 @@ void bind_homing(py::module_& m) {
   bind_catchment(m);
   Record<NamedHomingResult>(m, "HomingResult", "The direction home computed from an observation.")
       .field("name", &NamedHomingResult::name, "Name of the image, if it has one.")
-      .field("known", &NamedHomingResult::known, "True if the views match better than chance.")
+      .field(
+          "known", [](const NamedHomingResult& r) { return r.known(); },
+          "False: there is no answer.")
       .field("direction_rad", &NamedHomingResult::direction_rad,
              "In the robot frame; None if it is unknown or the robot is at home.")
-      .field("distance_r", &NamedHomingResult::distance_r, "In units of R.")
-      .field("turn_rad", &NamedHomingResult::turn_rad, "Turn of the robot since the goal's view.")
-      .field("probability", &NamedHomingResult::probability,
-             "That the direction is right within 45 degrees.")
-      .field("vector", &NamedHomingResult::vector, "The home vector, also if it is not known.");
-  const std::string option_text =
-      append_option_list("", {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
-                              options_of<PreprocessingOptions>()});
+      .field(
+          "distance_r", [](const NamedHomingResult& r) { return r.distance_r(); }, "In units of R.")
+      .field(
+          "turn_rad", [](const NamedHomingResult& r) { return r.turn_rad(); },
+          "Turn of the robot since the goal's view.")
+      .field(
+          "probability", [](const NamedHomingResult& r) { return r.probability(); },
+          "That the direction is right within 45 degrees.")
+      .field("evidence", &NamedHomingResult::evidence, "None if it is not known.");
   py::class_<HomingGuide>(m, "HomingGuide",
                           "Computes the direction to a goal from one observation. Several threads "
                           "may use it at the same time.")
-      .def(py::init(&make_homing_guide), py::arg("goal"), py::arg("memory") = py::none(),
-           py::arg("source") = py::none(), py::arg("horizon") = false,
-           ("`goal`: name or id of a view of `memory` (a path or a MemoryFile); without a memory "
-            "an observation made there, and `source` is the image layout. `horizon`: compare only "
-            "the "
-            "mean of the rows near the horizon. Options of signature and preprocessing are allowed "
-            "without a memory only." +
-            option_text)
+      .def(
+          py::init(&make_guide_to_view), py::arg("memory"), py::arg("goal"),
+          py::arg("source") = py::none(), py::arg("horizon") = false,
+          append_option_list(
+              "`memory`: a path or a MemoryFile. `goal`: name or id of one of its views. `source`: "
+              "layout of the robot's images; None: that of the memory. `horizon`: compare only "
+              "the mean of the rows near the horizon.",
+              {options_of<FourierHomingOptions>()})
+              .c_str())
+      .def(py::init(&make_guide_to_image), py::arg("goal"), py::arg("source") = py::none(),
+           py::arg("horizon") = false,
+           append_option_list(
+               "`goal`: an observation made at the goal, or its image. `source`: layout of all "
+               "images.",
+               {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
+                options_of<PreprocessingOptions>()})
                .c_str())
       .def(
           "home",
@@ -289,7 +311,9 @@ void bind_homing(py::module_& m) {
           "home_all",
           [](const HomingGuide& guide, const py::object& recording,
              const std::optional<PictureSource>& source, int threads) {
-            const Dataset dataset = to_dataset(recording, source);
+            // The guide has the layout of its images; that of a list is not used.
+            const auto unused = is_path(recording) ? std::nullopt : std::optional(PictureSource{});
+            const Dataset dataset = to_dataset(recording, source, unused);
             const py::gil_scoped_release free;
             InterruptibleExecutor executor(threads);
             std::vector<NamedHomingResult> results;
@@ -304,7 +328,7 @@ void bind_homing(py::module_& m) {
             return results;
           },
           py::arg("recording"), py::arg("source") = py::none(), py::arg("threads") = 0,
-          "Does the same for each image of a Dataset, or of the recording at a path.");
+          "Does the same for each image of a Dataset, of a list, or of the recording at a path.");
 }
 
 }  // namespace panonav::python

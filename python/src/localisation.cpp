@@ -7,7 +7,6 @@
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/tracker.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
-#include "panonav/pipeline/visual_motion.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "recordings.hpp"
 
@@ -33,12 +32,26 @@ void bind_places(py::module_& m) {
       .field("verified_features", &PlaceMatch::verified_features,
              "Number of matching local features; None if they were not compared.")
       .field("heading_rad", &PlaceMatch::heading_rad, "Heading relative to this view.");
+  Record<PositionEstimate::AlongRoute>(m, "AlongRoute", "What is known along a route.")
+      .field("direction_rad", &PositionEstimate::AlongRoute::direction_rad,
+             "Direction of the route.")
+      .field("within_m", &PositionEstimate::AlongRoute::within_m,
+             "Contains the error along the route in 95 % of cases.");
   Record<PositionEstimate>(m, "PlacePosition", "A position and its uncertainty.")
       .field("x_m", &PositionEstimate::x_m,
              "Along the x axis of the frame of the memory's positions.")
       .field("y_m", &PositionEstimate::y_m, "Along the y axis of the same frame.")
       .field("radius_m", &PositionEstimate::radius_m,
-             "The true position is within this radius in 95 % of cases.");
+             "The true position is within this radius in 95 % of cases; None: not known.")
+      .field("along_route", &PositionEstimate::along_route,
+             "Along a line of views, the position is within this bound; None: no line.")
+      .field(
+          "covariance",
+          [](const PositionEstimate& estimate) {
+            const auto [xx, xy, yy] = estimate.covariance();
+            return std::array{std::array{xx, xy}, std::array{xy, yy}};
+          },
+          "((xx, xy), (xy, yy)) in m^2; 1 km of deviation where nothing is known.");
   Record<Circle>(m, "Circle", "A circle.")
       .field(
           "centre", [](const Circle& c) { return c.centre; }, "(x_m, y_m)")
@@ -50,10 +63,19 @@ void bind_places(py::module_& m) {
       .field("area_m2", &LocalisationLevel::area_m2, "Area of the candidates' cells, or None.")
       .field("region", &LocalisationLevel::region, "A circle around the candidates, or None.")
       .field("bytes_read", &LocalisationLevel::bytes_read, "Bytes read up to this level.");
+  Record<AlternativePlace>(m, "AlternativePlace", "Another place that the image may show.")
+      .field("match", &AlternativePlace::match, "Its best match.")
+      .field("probability", &AlternativePlace::probability, "That the image was taken there.")
+      .field("position", &AlternativePlace::position, "None: unknown.")
+      .field("heading_rad", &AlternativePlace::heading_rad, "None: unknown.");
   Record<NamedPlace>(m, "Place", "The position and heading of an image.")
       .field("name", &NamedPlace::name, "Name of the image, if it has one.")
       .field("known", &NamedPlace::known, "True if the place is in the memory.")
       .field("known_probability", &NamedPlace::known_probability, "Probability of `known`.")
+      .field("probability", &NamedPlace::probability,
+             "That the image was taken at `position`; the rest is shared by `alternatives`.")
+      .field("alternatives", &NamedPlace::alternatives,
+             "Other places that the image does not exclude, most probable first.")
       .field("position", &NamedPlace::position, "None: unknown.")
       .field("heading_rad", &NamedPlace::heading_rad, "None: unknown.")
       .field("matches", &NamedPlace::matches, "Best first; also given for unknown places.")
@@ -91,7 +113,7 @@ std::unique_ptr<SharedRecogniser> make_recogniser(const py::object& memory,
     return file.change(
         [&](MemoryFile& f) { return std::make_unique<SharedRecogniser>(f, options); });
   }
-  const auto path = memory.cast<std::filesystem::path>();
+  const auto path = to_path(memory, "memory");
   const py::gil_scoped_release free;
   return std::make_unique<SharedRecogniser>(path, options);
 }
@@ -139,7 +161,7 @@ void bind_recogniser(py::module_& m) {
                 [&](const PlaceRecogniser& r) { return localise_one(r, seen, excluded_names); });
           },
           py::arg("observation"), py::arg("excluded_names") = std::vector<std::string>{},
-          "Finds the place of an Observation, a Panorama, an array of pixels, or the "
+          "Finds the place of an Observation, a Panorama, an array of pixels, a PIL image, or the "
           "path of an image. Views with names in `excluded_names` are ignored.")
       .def(
           "localise_all",
@@ -152,7 +174,7 @@ void bind_recogniser(py::module_& m) {
           },
           py::arg("recording"), py::kw_only(), py::arg("exclude_same_file") = false,
           py::arg("threads") = 0,
-          "Does the same for each image of a Dataset, or of the recording at a path.")
+          "Does the same for each image of a Dataset, of a list, or of the recording at a path.")
       .def(
           "packed",
           [](const SharedRecogniser& recogniser, const py::object& observation) {
@@ -193,6 +215,9 @@ void bind_recogniser(py::module_& m) {
       "localise",
       [](const py::object& memory, const py::object& observation, bool areas,
          const py::kwargs& keywords) {
+        if (is_path(memory)) {
+          require_memory_first(to_path(memory, "memory"), observation);
+        }
         const auto recogniser =
             make_recogniser(memory, make_recogniser_options(std::nullopt, areas, keywords));
         const Observation seen = to_observation(observation);
@@ -203,29 +228,31 @@ void bind_recogniser(py::module_& m) {
       ("Finds position and heading of one image. To localise several images, make "
        "a PlaceRecogniser.\n\n"
        "`memory`: the path of a memory file, or a MemoryFile. `observation`: an Observation, a "
-       "Panorama, an array of pixels (uint8), or the path of an image, with the image layout of "
-       "the memory." +
+       "Panorama, an array of pixels, a PIL image, or the path of an image, with the image layout "
+       "of the memory." +
        option_text)
           .c_str());
 }
 
-std::vector<NamedEstimate> track_recording(Tracker& tracker, Dataset run, std::size_t every,
-                                           int threads) {
+std::vector<NamedEstimate> track_recording(Tracker& tracker, const Dataset& recorded,
+                                           std::size_t every, int threads) {
   InterruptibleExecutor executor(threads);
-  if (odometry_poses(run).empty()) {
-    (void)add_visual_odometry(run, tracker.memory(), tracker.encoder(), executor);
-  }
+  Dataset run = recorded;
+  tracker.bridge_pauses(run, executor);
+  const ViewEncoder& encoder = tracker.encoder();
   std::vector<NamedEstimate> estimates;
-  std::size_t moved = 0;
-  process_in_order((run.entries.size() + every - 1) / every, executor,
-                   [&](std::size_t i) {
-                     return tracker.encoder().packed(read_observation(run.entries[i * every]));
-                   },
-                   [&](std::size_t i, PackedSignature&& view) {
-                     for (; moved <= i * every; ++moved)
-                       tracker.move_to(*run.entries[moved].odometry);
-                     estimates.push_back({tracker.observe(view), run.entries[i * every].file});
-                   });
+  process_in_order(
+      run.entries.size(), executor,
+      [&](std::size_t i) -> std::optional<FourierSignature> {
+        if (i % every != 0 && !tracker.needs_view(run.entries, i)) return std::nullopt;
+        return encoder.signature(read_observation(run.entries[i]));
+      },
+      [&](std::size_t i, std::optional<FourierSignature>&& view) {
+        tracker.move(run.entries[i].odometry, view ? &*view : nullptr);
+        if (i % every != 0) return;
+        estimates.push_back(
+            {tracker.observe(pack(*view, encoder.header().full_scale)), run.entries[i].file});
+      });
   return estimates;
 }
 
@@ -246,8 +273,10 @@ void bind_tracker(py::module_& m) {
       .field("name", &NamedEstimate::name, "Name of the image, if it has one.")
       .field(
           "state", [](const NamedEstimate& e) { return to_string(e.state); },
-          "'localised', 'ambiguous' or 'lost'.")
-      .field("pose", &NamedEstimate::pose, "Mean of the largest mode; None if lost.")
+          "'localised', 'position_known', 'ambiguous' or 'lost'.")
+      .field("pose", &NamedEstimate::pose,
+             "Mean of the largest mode; None if lost or if the heading is unknown.")
+      .field("position", &NamedEstimate::position, "(x_m, y_m) of the largest mode; None if lost.")
       .field("inside", &NamedEstimate::p_inside, "Probability that it is in the memory's area.")
       .field("probability", &NamedEstimate::probability, "That it is at the largest mode.")
       .field("modes", &NamedEstimate::modes, "Largest weight first.")
@@ -266,25 +295,30 @@ void bind_tracker(py::module_& m) {
   using SharedTracker = Shared<Tracker>;
   py::class_<SharedTracker>(
       m, "Tracker",
-      "Tracks a moving robot with images, odometry and a memory file. The robot starts "
-      "anywhere in the area of the memory.")
+      "Tracks a moving robot with images, odometry and a memory file. Without odometry, the motion "
+      "is read from the images. The robot starts anywhere in the area of the memory.")
       .def(py::init([](const py::object& memory, const std::optional<PictureSource>& source,
-                       bool visual_odometry, const py::kwargs& keywords) {
+                       const py::kwargs& keywords) {
              TrackerOptions options{.source = source};
-             if (visual_odometry) options.odometry = visual_odometry_noise();
-             Keywords(keywords).options(options.filter).options(options.odometry).finish();
+             Keywords parsed(keywords);
+             parsed.options(options.filter);
+             OdometryNoise noise;
+             const bool is_noise_set = parsed.has_unread();
+             parsed.options(noise).finish();
+             if (is_noise_set) options.odometry = noise;
              if (py::isinstance<SharedFile>(memory)) {
                return memory.cast<SharedFile&>().change(
                    [&](MemoryFile& f) { return std::make_unique<SharedTracker>(f, options); });
              }
-             const auto path = memory.cast<std::filesystem::path>();
+             const auto path = to_path(memory, "memory");
              const py::gil_scoped_release free;
              return std::make_unique<SharedTracker>(path, options);
            }),
-           py::arg("memory"), py::arg("source") = py::none(), py::arg("visual_odometry") = false,
+           py::arg("memory"), py::arg("source") = py::none(),
            append_option_list(
-               "`memory`: the path of a memory file, or a MemoryFile. `visual_odometry`: "
-               "use the noise of motion that is computed from images.",
+               "`memory`: the path of a memory file, or a MemoryFile. If no option of the noise is "
+               "set (drive, translation_* and rotation_*), motion that is read from images has "
+               "larger noise than these defaults.",
                {options_of<MonteCarloOptions>(), options_of<OdometryNoise>()})
                .c_str())
       .def(
@@ -296,8 +330,10 @@ void bind_tracker(py::module_& m) {
             });
           },
           py::arg("observation"),
-          "Moves the particles by the odometry, if the observation has one, and weights them by "
-          "the image.")
+          "Moves the particles by the observation's odometry and weights them by the image. "
+          "Without "
+          "odometry, the motion is read from this image and the one before, unless `move_to` was "
+          "called since.")
       .def(
           "move_to",
           [](SharedTracker& tracker, const Pose2& odometry) {
@@ -326,17 +362,22 @@ void bind_tracker(py::module_& m) {
             require(every >= 1, "every", every, ">= 1");
             const auto source =
                 tracker.read([](const Tracker& t) { return t.encoder().header().source; });
-            Dataset run = to_dataset(recording, std::nullopt, source);
+            const Dataset run = to_dataset(recording, std::nullopt, source);
             return tracker.change([&](Tracker& t) {
-              return track_recording(t, std::move(run), static_cast<std::size_t>(every), threads);
+              return track_recording(t, run, static_cast<std::size_t>(every), threads);
             });
           },
           py::arg("recording"), py::kw_only(), py::arg("every") = 1, py::arg("threads") = 0,
-          "Tracks the robot of a Dataset, or of the recording at a path, like `panonav track`: "
-          "moves "
-          "with each odometry pose and observes every n-th image. Without odometry, motion "
-          "is "
-          "computed from the images; set `visual_odometry` for such a tracker.")
+          "Tracks the robot of a Dataset, a list of images, or the recording at a path, like "
+          "`panonav track`: "
+          "moves with the odometry of each image, or without odometry by the motion read from all "
+          "images, and observes every n-th image.")
+      .def_property_readonly(
+          "length_unit",
+          [](const SharedTracker& tracker) {
+            return tracker.read([](const Tracker& t) { return to_string(t.length_unit()); });
+          },
+          "Unit of all positions, as `MemoryFile.length_unit`.")
       .def(
           "particles",
           [](const SharedTracker& tracker) {
@@ -360,6 +401,7 @@ void bind_updater(py::module_& m) {
   using Changes = MemoryUpdater::Changes;
   Record<Changes>(m, "MemoryUpdaterChanges", "Changes of a memory by a run.")
       .field("observations", &Changes::observations, "Number of observations with odometry.")
+      .field("sure", &Changes::sure, "Number of these localised with a probability of 0.9 or more.")
       .field("certain", &Changes::certain, "Number of these whose place was certain and new.")
       .field("reinforced", &Changes::reinforced, "Number of views that matched the robot's images.")
       .field("added", &Changes::added, "Number of added views.")

@@ -32,6 +32,7 @@ MapperOptions make_mapper_options(const py::kwargs& keywords, SignatureOptions* 
       .options(options.graph, "graph");
   if (signature) parsed.options(*signature);
   parsed.finish();
+  options.is_scale_known = keywords.contains("scale_m");
   return options;
 }
 
@@ -77,7 +78,11 @@ void bind_maps(py::module_& m) {
       .field("map", &Mapper::Result::map, "All nodes and edges.")
       .field("observations", &Mapper::Result::observations, "Index of each node's observation.")
       .field("skipped", &Mapper::Result::skipped, "Number of too similar observations.")
-      .field("scale_m", &Mapper::Result::scale_m, "Metres per unit of visual length.")
+      .field("scale_m", &Mapper::Result::scale_m,
+             "Metres per unit of visual length; None if not known.")
+      .field(
+          "unit", [](const Mapper::Result& result) { return to_string(result.unit); },
+          "Unit of the map's lengths: 'm', or 'view steps' if no length is known.")
       .field("wheels", &Mapper::Result::wheels, "True if steps come from odometry.")
       .field("mapping_s", &Mapper::Result::mapping_s, "Duration of the mapping in seconds.");
   const std::string option_text = append_option_list(
@@ -110,17 +115,17 @@ void bind_maps(py::module_& m) {
           "Optimises and stores the map. More observations may follow.");
   m.def(
       "make_map",
-      [](const py::object& recording, const std::filesystem::path& memory,
+      [](const std::filesystem::path& memory, const py::object& recording,
          const std::optional<PictureSource>& source, bool thumbnails, int threads,
          const py::kwargs& keywords) {
         SignatureOptions signature;
         MapperOptions options = make_mapper_options(keywords, &signature);
         options.thumbnails = thumbnails;
-        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
+        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
         const py::gil_scoped_release free;
         return make_map(dataset, memory, signature, options, threads);
       },
-      py::arg("recording"), py::arg("memory"), py::arg("source") = py::none(),
+      py::arg("memory"), py::arg("recording"), py::arg("source") = py::none(),
       py::arg("thumbnails") = true, py::arg("threads") = 0,
       ("Makes a map of a recording in its order, like `panonav map`. `memory` is created if it "
        "does not exist; views that are not in it are appended." +
@@ -170,7 +175,7 @@ void bind_lattices(py::module_& m) {
         parsed.options(options);
         if (!odometry.is_none()) parsed.options(motion, "motion");
         parsed.finish();
-        const auto path = memory.cast<std::filesystem::path>();
+        const auto path = to_path(memory, "memory");
         std::optional<Dataset> recording;
         if (!odometry.is_none()) recording = to_dataset(odometry, std::nullopt);
         const py::gil_scoped_release free;

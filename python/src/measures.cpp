@@ -47,6 +47,22 @@ void bind_measures(py::module_& m) {
           "translation", [](const Alignment& a) { return a.translation; }, "(x_m, y_m)")
       .field("reflected", &Alignment::reflected, "True if `from` is mirrored first (y -> -y).")
       .field("rms_m", &Alignment::rms_m, "Root mean square distance after alignment.");
+  Record<Alignment3>(m, "Alignment3", "to = scale rotation from + translation, in space.")
+      .field("scale", &Alignment3::scale, "Length in `to` per unit length in `from`.")
+      .field(
+          "rotation",
+          [](const Alignment3& a) {
+            return std::tuple(a.rotation.x, a.rotation.y, a.rotation.z, a.rotation.w);
+          },
+          "Quaternion (x, y, z, w).")
+      .field(
+          "translation",
+          [](const Alignment3& a) {
+            return std::tuple(a.translation.x_m, a.translation.y_m, a.translation.z_m);
+          },
+          "(x_m, y_m, z_m)")
+      .field("reflected", &Alignment3::reflected, "True if `from` is mirrored first (y -> -y).")
+      .field("is_unique", &Alignment3::is_unique, "False for points on a straight line.");
   Record<ShapeDifference>(m, "ShapeDifference", "Procrustes disparity of two shapes.")
       .field("value", &ShapeDifference::value, "0 (same shape) to 1.")
       .field("with_reflection", &ShapeDifference::with_reflection,
@@ -60,16 +76,19 @@ void bind_measures(py::module_& m) {
   Record<TrajectoryError>(m, "TrajectoryError", "Errors of an estimated trajectory: ATE and RPE.")
       .field("pairs", &TrajectoryError::pairs, "Number of estimates with a true pose.")
       .field("left_out", &TrajectoryError::left_out, "Number of estimates without a true pose.")
-      .field("ground_truth_from_estimate", &TrajectoryError::ground_truth_from_estimate,
-             "Identity without `align`; its rms_m is that of position_m.")
+      .field("planar", &TrajectoryError::planar,
+             "True if the alignment rotated only about z, as both trajectories are planar.")
+      .field("truth_from_estimate", &TrajectoryError::truth_from_estimate,
+             "Identity with align='none'.")
       .field("position_m", &TrajectoryError::position_m, "ATE, after alignment.")
-      .field("heading_rad", &TrajectoryError::heading_rad, "After alignment.")
+      .field("rotation_rad", &TrajectoryError::rotation_rad,
+             "Angle between estimate and truth, after alignment.")
       .field("relative_pairs", &TrajectoryError::relative_pairs,
-             "Number of RPE pairs; 0 if the path is shorter than relative_distance_m.")
+             "Number of RPE pairs; 0 if the path is shorter than twice relative_distance_m.")
       .field("relative_position_m", &TrajectoryError::relative_position_m,
              "RPE over relative_distance_m.")
-      .field("relative_heading_rad", &TrajectoryError::relative_heading_rad,
-             "Error of the turn over relative_distance_m, absolute.");
+      .field("relative_rotation_rad", &TrajectoryError::relative_rotation_rad,
+             "Error of the rotation over relative_distance_m.");
   m.def(
       "align",
       [](const py::object& from, const py::object& to, bool allow_scale, bool allow_reflection) {
@@ -96,7 +115,7 @@ void bind_measures(py::module_& m) {
         const auto a = to_trajectory(to_number_rows(estimate, "estimate", 4));
         const auto b = to_trajectory(to_number_rows(truth, "truth", 4));
         const py::gil_scoped_release free;
-        return trajectory_error(a, b, options);
+        return panonav::trajectory_error(a, b, options);
       },
       py::arg("estimate"), py::arg("truth"),
       append_option_list(

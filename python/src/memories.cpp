@@ -3,6 +3,7 @@
 #include "bindings.hpp"
 #include "memories.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_list.hpp"
 #include "panonav_fleet/memory_synchronisation.hpp"
 
@@ -298,6 +299,26 @@ void bind_memory_file(py::module_& m) {
           "path",
           [](const SharedFile& s) { return s.read([](const MemoryFile& f) { return f.path(); }); },
           "Path as given; for a server the address without password.")
+      .def_property_readonly(
+          "length_unit",
+          [](SharedFile& s) {
+            return s.change([](MemoryFile& f) { return to_string(read_length_unit(f)); });
+          },
+          "Unit of all positions: 'm', or 'view steps' (the median distance between consecutive "
+          "views) if a map of images has no known length.")
+      .def(
+          "scale_to_metres",
+          [](SharedFile& s, const std::string& first, const std::string& second,
+             double distance_m) {
+            return s.change([&](MemoryFile& f) {
+              return scale_to_metres(f, find_view_by_name_or_id(f, first),
+                                     find_view_by_name_or_id(f, second), distance_m,
+                                     "scale by the distance of " + first + " and " + second);
+            });
+          },
+          py::arg("first"), py::arg("second"), py::arg("distance_m"),
+          "Makes metres of view steps by the known distance between two views of the map. Returns "
+          "the metres per former unit.")
       .def(
           "load",
           [](SharedFile& s) {

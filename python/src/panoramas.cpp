@@ -173,7 +173,7 @@ void bind_cameras(py::module_& m) {
             return unwarper.unwrap(pixels.view());
           },
           py::arg("picture"),
-          "The panorama of a picture, uint8 of (rows, columns) or (rows, columns, 3).");
+          "The panorama of an image: an array, a PIL image or the path of a file.");
 }
 
 }  // namespace
@@ -273,7 +273,8 @@ void bind_panoramas(py::module_& m) {
           "(bottom, top) of the picture's edges in radians; None: unknown.")
       .def_property_readonly(
           "kept_elevations", [](const PictureSource& s) { return s.layout.kept_elevations; },
-          "(bottom, top) of the part to keep in radians; None: all.")
+          "(bottom, top) of the part to keep in radians; None: all, but of 'equirectangular' "
+          "images -30 to 40 degrees.")
       .def_property_readonly(
           "direction", [](const PictureSource& s) { return to_string(s.layout.direction); },
           "How columns run from left to right, seen from above: 'clockwise' or "

@@ -1,5 +1,7 @@
 #include "recordings.hpp"
 
+#include <map>
+
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
@@ -23,24 +25,105 @@ Dataset open_with_warnings(const std::filesystem::path& path, const InputOptions
   return opened;
 }
 
+/// Images in RAM, as a data set needs them.
+class HeldPictures final : public PictureStore {
+ public:
+  [[nodiscard]] Image read(std::size_t index) const override { return images_.at(index); }
+  std::size_t add(Image image) {
+    images_.push_back(std::move(image));
+    return images_.size() - 1;
+  }
+
+ private:
+  std::vector<Image> images_;
+};
+
+/// Makes a data set of images: paths, which are read when they are needed, or observations and
+/// whatever `to_observation` accepts. Images without a name get their number as name.
+Dataset make_dataset_of_images(const py::list& images, const std::optional<PictureSource>& source) {
+  if (images.empty()) throw ContractError("images", "empty", "one image or more");
+  if (!source) throw ContractError("source", "None", "a PictureSource, for images without one");
+  Dataset dataset;
+  dataset.folder = "images";
+  dataset.source = *source;
+  const auto held = std::make_shared<HeldPictures>();
+  for (const py::handle& one : images) {
+    DatasetEntry& entry = dataset.entries.emplace_back();
+    if (is_path(one)) {
+      entry.path = to_path(one, "image");
+      entry.file = entry.path.filename().string();
+    } else {
+      Observation seen = to_observation(one);
+      auto* const image = std::get_if<Image>(&seen.picture);
+      if (image == nullptr) throw ContractError("image", "a Panorama", "an image of the camera");
+      entry = {.file = seen.name,
+               .path = seen.file,
+               .stamp_s = seen.stamp_s,
+               .pose = seen.pose,
+               .odometry = seen.odometry,
+               .tilt = seen.tilt,
+               .store = held,
+               .store_index = held->add(std::move(*image))};
+    }
+    if (entry.file.empty()) {
+      const std::string number = std::to_string(dataset.entries.size() - 1);
+      entry.file =
+          "image_" + std::string(5 - std::min<std::size_t>(5, number.size()), '0') + number;
+    }
+  }
+  std::map<std::string, std::size_t> counts;
+  for (const DatasetEntry& entry : dataset.entries) ++counts[entry.file];
+  for (DatasetEntry& entry : dataset.entries) {
+    if (counts[entry.file] > 1 && !entry.path.empty()) entry.file = entry.path.string();
+  }
+  return dataset;
+}
+
 }  // namespace
 
 Dataset to_dataset(const py::handle& recording, const std::optional<PictureSource>& source,
                    const std::optional<PictureSource>& default_source) {
-  if (!py::isinstance<Dataset>(recording)) {
+  if (is_path(recording)) {
     InputOptions options;
     options.source = source;
     options.default_source = default_source;
-    return open_with_warnings(recording.cast<std::filesystem::path>(), options);
+    return open_with_warnings(to_path(recording, "recording"), options);
+  }
+  if (!py::isinstance<Dataset>(recording)) {
+    const bool are_several =
+        py::isinstance<py::list>(recording) || py::isinstance<py::tuple>(recording);
+    py::list images;
+    if (are_several) images = py::list(py::reinterpret_borrow<py::object>(recording));
+    if (!are_several) images.append(recording);
+    return make_dataset_of_images(images, source ? source : default_source);
   }
   if (source) throw OptionError("a Dataset has its own image layout; leave out 'source'");
   return recording.cast<const Dataset&>();
 }
 
-std::optional<PictureSource> read_stored_source(const std::filesystem::path& memory) {
-  const py::gil_scoped_release free;
-  if (!memory_exists(memory)) return std::nullopt;
-  return MemoryFile::open(memory, Access::read_only).header().source;
+void require_memory_first(const std::filesystem::path& memory, const py::handle& input) {
+  const auto has_memory_name = [](const std::filesystem::path& path) {
+    std::error_code ignored;
+    return is_server_address(path) ||
+           (path.extension() == ".panonav" && !std::filesystem::is_directory(path, ignored));
+  };
+  if (!is_path(input)) return;
+  const auto path = to_path(input, "input");
+  if (!has_memory_name(path) || has_memory_name(memory)) return;
+  throw OptionError("the arguments are in the wrong order: '" + memory.string() + "', '" +
+                    path.string() + "'; the memory comes first: '" + path.string() + "', '" +
+                    memory.string() + "'");
+}
+
+Dataset to_dataset_for_memory(const std::filesystem::path& memory, const py::handle& recording,
+                              const std::optional<PictureSource>& source) {
+  require_memory_first(memory, recording);
+  std::optional<PictureSource> stored;
+  {
+    const py::gil_scoped_release free;
+    if (memory_exists(memory)) stored = MemoryFile::open(memory, Access::read_only).header().source;
+  }
+  return to_dataset(recording, source, stored);
 }
 
 namespace {
@@ -69,8 +152,9 @@ void bind_observations(py::module_& m) {
            py::arg("picture"), py::kw_only(), py::arg("name") = "", py::arg("stamp_s") = py::none(),
            py::arg("odometry") = py::none(), py::arg("pose") = py::none(),
            py::arg("tilt") = py::none(),
-           "`picture`: a Panorama, an array of pixels as the camera delivers them (uint8), or the "
-           "path of a picture. `odometry`: absolute, in a frame that drifts. `pose`: in the world "
+           "`picture`: a Panorama, or an image as the camera delivers it: an array of uint8 or "
+           "uint16, a PIL image, or the path of a file. `odometry`: absolute, in a frame that "
+           "drifts. `pose`: in the world "
            "frame, if it is known. `tilt`: (roll, pitch) in radians.")
       .def_property_readonly("picture", &get_picture, "A Panorama, or an array of pixels.")
       .def_readonly("name", &Observation::name, "Name of the image, and of its view in a memory.")
@@ -101,28 +185,38 @@ void bind_datasets(py::module_& m) {
   py::class_<Dataset>(m, "Dataset",
                       "A recording: images in order, which are read only when needed. "
                       "Iterating returns its observations.")
-      .def(
-          py::init([](const std::filesystem::path& path, const std::optional<PictureSource>& source,
-                      bool recursive, const std::optional<std::string>& image_topic,
-                      const std::optional<std::string>& odometry_topic,
-                      const std::optional<std::pair<std::string, std::string>>& odometry_frames,
-                      const std::optional<std::string>& imu_topic) {
-            InputOptions options;
-            options.source = source;
-            options.recursive = recursive;
-            options.topics = {image_topic, odometry_topic, imu_topic, odometry_frames};
-            return open_with_warnings(path, options);
-          }),
-          py::arg("path"), py::arg("source") = py::none(), py::kw_only(),
-          py::arg("recursive") = false, py::arg("image_topic") = py::none(),
-          py::arg("odometry_topic") = py::none(), py::arg("odometry_frames") = py::none(),
-          py::arg("imu_topic") = py::none(),
-          "`source` is the image layout; it is not allowed for a data set (with dataset.toml). It "
-          "describes the images of a folder, a video, a recording of topics (MCAP, rosbag2, "
-          "ROS 1 bag), or a single image. `recursive`: also read the subfolders of a "
-          "folder. Topics that are not named are found by their types; "
-          "`odometry_frames`: odometry from the transforms between these two frames. Skipped or "
-          "suspicious data cause a UserWarning.")
+      .def(py::init([](const py::object& path, const std::optional<PictureSource>& source,
+                       bool recursive, const std::optional<std::string>& image_topic,
+                       const std::optional<std::string>& odometry_topic,
+                       const std::optional<std::pair<std::string, std::string>>& odometry_frames,
+                       const std::optional<std::string>& imu_topic, bool ignore_gpano) {
+             InputOptions options;
+             options.source = source;
+             options.recursive = recursive;
+             options.ignore_gpano = ignore_gpano;
+             options.topics = {image_topic, odometry_topic, imu_topic, odometry_frames};
+             if (is_path(path)) return open_with_warnings(to_path(path, "path"), options);
+             if (recursive || image_topic || odometry_topic || imu_topic || odometry_frames ||
+                 ignore_gpano) {
+               throw OptionError(
+                   "a list of images has no topics and folders, and its GPano data are not read; "
+                   "leave out their options");
+             }
+             return to_dataset(path, source);
+           }),
+           py::arg("path"), py::arg("source") = py::none(), py::kw_only(),
+           py::arg("recursive") = false, py::arg("image_topic") = py::none(),
+           py::arg("odometry_topic") = py::none(), py::arg("odometry_frames") = py::none(),
+           py::arg("imu_topic") = py::none(), py::arg("ignore_gpano") = false,
+           "`path`: a path, or a list of images (paths, arrays, PIL images or Observations). "
+           "`source` is the image layout; it is not allowed for a data set (with dataset.toml). It "
+           "describes the images of a folder, a video, a recording of topics (MCAP, rosbag2, "
+           "ROS 1 bag), or a single image. `recursive`: also read the subfolders of a "
+           "folder. Topics that are not named are found by their types; "
+           "`odometry_frames`: odometry from the transforms between these two frames. "
+           "`ignore_gpano`: read images as if they had no GPano data (pitch, roll and crop), such "
+           "as those that are already level. Skipped or "
+           "suspicious data cause a UserWarning.")
       .def_readonly("source", &Dataset::source, "Layout of all images.")
       .def_readonly("entries", &Dataset::entries, "In the order in which they were taken.")
       .def_readonly("left_out", &Dataset::left_out, "Files of a folder that are no images.")
@@ -224,10 +318,10 @@ void bind_memorising(py::module_& m) {
           "Writes pending views and stores the models learnt from all views.");
   m.def(
       "memorise",
-      [=](const py::object& recording, const std::filesystem::path& memory,
+      [=](const std::filesystem::path& memory, const py::object& recording,
           const std::optional<PictureSource>& source, bool thumbnails, bool features, int threads,
           const py::kwargs& keywords) {
-        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
+        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
         const auto options = options_from(dataset.source, thumbnails, features, keywords);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
@@ -245,10 +339,11 @@ void bind_memorising(py::module_& m) {
         add();
         return memoriser.finish(executor);
       },
-      py::arg("recording"), py::arg("memory"), py::arg("source") = py::none(),
+      py::arg("memory"), py::arg("recording"), py::arg("source") = py::none(),
       py::arg("thumbnails") = true, py::arg("features") = true, py::arg("threads") = 0,
       ("Stores the images of a recording as views in a memory, like `panonav memorise`.\n\n"
-       "`recording`: a Dataset or a path; `memory`: the file, new or existing. An "
+       "`memory`: the file, new or existing; `recording`: a Dataset, a path or a list "
+       "of images. An "
        "image that cannot be read raises FileError; those before it are stored. threads: 0: "
        "one per core." +
        option_text)

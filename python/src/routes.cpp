@@ -105,10 +105,10 @@ void bind_following(py::module_& m) {
          const std::optional<std::string>& name, const std::optional<PictureSource>& source,
          bool use_odometry, int threads, const py::kwargs& keywords) {
         auto options = make_follower_options(name, use_odometry, keywords);
-        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
+        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
-        options.use_odometry = use_odometry && !odometry_poses(dataset).empty();
+        options.use_odometry = use_odometry && has_odometry(dataset);
         RouteFollower follower(MemoryFile::open(memory, Access::read_only), dataset.source,
                                options);
         std::vector<NamedStep> steps;
@@ -132,18 +132,18 @@ void bind_following(py::module_& m) {
 RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesystem::path& memory,
                                      RouteRecorderOptions options, int threads) {
   InterruptibleExecutor executor(threads);
-  std::vector<Pose2> poses = options.odometry ? std::vector<Pose2>{} : dataset_poses(dataset);
-  if (poses.empty()) {
-    poses = odometry_poses(dataset);
-    options.odometry = true;
-  }
-  if (poses.empty()) throw FileError(dataset.folder.string(), "has neither positions nor odometry");
-  RouteRecorder recorder(
-      memory_exists(memory)
+  const bool memory_existed = memory_exists(memory);
+  MemoryFile file =
+      memory_existed
           ? MemoryFile::open(memory, Access::read_write)
-          : MemoryFile::create(memory, make_header_from_recording(dataset, {}, {}, executor)),
-      dataset.source, options);
-  return recorder.record(dataset, poses, executor);
+          : MemoryFile::create(memory, make_header_from_recording(dataset, {}, {}, executor));
+  const DrivePoses drive =
+      find_drive_poses(dataset, file, options.name, options.odometry, executor);
+  options.odometry =
+      drive.origin == RoutePoseOrigin::odometry || drive.origin == RoutePoseOrigin::images;
+  options.assumed_unit_m = drive.assumed_unit_m;
+  RouteRecorder recorder(std::move(file), dataset.source, options);
+  return recorder.record(drive.drive, drive.poses, executor);
 }
 
 void bind_recording(py::module_& m) {
@@ -180,7 +180,7 @@ void bind_recording(py::module_& m) {
              "Bytes per kilometre; 0 for a route of length 0.");
   m.def(
       "record_route",
-      [](const py::object& recording, const std::filesystem::path& memory, const std::string& name,
+      [](const std::filesystem::path& memory, const py::object& recording, const std::string& name,
          const std::optional<PictureSource>& source, double every_m,
          const std::optional<std::pair<int, int>>& horizon_rows, bool odometry, int threads,
          const py::kwargs& keywords) {
@@ -189,11 +189,11 @@ void bind_recording(py::module_& m) {
         HorizonScanlineOptions line;
         Keywords(keywords).options(line).finish();
         if (py::len(keywords) > 0) options.line = line;
-        const Dataset dataset = to_dataset(recording, source, read_stored_source(memory));
+        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
         const py::gil_scoped_release free;
         return record_route(dataset, memory, options, threads);
       },
-      py::arg("recording"), py::arg("memory"), py::arg("name") = "route",
+      py::arg("memory"), py::arg("recording"), py::arg("name") = "route",
       py::arg("source") = py::none(), py::kw_only(), py::arg("every_m") = 0.1,
       py::arg("horizon_rows") = py::none(), py::arg("odometry") = false, py::arg("threads") = 0,
       append_option_list(

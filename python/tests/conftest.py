@@ -31,7 +31,7 @@ def office(tmp_path_factory):
     run_command("simulate", "office", folder / "memory_run", "--grid", 0.5, *small)
     run_command("simulate", "office", folder / "query_run", "--random", 6, "--seed", 7, *small)
     run_command("simulate", "office", folder / "drive", "--path", "tour", "--spacing-m", 0.3, "--seed", 3, *small)
-    run_command("memorise", folder / "memory_run", folder / "office.panonav", "--quiet")
+    run_command("memorise", folder / "office.panonav", folder / "memory_run", "--quiet")
     return folder
 
 

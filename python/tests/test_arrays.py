@@ -62,13 +62,48 @@ def test_pictures_of_any_layout_are_the_same():
 
 
 @pytest.mark.parametrize("picture", [
-    numpy.zeros((4, 8), numpy.float32), numpy.zeros((4, 8, 4), numpy.uint8), numpy.zeros(8, numpy.uint8),
-    numpy.zeros((0, 8), numpy.uint8), numpy.zeros((4, 8), bool), "missing.png", 3, None,
+    numpy.zeros((4, 8), numpy.float32), numpy.zeros((4, 8, 2), numpy.uint8), numpy.zeros(8, numpy.uint8),
+    numpy.zeros((0, 8), numpy.uint8), numpy.zeros((4, 8), bool), numpy.zeros((4, 8), numpy.int32),
+    numpy.zeros((2, 4, 8, 3), numpy.uint8), "missing.png", 3, None, [[1, 2], [3, 4]],
 ])
 def test_wrong_pictures_are_refused_in_one_line(picture):
     with pytest.raises((panonav.ContractError, panonav.FileError)) as caught:
         panonav.Observation(picture)
     assert "\n" not in str(caught.value)
+
+
+def test_pixels_of_16_bit_and_of_four_channels_are_those_of_a_file():
+    grey = numpy.random.default_rng(3).integers(0, 256, (8, 24), dtype=numpy.uint8)
+    colour = numpy.random.default_rng(4).integers(0, 256, (8, 24, 3), dtype=numpy.uint8)
+    alpha = numpy.full((8, 24, 1), 7, numpy.uint8)
+    for same, right in ((grey[..., None], grey), (numpy.dstack([colour, alpha]), colour),
+                        (grey.astype(numpy.uint16) * 257, grey), (colour.astype(numpy.uint16) * 257, colour),
+                        (grey // 2 * numpy.uint16(257) + numpy.uint16(120), grey // 2)):
+        assert numpy.array_equal(panonav.Observation(same).picture, right)
+
+
+def test_pil_images_are_read_as_their_files(tmp_path):
+    """Whoever opens a file with PIL gets the same answer as with its path."""
+    image = pytest.importorskip("PIL.Image")
+    random = numpy.random.default_rng(5)
+    grey, colour = (random.integers(0, 256, shape, dtype=numpy.uint8) for shape in ((8, 24), (8, 24, 4)))
+    wide = random.integers(0, 65536, (8, 24), dtype=numpy.uint16)
+    kinds = {"1": image.fromarray(grey).convert("1"), "L": image.fromarray(grey), "RGBA": image.fromarray(colour),
+             "RGB": image.fromarray(colour[..., :3].copy()), "LA": image.fromarray(colour).convert("LA"),
+             "P": image.fromarray(colour[..., :3].copy()).convert("P"), "I;16": image.fromarray(wide)}
+    for mode, one in kinds.items():
+        path = tmp_path / f"{mode[0]}.png"
+        one.save(path)
+        read = panonav.read_image(path)
+        for same in (one, image.open(path), path, str(path)):
+            assert numpy.array_equal(panonav.Observation(same).picture, read), mode
+    turned = image.Exif()
+    turned[0x0112] = 6  # the camera was held upright
+    image.fromarray(grey).save(tmp_path / "turned.jpg", exif=turned)
+    upright = panonav.Observation(image.open(tmp_path / "turned.jpg")).picture
+    assert upright.shape == (24, 8) == panonav.read_image(tmp_path / "turned.jpg").shape
+    with pytest.raises(panonav.ContractError, match="dtype of picture is float32"):
+        panonav.Observation(image.fromarray(VALUES))
 
 
 def test_what_is_handed_out_is_read_only_and_outlives_its_owner():
@@ -122,7 +157,7 @@ def test_options_have_ranges_names_and_types():
     assert "masked_rows_top: int = 0" in panonav.preprocess.__doc__
 
 
-def test_camera_projects_and_unwraps():
+def test_camera_projects_and_unwraps(tmp_path):
     camera = panonav.Camera("hyperboloidal", (320, 240), {"focal_length_px": 100.0}, centre=(160, 120),
                             rim_radius_px=110, inner_radius_px=15)
     pixel = camera.project((1, 0, 0))
@@ -134,6 +169,9 @@ def test_camera_projects_and_unwraps():
     assert panorama.elevations == unwarper.elevations
     with pytest.raises(panonav.ContractError):
         unwarper.unwrap(numpy.zeros((4, 8), numpy.uint8))
+    path = tmp_path / "raw.png"
+    panonav.write_png(path, numpy.full((240, 320, 3), 128, numpy.uint8))
+    assert unwarper.unwrap(path) == unwarper.unwrap(str(path)) == unwarper.unwrap(panonav.Observation(path)) == panorama
     with pytest.raises(panonav.ContractError, match="nonsense"):
         panonav.Camera("hyperboloidal", (320, 240), {"nonsense": 1})
 
@@ -143,7 +181,7 @@ def test_structured_poses_are_rows():
     poses = panonav.structured_poses(rows)
     assert poses.dtype.names == ("stamp_s", "x_m", "y_m", "heading_rad") and poses.shape == (5,)
     assert numpy.shares_memory(poses, rows) and numpy.array_equal(poses["x_m"], rows[:, 1])
-    assert panonav.trajectory_error(poses, rows, align=False).position_m.rms == 0
+    assert panonav.trajectory_error(poses, rows, align="none").position_m.rms == 0
     assert panonav.structured_poses(rows[:, 1:])["heading_rad"][2] == 0.1
     assert panonav.align(panonav.structured_poses(rows[:, 1:3]), rows[:, 1:3]).rms_m == pytest.approx(0)
     for wrong in (lambda: panonav.structured_poses(rows[0]), lambda: panonav.align(poses, poses)):
@@ -179,7 +217,7 @@ def test_every_public_name_has_a_text():
 
 def test_the_source_archive_holds_what_the_build_reads():
     root = pathlib.Path(__file__).resolve().parents[2]
-    read = set(re.findall(r"add_subdirectory\(([a-z0-9]+)", (root / "CMakeLists.txt").read_text())) - {"bench", "tests"}
+    read = set(re.findall(r"add_subdirectory\(([a-z0-9]+)", (root / "CMakeLists.txt").read_text())) - {"apps", "bench", "lab", "tests"}
     packed = re.findall(r"^graft (\w+)$", (root / "MANIFEST.in").read_text(), re.MULTILINE)
     assert read | {"cmake"} == set(packed) and "src" in packed
 
@@ -187,7 +225,7 @@ def test_the_source_archive_holds_what_the_build_reads():
 def test_a_wheel_links_what_its_page_says():
     page = (pathlib.Path(__file__).resolve().parents[2] / "docs" / "python.md").read_text()
     folder = pathlib.Path(panonav.__file__).parent
-    for binary in (panonav._core.__file__, folder / "panonav"):
+    for binary in (panonav._core.__file__,):
         printed = subprocess.run(["readelf", "-d", binary], capture_output=True, text=True, check=True).stdout
         needed = re.findall(r"NEEDED.*\[(lib[\w+-]*?)\d?\.", printed)
         assert len(needed) > 8 and [name for name in needed if name not in page] == []

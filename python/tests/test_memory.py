@@ -1,10 +1,13 @@
 """Memories: exact search from any number of threads, bulk appending, lifetimes, files."""
 import concurrent.futures
 import gc
+import math
 import pathlib
 import shutil
+import struct
 import subprocess
 import warnings
+import zlib
 
 import numpy
 import pytest
@@ -182,7 +185,7 @@ def test_inputs_are_opened_as_by_the_command(office, tmp_path):
     with pytest.raises(panonav.OptionError, match="dataset.toml.*leave out 'source'"):
         panonav.Dataset(run, source)
     with pytest.raises(panonav.OptionError, match="leave out 'source'"):
-        panonav.memorise(panonav.Dataset(run), tmp_path / "new.panonav", source)
+        panonav.memorise(tmp_path / "new.panonav", panonav.Dataset(run), source)
     with pytest.raises(panonav.OptionError, match="has no topics; leave out the option imu_topic"):
         panonav.Dataset(run, imu_topic="/imu")
     photos = tmp_path / "photos"
@@ -192,7 +195,7 @@ def test_inputs_are_opened_as_by_the_command(office, tmp_path):
     (photos / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.warns(UserWarning) as warned:
         assert len(panonav.Dataset(photos, source)) == 1
-    assert [str(each.message) for each in warned] == ["left out, no PNG or JPEG by name: notes.txt",
+    assert [str(each.message) for each in warned] == ["left out, no PNG or JPEG: notes.txt",
                                                       "left out, folders within: within/"]
     with pytest.warns(UserWarning, match="notes.txt"):
         assert len(panonav.Dataset(photos, source, recursive=True)) == 2
@@ -204,4 +207,124 @@ def test_inputs_are_opened_as_by_the_command(office, tmp_path):
     memory = tmp_path / "office.panonav"
     shutil.copy(office / "office.panonav", memory)
     with pytest.warns(UserWarning):
-        assert panonav.memorise(photos, memory).appended == 1
+        assert panonav.memorise(memory, photos).appended == 1
+
+
+def with_pitch(png, degrees):
+    """The same PNG with GPano data (XMP in a chunk iTXt behind the header)."""
+    xmp = ('<rdf:Description xmlns:GPano="http://ns.google.com/photos/1.0/panorama/" '
+           f'GPano:ProjectionType="equirectangular" GPano:PosePitchDegrees="{degrees}"/>')
+    data = b"iTXtXML:com.adobe.xmp" + b"\0" * 5 + xmp.encode()
+    chunk = struct.pack(">I", len(data) - 4) + data + struct.pack(">I", zlib.crc32(data))
+    head = 8 + 25
+    return png[:head] + chunk + png[head:]
+
+
+def test_gpano_data_are_used_unless_they_are_ignored(office, tmp_path):
+    run = panonav.Dataset(office / "query_run")
+    photo = tmp_path / "photo.png"
+    photo.write_bytes(with_pitch((office / "query_run" / run.entries[0].file).read_bytes(), 10))
+    with pytest.warns(UserWarning, match="1 of 1 images are levelled.*ignore_gpano"):
+        levelled = panonav.Dataset(photo, run.source)
+    assert levelled.entries[0].tilt == pytest.approx((0, -math.radians(10)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert panonav.Dataset(photo, run.source, ignore_gpano=True).entries[0].tilt is None
+    with pytest.raises(panonav.OptionError, match="leave out their options"):
+        panonav.Dataset([photo], run.source, ignore_gpano=True)
+
+
+def estimated(estimate):
+    return estimate.name, estimate.state, estimate.pose, estimate.spread_m
+
+
+def test_lists_of_images_are_recordings(office, tmp_path):
+    run = panonav.Dataset(office / "query_run")
+    paths = [office / "query_run" / entry.file for entry in run.entries]
+    arrays = [panonav.read_image(path) for path in paths]
+    recogniser = panonav.PlaceRecogniser(office / "office.panonav")
+    expected = [recogniser.localise(path).to_dict() for path in paths]
+    for images in (paths, [str(path) for path in paths], tuple(paths), [panonav.Observation(path) for path in paths]):
+        assert [place.to_dict() for place in recogniser.localise_all(images)] == expected
+    unnamed = recogniser.localise_all(arrays)
+    assert [place.name for place in unnamed[:2]] == ["image_00000", "image_00001"]
+    assert [place.to_dict() | {"name": ""} for place in unnamed] == [place | {"name": ""} for place in expected]
+    assert recogniser.localise_all(arrays[0])[0].heading_rad == recogniser.localise(arrays[0]).heading_rad
+
+    guide = panonav.HomingGuide(office / "office.panonav", "view_00003.png")
+    assert [way.to_dict() for way in guide.home_all(paths)] == [guide.home(path).to_dict() for path in paths]
+    two = [panonav.Dataset(images, run.source) for images in (paths, arrays)]
+    assert [len(one) for one in two] == [len(run)] * 2 and two[0][1].name == run[1].name
+    for number, images in enumerate((paths, arrays, [one for one in run])):
+        memory = tmp_path / f"{number}.panonav"
+        assert panonav.memorise(memory, images, run.source).appended == len(paths)
+        assert panonav.memorise(memory, images).known_before == len(paths)
+    assert panonav.MemoryFile(tmp_path / "0.panonav").names() == [path.name for path in paths]
+    poses = panonav.MemoryFile(tmp_path / "2.panonav").load().poses()
+    assert numpy.allclose(poses[:, 0], [entry.pose.x_m for entry in run.entries])
+    drive = [one for one in panonav.Dataset(office / "drive")]
+    ends = [panonav.Tracker(office / "office.panonav").track(images)[-1] for images in (drive, office / "drive")]
+    assert estimated(ends[0]) == estimated(ends[1])
+    for wrong in ([], [panonav.Panorama(numpy.zeros((4, 8), numpy.float32))], [None], arrays):
+        with pytest.raises(panonav.ContractError):
+            panonav.memorise(tmp_path / "new.panonav", wrong)
+    assert not (tmp_path / "new.panonav").exists()
+
+
+def test_a_tracker_reads_motion_from_images_without_odometry(office):
+    bare = [panonav.Observation(one.picture, name=one.name) for one in panonav.Dataset(office / "drive")]
+    steps, run = panonav.Tracker(office / "office.panonav"), panonav.Tracker(office / "office.panonav")
+    one_by_one = [estimated(steps.observe(one)) for one in bare]
+    assert one_by_one == [estimated(one) for one in run.track(bare)]
+    still = panonav.Tracker(office / "office.panonav")
+    assert still.length_unit == "m"
+    still.move_to((0, 0, 0))
+    assert still.observe(bare[0])
+    still.move_to((0, 0, 0))  # odometry, so the images tell no motion
+    assert estimated(still.observe(bare[1])) != one_by_one[1]
+
+
+def errors_of_every_kind(office, folder):
+    """Calls that must fail, and the built-in class of their error."""
+    (folder / "text.panonav").write_text("no memory")
+    (folder / "broken.png").write_bytes(b"\x89PNG\r\n\x1a\nbroken")
+    memory, image = office / "office.panonav", office / "query_run" / panonav.Dataset(office / "query_run").entries[0].file
+    recogniser = panonav.PlaceRecogniser(memory)
+    yield OSError, lambda: panonav.localise(folder / "none.panonav", image)
+    yield OSError, lambda: panonav.localise(folder / "text.panonav", image)
+    yield OSError, lambda: panonav.localise(folder, image)
+    yield OSError, lambda: panonav.localise(memory, folder / "none.png")
+    yield OSError, lambda: panonav.localise(memory, folder / "broken.png")
+    yield OSError, lambda: panonav.memorise(folder / "new.panonav", folder / "no_run")
+    yield OSError, lambda: panonav.memorise(folder / "no_folder" / "new.panonav", office / "query_run")
+    yield OSError, lambda: panonav.Dataset(folder / ("n" * 300))
+    yield OSError, lambda: panonav.MemoryFile(memory).remove([1])
+    yield OSError, lambda: panonav.HomingGuide(memory, "nowhere")
+    yield OSError, lambda: panonav.read_image(folder)
+    yield OSError, lambda: panonav.read_camera(folder / "none.toml")
+    yield ValueError, lambda: panonav.localise(memory, image, topp=3)
+    yield ValueError, lambda: panonav.localise(memory, image, top=-3)
+    yield ValueError, lambda: panonav.localise(image, memory)
+    yield ValueError, lambda: panonav.memorise(office / "memory_run", memory)
+    yield ValueError, lambda: panonav.HomingGuide("view_00003.png", memory)
+    yield ValueError, lambda: panonav.localise(3, image)
+    yield ValueError, lambda: panonav.Tracker(None)
+    yield ValueError, lambda: recogniser.localise(3)
+    yield ValueError, lambda: recogniser.localise(numpy.zeros((4, 8), numpy.uint8))
+    yield ValueError, lambda: recogniser.localise(numpy.zeros((32, 128), numpy.float32))
+    yield ValueError, lambda: recogniser.localise_all(3)
+    yield ValueError, lambda: panonav.find_mirror(str(image))
+    yield ValueError, lambda: panonav.PictureSource("panorma")
+    yield ValueError, lambda: panonav.SimulatedWorld("offce")
+
+
+def test_every_error_is_an_error_of_panonav_in_one_line(office, tmp_path):
+    for number, (kind, call) in enumerate(errors_of_every_kind(office, tmp_path)):
+        with pytest.raises(panonav.Error) as caught:
+            call()
+        line = str(caught.value)
+        assert isinstance(caught.value, kind) and line and "\n" not in line, (number, line)
+    with pytest.raises(panonav.OptionError, match="the memory comes first: 'a.panonav', 'run'"):
+        panonav.make_map("run", "a.panonav")
+    with pytest.raises(panonav.OptionError, match="the memory comes first: 'a.panonav', 'run'"):
+        panonav.record_route("run", "a.panonav")

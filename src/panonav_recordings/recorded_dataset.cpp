@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
-#include <unordered_set>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav_recordings/internal/picture_messages.hpp"
 #include "panonav_recordings/internal/recorded_messages.hpp"
 #include "panonav_recordings/internal/recorded_topics.hpp"
 #include "panonav_recordings/ros_messages.hpp"
@@ -17,8 +17,6 @@ namespace panonav::recordings {
 namespace {
 
 namespace fs = std::filesystem;
-using MessageBytes = std::span<const std::uint8_t>;
-
 constexpr std::int64_t second_ns = 1'000'000'000;
 
 std::string make_name_from_stamp(std::int64_t ns) {
@@ -38,63 +36,69 @@ double to_seconds(std::int64_t ns) {
 /// The pictures of one topic, read and decoded on demand.
 class RecordedPictures : public PictureStore {
  public:
-  /// `locations` are the locations of messages of the types sensor_msgs/Image and CompressedImage.
+  /// `locations` are those of messages of topics of pictures.
   RecordedPictures(fs::path path, std::shared_ptr<const Recording> recording,
-                   std::vector<MessageLocation> locations);
+                   std::vector<MessageLocation> locations)
+      : path_(std::move(path)),
+        recording_(std::move(recording)),
+        locations_(std::move(locations)) {}
   [[nodiscard]] Image read(std::size_t index) const override;
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> encoded(std::size_t index) const override;
 
  private:
+  [[nodiscard]] const RecordedTopic& topic_of(std::size_t index) const {
+    return recording_->topics()[locations_.at(index).topic];
+  }
   fs::path path_;
   std::shared_ptr<const Recording> recording_;
   std::vector<MessageLocation> locations_;
 };
 
-RecordedPictures::RecordedPictures(fs::path path, std::shared_ptr<const Recording> recording,
-                                   std::vector<MessageLocation> locations)
-    : path_(std::move(path)), recording_(std::move(recording)), locations_(std::move(locations)) {}
-
 Image RecordedPictures::read(std::size_t index) const {
   const MessageLocation& location = locations_.at(index);
-  const RecordedTopic& topic = recording_->topics()[location.topic];
   const auto bytes = recording_->read(location);
   const std::string name =
       path_.string() + ": image at " + to_text(to_seconds(location.time_ns)) + " s";
   try {
-    if (topic.type == ros::Image::type) {
-      return ros::to_image(ros::read_message<ros::Image>(bytes, topic.encoding));
-    }
-    return ros::to_image(ros::read_message<ros::CompressedImage>(bytes, topic.encoding), name);
+    return to_image(read_picture_message(bytes, topic_of(index)), name);
   } catch (const ContractError& error) {
     throw FileError(name, error.what());
   }
 }
 
 std::optional<std::vector<std::uint8_t>> RecordedPictures::encoded(std::size_t index) const {
-  const MessageLocation& location = locations_.at(index);
-  const RecordedTopic& topic = recording_->topics()[location.topic];
-  if (topic.type == ros::Image::type) return std::nullopt;
-  const auto bytes = recording_->read(location);
+  if (is_raw_picture_topic(topic_of(index))) return std::nullopt;
+  const auto bytes = recording_->read(locations_.at(index));
   try {
-    const auto message = ros::read_message<ros::CompressedImage>(bytes, topic.encoding);
-    return std::vector<std::uint8_t>(message.data.begin(), message.data.end());
+    const auto data = read_picture_message(bytes, topic_of(index)).file.data;
+    return std::vector<std::uint8_t>(data.begin(), data.end());
   } catch (const ContractError& error) {
     throw FileError(path_.string(), error.what());
   }
 }
 
+/// The pictures of a video whose packets are messages.
+class PicturesOfVideo : public PictureStore {
+ public:
+  explicit PicturesOfVideo(std::unique_ptr<RecordedVideo> video)
+      : video_(std::move(video)), pictures_(video_->pictures()) {}
+  [[nodiscard]] Image read(std::size_t index) const override { return pictures_->read(index); }
+
+ private:
+  std::unique_ptr<RecordedVideo> video_;  // outlives its pictures
+  std::shared_ptr<const PictureStore> pictures_;
+};
+
 /// Makes the entry of each image, in order, and counts missing fields.
 class EntryMaker {
  public:
-  EntryMaker(const RecordedMessages& messages, bool use_log_times)
-      : messages_(messages), use_log_times_(use_log_times) {}
+  explicit EntryMaker(const RecordedMessages& messages)
+      : messages_(messages), odometry_span_(messages.odometry_span()) {}
 
   [[nodiscard]] DatasetEntry make(const RecordedPicture& picture) {
-    const std::int64_t ns = use_log_times_ ? picture.location.time_ns : picture.stamp_ns;
-    if (ns < previous_ns_) ++backward_;
-    previous_ns_ = ns;
+    const std::int64_t ns = picture.stamp_ns;
     DatasetEntry entry;
-    entry.file = make_unique_name(ns);
+    entry.file = make_name_from_stamp(ns);
     entry.stamp_s = to_seconds(ns);
     set_odometry(entry, ns);
     set_tilt(entry, ns);
@@ -103,21 +107,24 @@ class EntryMaker {
   }
 
   void append_warnings(std::vector<std::string>& warnings) const {
-    const std::string of_all = " of " + std::to_string(messages_.pictures.size()) + " images";
+    const std::string of_all = " of " + format_count(messages_.pictures.size(), "image");
     const auto warn_if_any = [&](std::size_t count, const std::string& what) {
       if (count > 0) warnings.push_back(std::to_string(count) + what);
     };
     const auto& [width, height] = messages_.first_size;
-    if (backward_ > 0)
-      warnings.push_back("stamps run back at " + std::to_string(backward_) + of_all);
     warn_if_any(messages_.differing_size_count, of_all + " are not of the size of the first, " +
                                                     std::to_string(width) + " x " +
                                                     std::to_string(height) + " px");
-    if (messages_.chain || messages_.odometry.size() > 0) {
-      warn_if_any(without_odometry_,
-                  of_all +
-                      " have no odometry: it begins later, ends before or pauses for more than a "
-                      "second");
+    if (odometry_span_) {
+      std::string where;
+      for (const auto& [count, what] : {std::pair{before_odometry_, "before its first message"},
+                                        {in_pauses_, "in pauses of more than a second"},
+                                        {after_odometry_, "after its last message"}}) {
+        if (count == 0) continue;
+        where += (where.empty() ? ": " : ", ") + std::to_string(count) + " " + what;
+      }
+      warn_if_any(before_odometry_ + in_pauses_ + after_odometry_,
+                  of_all + " have no odometry" + where);
     }
     if (messages_.orientation.size() > 0) {
       warn_if_any(without_tilt_, of_all + " have no orientation near their stamps");
@@ -132,21 +139,13 @@ class EntryMaker {
   }
 
  private:
-  [[nodiscard]] std::string make_unique_name(std::int64_t ns) {
-    std::string name = make_name_from_stamp(ns);
-    for (int copy = 2; !names_.insert(name).second; ++copy) {
-      name = make_name_from_stamp(ns) + "_" + std::to_string(copy);
-    }
-    return name;
-  }
-
   void set_odometry(DatasetEntry& entry, std::int64_t ns) {
-    const auto pose = messages_.chain ? messages_.chain->at(ns) : messages_.odometry.at(ns);
-    if (!pose) {
-      ++without_odometry_;
-      return;
+    if (const auto pose = messages_.odometry_at(ns)) {
+      entry.odometry = ros::to_pose2(*pose);
+    } else if (odometry_span_) {
+      const bool is_before = ns < odometry_span_->begin_ns;
+      ++(is_before ? before_odometry_ : ns > odometry_span_->end_ns ? after_odometry_ : in_pauses_);
     }
-    entry.odometry = ros::to_pose2(*pose);
   }
 
   void set_tilt(DatasetEntry& entry, std::int64_t ns) {
@@ -172,24 +171,13 @@ class EntryMaker {
   }
 
   const RecordedMessages& messages_;
-  bool use_log_times_;
-  std::unordered_set<std::string> names_;
-  std::int64_t previous_ns_ = std::numeric_limits<std::int64_t>::min();
-  std::size_t backward_ = 0;  ///< pictures with a stamp before the previous one's
-  std::size_t without_odometry_ = 0;
+  std::optional<TimeSpan> odometry_span_;
+  std::size_t before_odometry_ = 0;
+  std::size_t in_pauses_ = 0;
+  std::size_t after_odometry_ = 0;
   std::size_t without_tilt_ = 0;
   std::size_t too_tilted_ = 0;
 };
-
-/// Describes a picture message: size and encoding, or the format of a compressed one.
-std::string describe_picture(MessageBytes bytes, const RecordedTopic& topic) {
-  if (topic.type == ros::CompressedImage::type) {
-    return ros::read_message<ros::CompressedImage>(bytes, topic.encoding).format;
-  }
-  const auto message = ros::read_message<ros::Image>(bytes, topic.encoding);
-  return std::to_string(message.width) + " x " + std::to_string(message.height) + " " +
-         message.encoding;
-}
 
 }  // namespace
 
@@ -202,21 +190,26 @@ Dataset read_recording(std::shared_ptr<const Recording> recording, const fs::pat
                        PictureSource source, const InputOptions::Topics& topics) {
   RecordedMessages messages =
       collect_messages(path, *recording, choose_topics(*recording, path, topics, source));
-  const bool use_log_times = messages.sort();
+  messages.sort();
   std::vector<MessageLocation> locations;
   for (const RecordedPicture& picture : messages.pictures) locations.push_back(picture.location);
-  const auto store =
-      std::make_shared<const RecordedPictures>(path, recording, std::move(locations));
+  const bool is_video = messages.video != nullptr;
+  std::shared_ptr<const PictureStore> store;
+  if (is_video) {
+    store = std::make_shared<const PicturesOfVideo>(std::move(messages.video));
+  } else {
+    store = std::make_shared<const RecordedPictures>(path, recording, std::move(locations));
+  }
 
   Dataset opened;
   opened.folder = path;
   opened.source = std::move(source);
-  EntryMaker maker(messages, use_log_times);
+  EntryMaker maker(messages);
   for (const RecordedPicture& picture : messages.pictures) {
     DatasetEntry& entry = opened.entries.emplace_back(maker.make(picture));
     entry.path = path;
     entry.store = store;
-    entry.store_index = opened.entries.size() - 1;
+    entry.store_index = is_video ? picture.video_index : opened.entries.size() - 1;
   }
   opened.warnings = recording->warnings();
   opened.warnings.insert(opened.warnings.end(), messages.warnings.begin(), messages.warnings.end());
@@ -236,12 +229,15 @@ RecordingSummary describe_recording(const fs::path& path) {
     each.time = TimeSpan{locations.front().time_ns, locations.back().time_ns};
     const double span_s = to_seconds(each.time->end_ns - each.time->begin_ns);
     if (span_s > 0.0) each.rate_hz = static_cast<double>(locations.size() - 1) / span_s;
-    if (!is_readable_picture_topic(topics[i])) continue;
+    if (!is_picture_topic(topics[i])) continue;
     try {
-      each.shows =
-          to_readable_line(describe_picture(recording->read(locations.front()), topics[i]));
+      const auto bytes = recording->read(locations.front());
+      const PictureMessage message = read_picture_message(bytes, topics[i]);
+      each.shows = to_readable_line(describe_picture(message));
+      if (message.raw || !find_video_codec(message.file.format))
+        each.size = to_image(message, topics[i].name).size();
     } catch (const Error& error) {
-      each.shows = to_readable_line(error.what());
+      if (!each.shows) each.shows = to_readable_line(error.what());
     }
   }
   std::ranges::stable_sort(summary.topics, {},

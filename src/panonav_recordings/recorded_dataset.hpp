@@ -17,10 +17,10 @@ namespace panonav::recordings {
 /// Pictures are named by their stamps ("1700000000_250000000") and read when needed; `source` is
 /// their layout. docs/recordings.md has the rules for topics, stamps and frames. Odometry and
 /// "/ground_truth" are interpolated between messages at most a second apart; tilt comes from the
-/// IMU topic, if there is exactly one. Throws FileError if there is no topic of pictures, or
-/// several and none is named; if a named topic is missing or of another type; if no transforms
-/// connect named frames; and as `Recording::open`. Cost: one pass over the messages. Memory: 400
-/// bytes a picture and 80 a message.
+/// IMU topic, if there is exactly one. Throws FileError if there is no topic of pictures; if a
+/// named topic is missing or of another type; if no transforms connect named frames; and as
+/// `Recording::open`. Cost: one pass over the messages; packets of a video are copied into a
+/// temporary file. Memory: 400 bytes a picture and 88 a message.
 [[nodiscard]] Dataset read_recording(const std::filesystem::path& path, PictureSource source,
                                      const InputOptions::Topics& topics = {});
 /// Reads an open recording; errors and entries name `path`.
@@ -34,6 +34,7 @@ struct TopicSummary {
   std::optional<TimeSpan> time;      ///< log times of its first and last message
   std::optional<double> rate_hz;     ///< mean; nullopt for one message
   std::optional<std::string> shows;  ///< format or size and encoding of the first picture
+  std::optional<ImageSize> size;     ///< of the first picture; nullopt: not known, as of a video
 };
 
 /// Contents of a recording.
@@ -43,7 +44,8 @@ struct RecordingSummary {
   std::vector<std::string> warnings;  ///< what was damaged or left out, a line each
 };
 
-/// Describes the contents of a recording without decoding a picture. Throws FileError.
+/// Describes the contents of a recording. Decodes the first picture of each topic with pictures.
+/// Throws FileError.
 [[nodiscard]] RecordingSummary describe_recording(const std::filesystem::path& path);
 
 }  // namespace panonav::recordings

@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav_recordings/internal/recording_file.hpp"
 #include "panonav_recordings/internal/rosbag2.hpp"
@@ -39,7 +40,7 @@ class FilesRecording : public Recording {
       for (const RecordedTopic& topic : files_[file]->topics()) {
         const auto [found, is_new] = numbers.try_emplace(
             {topic.name, topic.type, topic.encoding}, static_cast<std::uint32_t>(topics_.size()));
-        if (is_new) topics_.push_back(RecordedTopic{topic.name, topic.type, topic.encoding, 0});
+        if (is_new) topics_.emplace_back(topic).messages = 0;
         topics_[found->second].messages += topic.messages;
         topics.push_back(found->second);
       }
@@ -320,6 +321,43 @@ std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLi
                   "folders of rosbag2 with metadata.yaml");
 }
 
+/// Returns the recordings in a folder of a recorder that crashed before it wrote metadata.yaml, in
+/// natural order of their names (_2 before _10). Empty if the folder also has pictures, or files of
+/// several recordings, whose names differ in more than a number.
+std::vector<fs::path> find_files_without_metadata(const fs::path& folder) {
+  constexpr std::size_t max_files = 10'000;
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::vector<std::pair<std::uint64_t, fs::path>> numbered;
+  std::set<std::string> names;
+  std::error_code code;
+  fs::directory_iterator file(folder, code);
+  for (; !code && file != fs::directory_iterator() && numbered.size() < max_files;
+       file.increment(code)) {
+    const std::string extension = to_lower_case(file->path().extension().string());
+    if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") return {};
+    if (file->path().filename() == "dataset.toml") return {};
+    const FileKind kind = detect_kind(file->path());
+    if (kind != FileKind::mcap && kind != FileKind::database && kind != FileKind::packed) continue;
+    fs::path stem = file->path().stem();
+    if (extension == ".zstd") stem = stem.stem();
+    std::string name = stem.string();
+    std::string number;
+    while (!name.empty() && is_digit(name.back())) {
+      number.insert(number.begin(), name.back());
+      name.pop_back();
+    }
+    std::uint64_t value = 0;
+    if (!read_number(number, value)) value = 0;
+    numbered.emplace_back(value, file->path());
+    names.insert(name);
+  }
+  if (code || names.size() > 1) return {};
+  std::ranges::sort(numbered);
+  std::vector<fs::path> files;
+  for (auto& each : numbered) files.push_back(std::move(each.second));
+  return files;
+}
+
 bool is_rosbag2_folder(const fs::path& path) {
   std::array<char, 4096> first{};
   std::error_code code;
@@ -335,11 +373,24 @@ std::unique_ptr<const Recording> Recording::open(const fs::path& path,
                                                  const RecordingLimits& limits) {
   Files files;
   std::vector<std::string> warnings;
-  if (!is_rosbag2_folder(path)) {
+  std::error_code code;
+  const bool has_metadata = is_rosbag2_folder(path);
+  const bool is_folder = fs::is_directory(path, code);
+  if (!has_metadata && !is_folder) {
     files.push_back(open_file(path, limits));
   } else {
+    const auto found = has_metadata ? read_rosbag2_folder(path) : find_files_without_metadata(path);
+    if (found.empty()) {
+      throw FileError(path.string(),
+                      "has no metadata.yaml and is no recording; allowed: folders of rosbag2, or "
+                      "with the files of one recording (NAME_0.db3, NAME_1.db3 or .mcap)");
+    }
+    if (!has_metadata) {
+      warnings.push_back("has no metadata.yaml, as the recorder was not closed; files read: " +
+                         std::to_string(found.size()));
+    }
     // If one file of a recording cannot be opened, the others are still read.
-    for (const fs::path& file : read_rosbag2_folder(path)) {
+    for (const fs::path& file : found) {
       try {
         files.push_back(open_file(file, limits));
       } catch (const FileError& error) {
@@ -347,14 +398,16 @@ std::unique_ptr<const Recording> Recording::open(const fs::path& path,
       }
     }
     if (files.empty())
-      throw FileError(path.string(), "has no file that can be read: " + warnings[0]);
+      throw FileError(path.string(), "has no file that can be read: " + warnings.back());
   }
   return std::make_unique<const FilesRecording>(std::move(files), std::move(warnings), limits);
 }
 
 bool is_recording(const fs::path& path) noexcept {
   try {
-    return detect_kind(path) != FileKind::other || is_rosbag2_folder(path);
+    if (detect_kind(path) != FileKind::other || is_rosbag2_folder(path)) return true;
+    std::error_code code;
+    return fs::is_directory(path, code) && !find_files_without_metadata(path).empty();
   } catch (...) {
     return false;
   }

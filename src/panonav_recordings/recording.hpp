@@ -14,9 +14,10 @@ namespace panonav::recordings {
 
 /// Serialisation of a message.
 enum class MessageEncoding {
-  ros1,  ///< of ROS 1 bags
-  cdr,   ///< of ROS 2, little or big endian (XCDR1)
-  other  ///< not supported by `read_message`
+  ros1,      ///< of ROS 1 bags
+  cdr,       ///< of ROS 2, little or big endian (XCDR1)
+  protobuf,  ///< of Foxglove; pictures only
+  other      ///< not supported by `read_message`
 };
 
 /// A topic of a recording: all channels (MCAP) or connections (ROS 1) of one name, type and
@@ -28,6 +29,7 @@ struct RecordedTopic {
   std::string type;
   MessageEncoding encoding = MessageEncoding::other;  ///< serialisation of its messages
   std::uint64_t messages = 0;                         ///< number of messages
+  std::string encoding_name;  ///< name of the serialisation in the file, such as "json"
 };
 
 /// Position of a message in its recording.
@@ -58,8 +60,9 @@ struct RecordingLimits {
 };
 
 /// Messages of topics, with the times at which they were recorded. Formats: an MCAP file, a ROS 1
-/// bag (version 2.0), a .db3 file of rosbag2, or a folder of rosbag2 with one or several files.
-/// Compressed files (.zstd) are unpacked into a temporary file.
+/// bag (version 2.0), a .db3 file of rosbag2, or a folder of rosbag2 with one or several files; a
+/// folder without metadata.yaml, of a recorder that crashed, gives a warning. Compressed files
+/// (.zstd) are unpacked into a temporary file.
 ///
 /// A file that is cut off or damaged is read up to the damage, and chunks with a wrong checksum are
 /// skipped; `warnings` reports both.
@@ -99,8 +102,9 @@ class Recording {
                                std::span<const std::uint8_t> bytes)>& use) const = 0;
 };
 
-/// True if `Recording::open` would accept the path, by the first bytes of a file or the
-/// metadata.yaml of a folder. Never throws; false if it cannot be read.
+/// True if `Recording::open` would accept the path, by the first bytes of a file, the metadata.yaml
+/// of a folder, or the files of a folder without pictures. Never throws; false if it cannot be
+/// read.
 [[nodiscard]] bool is_recording(const std::filesystem::path& path) noexcept;
 
 }  // namespace panonav::recordings

@@ -6,6 +6,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/temporary_file.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/unfinished_folder.hpp"
@@ -23,7 +24,9 @@ namespace fs = std::filesystem;
 
 Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& file,
                                      const std::function<void()>& advance) {
-  const Dataset::Fields shared = find_shared_fields(dataset);
+  const Dataset::Fields known = find_known_fields(dataset);
+  const bool has_all_headings = std::ranges::all_of(
+      dataset.entries, [](const DatasetEntry& e) { return !e.pose || e.pose->heading_rad; });
   TemporaryFile unfinished(file);
   // JPEG and PNG data is compressed already.
   McapWriter writer(unfinished.path(), {.compression = McapCompression::none});
@@ -32,10 +35,10 @@ Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& fil
   std::int64_t log_ns = 0;
   for (std::size_t i = 0; i < dataset.entries.size(); ++i) {
     const DatasetEntry& entry = dataset.entries[i];
-    const std::int64_t ns = to_nanoseconds(shared.stamps ? *entry.stamp_s : static_cast<double>(i));
+    const std::int64_t ns = to_nanoseconds(known.stamps ? *entry.stamp_s : static_cast<double>(i));
     log_ns = std::max(log_ns, ns);  // never decreases: readers sort by it
     std::optional<ReferencePose> truth = entry.pose;
-    if (truth && !shared.headings) truth->heading_rad.reset();
+    if (truth && !has_all_headings) truth->heading_rad.reset();
     robot.write(log_ns, ns, entry.odometry, entry.tilt, truth);
     const auto bytes = read_encoded_picture(entry);
     pictures.write(log_ns, ns,
@@ -49,24 +52,23 @@ Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& fil
   fs::rename(unfinished.path(), file, error);
   if (error) throw FileError(file.string(), "cannot be written: " + error.message());
   unfinished.keep();
-  return shared;
+  return known;
 }
 
 Dataset::Fields convert_to_dataset(const Dataset& recording, const fs::path& folder,
                                    const std::function<void()>& advance) {
   UnfinishedFolder unfinished(folder);
   Dataset dataset = recording;
-  const Dataset::Fields shared = drop_partial_fields(dataset);
   dataset.folder = unfinished.path();
   for (DatasetEntry& entry : dataset.entries) {
     const auto bytes = read_encoded_picture(entry);
     entry.file += image_format(bytes, entry.file) == ImageFormat::png ? ".png" : ".jpg";
-    write_file(dataset.folder / entry.file, bytes);
+    write_file(dataset.folder / unescape_name(entry.file), bytes);
     if (advance) advance();
   }
   write_dataset(dataset);
   unfinished.finish();
-  return shared;
+  return find_known_fields(dataset);
 }
 
 }  // namespace panonav::recordings

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "panonav/io/dataset_readers.hpp"
+#include "panonav_recordings/internal/foreign_pictures.hpp"
 #include "panonav_recordings/jpeg_stream.hpp"
 #include "panonav_recordings/recorded_dataset.hpp"
 #include "panonav_recordings/video_file.hpp"
@@ -18,15 +19,19 @@ Dataset open_recording(const std::filesystem::path& path, const PictureSource& s
   return opened;
 }
 
-bool is_video_file(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return is_video(path) && std::filesystem::is_regular_file(path, ignored);
-}
-
 /// Reads only the selected pictures of a video, because decoding the others would cost time.
 Dataset open_video(const std::filesystem::path& path, const PictureSource& source,
                    const InputOptions& options) {
-  return read_video(path, source, options.selection);
+  std::vector<std::filesystem::path> paths{path};
+  paths.insert(paths.end(), options.further_videos.begin(), options.further_videos.end());
+  return read_videos(paths, source, options.selection);
+}
+
+Dataset open_foreign_pictures(const std::filesystem::path& path, const PictureSource& source,
+                              const InputOptions& options) {
+  Dataset opened = read_foreign_pictures(path, source);
+  select_pictures(opened, options.selection);
+  return opened;
 }
 
 bool is_standard_input(const std::filesystem::path& path) {
@@ -44,7 +49,9 @@ Dataset open_standard_input(const std::filesystem::path& /*path*/, const Picture
 
 void register_recordings() {
   register_dataset_reader({"recording", true, is_recording, open_recording});
-  register_dataset_reader({"video", false, is_video_file, open_video});
+  register_dataset_reader({"video", false, is_video, open_video});
+  register_dataset_reader(
+      {"folder of WebP, HEIC or AVIF images", false, is_foreign_picture, open_foreign_pictures});
   register_dataset_reader({"stream", false, is_standard_input, open_standard_input});
 }
 

@@ -52,6 +52,20 @@ void visit_fields(A& a, Is<CompressedImage> auto& m) {
   a(m.header, m.format, m.data);
 }
 template <class A>
+void visit_fields(A& a, Is<FoxgloveRawImage> auto& m) {
+  a.stamp(m.stamp_ns);
+  a(m.frame_id, m.width, m.height, m.encoding, m.step, m.data);
+}
+template <class A>
+void visit_fields(A& a, Is<FoxgloveCompressedImage> auto& m) {
+  a.stamp(m.stamp_ns);
+  a(m.frame_id, m.data, m.format);
+}
+template <class A>
+void visit_fields(A& a, Is<FfmpegPacket> auto& m) {
+  a(m.header, m.width, m.height, m.encoding, m.pts, m.flags, m.is_bigendian, m.data);
+}
+template <class A>
 void visit_fields(A& a, Is<Imu> auto& m) {
   a(m.header, m.orientation, m.orientation_covariance, m.angular_velocity,
     m.angular_velocity_covariance, m.linear_acceleration, m.linear_acceleration_covariance);
@@ -149,7 +163,8 @@ class Reader {
  public:
   Reader(std::span<const std::uint8_t> bytes, MessageEncoding encoding, std::string_view type)
       : bytes_(bytes), type_(type), cdr_(encoding == MessageEncoding::cdr) {
-    if (encoding == MessageEncoding::other) fail("encoding", "other", "ros1, cdr");
+    if (encoding != MessageEncoding::cdr && encoding != MessageEncoding::ros1)
+      fail("encoding", "other", "ros1, cdr");
     if (!cdr_) return;
     const auto header = take(encapsulation_bytes);
     const int representation = header[0] << 8 | header[1];
@@ -340,12 +355,16 @@ std::vector<std::uint8_t> write_message(const Message& message, MessageEncoding 
   template std::vector<std::uint8_t> write_message<Message>(const Message&, MessageEncoding)
 PANONAV_ROS_MESSAGE(Image);
 PANONAV_ROS_MESSAGE(CompressedImage);
+PANONAV_ROS_MESSAGE(FoxgloveRawImage);
+PANONAV_ROS_MESSAGE(FoxgloveCompressedImage);
+PANONAV_ROS_MESSAGE(FfmpegPacket);
 PANONAV_ROS_MESSAGE(Imu);
 PANONAV_ROS_MESSAGE(PointCloud2);
 PANONAV_ROS_MESSAGE(Odometry);
 PANONAV_ROS_MESSAGE(Path);
 PANONAV_ROS_MESSAGE(OccupancyGrid);
 PANONAV_ROS_MESSAGE(TFMessage);
+PANONAV_ROS_MESSAGE(TransformStamped);
 PANONAV_ROS_MESSAGE(PointStamped);
 PANONAV_ROS_MESSAGE(PoseStamped);
 PANONAV_ROS_MESSAGE(PoseWithCovarianceStamped);

@@ -89,6 +89,44 @@ struct CompressedImage {
   std::span<const std::uint8_t> data;  ///< the bytes of the file
 };
 
+/// The type foxglove_msgs/RawImage: pixels, as in `Image` with numbers of the least significant
+/// byte first.
+struct FoxgloveRawImage {
+  static constexpr std::string_view type = "foxglove_msgs/RawImage";  ///< ROS 1's name of the type
+  std::int64_t stamp_ns = 0;                                          ///< when it was taken
+  std::string frame_id;                                               ///< frame of the camera
+  std::uint32_t width = 0;                                            ///< columns
+  std::uint32_t height = 0;                                           ///< rows
+  std::string encoding;                ///< pixel encoding, see `to_image`
+  std::uint32_t step = 0;              ///< bytes from one row to the next
+  std::span<const std::uint8_t> data;  ///< height x step bytes, rows from the top
+};
+
+/// The types foxglove_msgs/CompressedImage, a picture as a file, and foxglove_msgs/CompressedVideo,
+/// a packet of a video.
+struct FoxgloveCompressedImage {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "foxglove_msgs/CompressedImage";
+  std::int64_t stamp_ns = 0;           ///< when it was taken
+  std::string frame_id;                ///< frame of the camera
+  std::span<const std::uint8_t> data;  ///< the bytes of the file or packet
+  std::string format;                  ///< "jpeg", "png", "h264", "h265"
+};
+
+/// A packet of a video, of the package ffmpeg_image_transport.
+struct FfmpegPacket {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "ffmpeg_image_transport_msgs/FFMPEGPacket";
+  Header header;                       ///< when it was taken; frame of the camera
+  std::int32_t width = 0;              ///< columns
+  std::int32_t height = 0;             ///< rows
+  std::string encoding;                ///< "h264", "hevc", or with further words: "h264;yuv420p"
+  std::uint64_t pts = 0;               ///< number of the packet
+  std::uint8_t flags = 0;              ///< 1: a key frame
+  std::uint8_t is_bigendian = 0;       ///< unused
+  std::span<const std::uint8_t> data;  ///< the bytes of the packet
+};
+
 /// Measurements of an inertial sensor.
 struct Imu {
   static constexpr std::string_view type = "sensor_msgs/Imu";  ///< ROS 1's name of the type
@@ -120,6 +158,8 @@ struct Odometry {
 
 /// Pose of one frame in another at a time.
 struct TransformStamped {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "geometry_msgs/TransformStamped";
   Header header;               ///< frame_id: the parent
   std::string child_frame_id;  ///< the child frame
   Pose transform;              ///< parent_from_child
@@ -269,13 +309,12 @@ template <class Message>
 /// types in it. Throws ContractError on another type.
 [[nodiscard]] std::string ros2_schema(std::string_view type);
 
-/// Returns the picture like `read_image`: one channel for grey, three for colour.
-/// - mono8, 8UC1: as they are. mono16: scaled from 0 .. 65535 as a PNG of 16 bits is.
-/// - rgb8, bgr8, rgba8, bgra8, 8UC3 and 8UC4 (OpenCV's order: blue first): alpha is dropped.
-/// - bayer_rggb8, bayer_bggr8, bayer_gbrg8, bayer_grbg8: bilinear interpolation.
-/// - yuv422 or uyvy, yuv422_yuy2 or yuyv: ITU-R BT.601, luma 16 .. 235, as in OpenCV.
-/// Throws ContractError on other encodings, sizes beyond the limits, a step shorter than a row and
-/// data of another length than height x step.
+/// Returns the picture like `read_image`: one channel for grey, three for colour, without alpha.
+/// Reads the encodings of docs/recordings.md, in capitals or not: 16 bits are scaled as those of a
+/// PNG; floating point from 0 .. 1, or from 0 .. 255 if a value is more than 2 (NaN gives 0); Bayer
+/// patterns are interpolated bilinearly; YUV is converted by ITU-R BT.601, luma 16 .. 235, as in
+/// OpenCV. The height of planes counts the rows of u and v or not. Throws ContractError on other
+/// encodings, sizes beyond the limits, a step shorter than a row and data of another length.
 [[nodiscard]] panonav::Image to_image(const Image& message, const ImageLimits& limits = {});
 /// Decodes a JPEG or PNG; the bytes, not `format`, decide which. Errors name `name`. Throws
 /// ContractError on another format (compressedDepth, h264), FileError on bytes that cannot be

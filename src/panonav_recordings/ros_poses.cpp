@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/pose3.hpp"
 
 namespace panonav::recordings::ros {
 
@@ -78,8 +79,7 @@ Pose to_pose(const Pose2& pose, const Tilt& tilt) {
 
 Pose2 to_pose2(const Pose& pose) {
   const auto& [x, y, z, w] = pose.orientation;
-  return {pose.position.x, pose.position.y,
-          wrap_angle(std::atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))};
+  return {pose.position.x, pose.position.y, wrap_angle(Rotation3{w, x, y, z}.yaw_rad())};
 }
 
 Tilt to_tilt(const Quaternion& orientation) {

@@ -110,9 +110,9 @@ void set_localisation(RunMoment& moment, const MonteCarloEstimate& estimate) {
     moment.covariance = estimate.modes.front().covariance;
   }
   moment.sure = estimate.state == LocalisationState::localised;
-  moment.state = moment.sure                                      ? "localised"
-                 : estimate.state == LocalisationState::ambiguous ? "ambiguous"
-                                                                  : "lost";
+  moment.state = estimate.state == LocalisationState::position_known
+                     ? "position known, heading not"
+                     : std::string(to_string(estimate.state));
   moment.probability = estimate.probability;
   moment.values = {{"probability", format_fixed(estimate.probability, 4)},
                    {"inside", format_fixed(estimate.p_inside, 4)},
@@ -123,22 +123,22 @@ void set_localisation(RunMoment& moment, const MonteCarloEstimate& estimate) {
 void set_localisation(RunMoment& moment, const Place& place) {
   moment.sure = place.known;
   moment.state = place.known ? "known place" : "unknown place";
-  moment.probability = place.known_probability;
+  moment.probability = place.probability;
   moment.values = {{"known_probability", format_fixed(place.known_probability, 4)}};
+  for (const AlternativePlace& other : place.alternatives) {
+    moment.values.emplace_back(
+        "alternative", other.match.name + ", probability " + format_fixed(other.probability, 4));
+  }
   if (!place.matches.empty()) {
     moment.best_match_turn_rad = place.matches.front().heading_rad;
     moment.values.emplace_back("best_match", place.matches.front().name);
   }
   if (!place.known || !place.position || !place.heading_rad) return;
   moment.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
-  if (place.position->radius_m) {
-    // 95 % of a circular normal distribution lie within 2.4477 standard deviations.
-    const double deviation_m = *place.position->radius_m / 2.4477;
-    const double variance = deviation_m * deviation_m;
-    // The accuracy of the heading is unknown: this is the variance of a uniform angle.
-    constexpr double uniform_heading_variance = std::numbers::pi * std::numbers::pi / 3.0;
-    moment.covariance = {variance, 0, 0, 0, variance, 0, 0, 0, uniform_heading_variance};
-  }
+  // The accuracy of the heading is unknown: this is the variance of a uniform angle.
+  constexpr double uniform_heading_variance = std::numbers::pi * std::numbers::pi / 3.0;
+  const auto [xx, xy, yy] = place.position->covariance();
+  moment.covariance = {xx, xy, 0, xy, yy, 0, 0, 0, uniform_heading_variance};
 }
 
 struct RunRecorder::Implementation {

@@ -47,10 +47,10 @@ struct RunComparison {
   std::uint32_t dissimilarity = 0;  ///< as `Match`: a smaller value is more similar
 };
 
-/// Direction and confidence of a home vector.
+/// Direction of a home vector and its probability.
 struct RunHoming {
   double direction_rad = 0.0;  ///< in the frame of the robot
-  double confidence = 0.0;     ///< 0 .. 1, as `HomeVector`
+  double probability = 0.0;    ///< 0 .. 1, that the direction is right, as `PairEvidence`
 };
 
 /// State of a run at one moment, for display. Empty members are not written. Positions and poses
@@ -77,6 +77,7 @@ struct RunMoment {
   std::optional<ReferencePose> truth;  ///< true pose of the robot, for comparison
   // These members stay valid until a later moment replaces them.
   std::vector<Point2> references;             ///< positions of the reference views
+  std::string length_unit;                    ///< of all positions if it is not "m"; not in records
   std::vector<RunReference> reference_views;  ///< one for each reference, or empty; not in records
   std::vector<RunRegion> regions;             ///< not in records
   std::vector<std::vector<Point2>> walls;  ///< polylines, closed if ends are equal; not in records

@@ -7,6 +7,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
 namespace panonav::ros2 {
@@ -30,6 +31,12 @@ LoadedMemory& MemoryLocaliser::loaded() const {
 
 void MemoryLocaliser::load(std::filesystem::path path) {
   MemoryFile file = MemoryFile::open(path, Access::read_only);
+  if (read_length_unit(file) != LengthUnit::metres) {
+    throw FileError(
+        path.string(),
+        "has positions in view steps, and ROS needs metres; first scale it by the known "
+        "distance between two of its views, or record a drive with odometry");
+  }
   Tracker tracker(path, setup_.tracker);
   std::unique_ptr<LoadedMemory> memory(
       new LoadedMemory{std::move(path), std::move(file), std::move(tracker)});

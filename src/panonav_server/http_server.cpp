@@ -157,6 +157,9 @@ MHD_Result queue_answer(Connection& one, HttpAnswer answer, std::string_view hea
   }
   if (status != 204) MHD_add_response_header(response, "Content-Type", answer.type.c_str());
   if (status >= 400) MHD_add_response_header(response, "Connection", "close");
+  if (status == 401) {  // browsers then ask the user for a password
+    MHD_add_response_header(response, "WWW-Authenticate", "Basic realm=\"panonav\"");
+  }
   const MHD_Result queued = MHD_queue_response(one.handle, status, response);
   MHD_destroy_response(response);
   return queued;

@@ -17,6 +17,8 @@ struct HttpRequest {
   std::string host;           ///< host and port, as the client named them
   std::string origin;         ///< empty: none was sent
   std::string authorization;  ///< the field of that name; empty: none was sent
+  std::string accept;         ///< media types that the client accepts; empty: none was sent
+  std::string content_type;   ///< of the body; empty: none was sent
   std::string body;           ///< at most `HttpServerOptions::max_body` bytes
 };
 

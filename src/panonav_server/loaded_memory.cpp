@@ -49,6 +49,7 @@ LoadedMemory::LoadedMemory(const std::filesystem::path& memory,
       recogniser(path, {.localiser = options.localiser, .max_held_views = options.max_held_views}),
       file_(MemoryFile::open(path, Access::read_only)) {
   shape = file_.header().shape;
+  unit = read_length_unit(file_);
 }
 
 std::optional<std::vector<std::uint8_t>> LoadedMemory::thumbnail(const std::string& view) {

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/memory_scheme.hpp"
@@ -51,6 +52,7 @@ struct LoadedMemory {
   std::filesystem::path path;
   bool is_on_server;
   SignatureShape shape;
+  LengthUnit unit;  ///< of all positions
   PlaceRecogniser recogniser;
 
  private:

@@ -20,10 +20,13 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_address.hpp"
+#include "panonav_server/access.hpp"
 #include "panonav_server/http_server.hpp"
+#include "panonav_server/json_answer.hpp"
 #include "panonav_server/loaded_memory.hpp"
 #include "panonav_server/metrics.hpp"
 #include "panonav_server/place_json.hpp"
+#include "panonav_server/upload_page.hpp"
 
 namespace panonav::server {
 
@@ -47,16 +50,6 @@ bool is_valid_memory_name(std::string_view name) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
            c == '_' || c == '.';
   });
-}
-
-HttpAnswer make_json_answer(const ordered_json& document, int status = 200) {
-  return {.status = status,
-          .type = "application/json",
-          .content = document.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n"};
-}
-
-HttpAnswer make_error(int status, std::string_view why) {
-  return make_json_answer({{"error", to_readable_line(std::string(why))}}, status);
 }
 
 }  // namespace
@@ -109,11 +102,13 @@ struct LocalisationServer::Implementation {
     server.emplace(
         HttpServerOptions{.address = options.address,
                           .port = options.port,
+                          // Without a referrer, browsers would hide the origin of the form.
                           .headers = "X-Content-Type-Options: nosniff\r\n"
-                                     "Referrer-Policy: no-referrer\r\n"
+                                     "Referrer-Policy: same-origin\r\n"
                                      "Cross-Origin-Resource-Policy: same-origin\r\n"
-                                     "Content-Security-Policy: default-src 'none'; "
-                                     "frame-ancestors 'none'\r\n"
+                                     "Content-Security-Policy: " +
+                                     std::string(page_policy) +
+                                     "\r\n"
                                      "Cache-Control: no-store\r\n",
                           .max_body = max_picture_bytes,
                           .max_bodies = max_in_flight_bytes,
@@ -159,21 +154,7 @@ struct LocalisationServer::Implementation {
   /// read `/health`, but is not trusted for it.
   HeadVerdict check_access(const HttpRequest& head) {
     if (head.path == "/health") return {};
-    std::optional<HttpAnswer> refusal;
-    if (options.token.empty()) {
-      if (!is_same_origin(head)) {
-        refusal = make_error(403,
-                             "without a token this server answers programs that call it by its "
-                             "number or as localhost");
-      }
-    } else {
-      constexpr std::string_view bearer = "Bearer ";
-      const std::string_view sent = head.authorization;
-      if (!sent.starts_with(bearer) || !is_same_secret(sent.substr(bearer.size()), options.token)) {
-        refusal =
-            make_error(401, "the token of this server is missing: Authorization: Bearer TOKEN");
-      }
-    }
+    auto refusal = find_refusal(head, options.token);
     if (!refusal) return {.is_trusted = true};
     const std::lock_guard lock(mutex);
     ++refused[refusal->status];
@@ -188,8 +169,13 @@ struct LocalisationServer::Implementation {
       const std::lock_guard lock(mutex);
       return make_json_answer({{"status", ending ? "ending" : "ok"}}, ending ? 503 : 200);
     }
-    if (path == "/metrics" || path == memories || path == "/") {
+    if (path == "/" && request.method == "POST") return answer_form(request);
+    if (path == "/" && request.method == "GET" && accepts_html(request)) return make_page({}, "");
+    if (path == "/metrics" || path == memories || path == "/" || path == "/page.css") {
       if (request.method != "GET") return make_error(405, "allowed: GET");
+      if (path == "/page.css") {
+        return {.type = "text/css; charset=utf-8", .content = std::string(upload_page_style())};
+      }
       if (path == "/metrics") return metrics();
       return list();
     }
@@ -201,12 +187,8 @@ struct LocalisationServer::Implementation {
     const std::size_t slash = std::min(rest.find('/'), rest.size());
     const std::string name(rest.substr(0, slash));
     const std::string_view below = rest.substr(slash);
-    {
-      const std::lock_guard lock(mutex);
-      if (!served.contains(name)) {
-        return make_error(404,
-                          "no memory " + name + "; GET /v1/memories lists those that there are");
-      }
+    if (!served.contains(name)) {
+      return make_error(404, "no memory " + name + "; GET /v1/memories lists those that there are");
     }
     if (below == "/localise") {
       if (request.method != "POST") return make_error(405, "allowed: POST, with a PNG or JPEG");
@@ -249,6 +231,35 @@ struct LocalisationServer::Implementation {
       if (Clock::now() < job->came + request_deadline) return std::nullopt;
       return make_error(503, "there was no answer in time; try again in a moment");
     }};
+  }
+
+  /// Returns the page with the answer to the image of its form.
+  HttpAnswer answer_form(const HttpRequest& request) {
+    auto form = read_upload_form(request.content_type, request.body);
+    if (!form) return make_page(make_error(400, "the request is not the form of this page"), "");
+    const std::string name = form->memory;
+    if (!served.contains(name)) {
+      return make_page(make_error(404, "there is no memory " + name), name);
+    }
+    if (form->picture.empty()) {
+      return make_page(make_error(422, "no image was chosen; choose a PNG or JPEG file"), name);
+    }
+    HttpAnswer answer = enqueue(name, std::move(form->picture), "");
+    if (!answer.later) return make_page(answer, name);
+    return {.later = [this, name, later = std::move(answer.later)]() -> std::optional<HttpAnswer> {
+      const auto found = later();
+      return found ? std::optional(make_page(*found, name)) : std::nullopt;
+    }};
+  }
+
+  /// Returns the page with the JSON of an answer in words.
+  HttpAnswer make_page(const HttpAnswer& shown, const std::string& memory) const {
+    std::vector<PageMemory> memories;
+    for (const auto& [name, one] : served)
+      memories.push_back({name, loaded(name)->recogniser.size()});
+    return {.status = shown.status,
+            .type = "text/html; charset=utf-8",
+            .content = make_upload_page(memories, memory, shown.content)};
   }
 
   HttpAnswer list() {
@@ -359,6 +370,7 @@ struct LocalisationServer::Implementation {
       known = place.known;
       ordered_json json{{"memory", job.memory}};
       json.update(place_json(place));
+      rename_lengths(json, memory.unit);
       return make_json_answer(json);
     } catch (const FileError& error) {
       return make_memory_error(503, job.memory, error);
@@ -446,8 +458,7 @@ struct LocalisationServer::Implementation {
     }
     if (!fault.empty() && !report_loss(name, fault)) return true;
     if (again && options.note) {
-      options.note(name + ": the memory was changed; " + std::to_string(again->recogniser.size()) +
-                   " views");
+      options.note(name + ": reloaded; " + format_count(again->recogniser.size(), "view"));
     }
     const std::lock_guard lock(mutex);
     one.is_lost = !fault.empty();

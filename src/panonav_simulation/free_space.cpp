@@ -11,6 +11,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav_simulation/internal/occupancy.hpp"
+#include "panonav_simulation/internal/solids.hpp"
 
 namespace panonav::simulation {
 
@@ -122,55 +123,85 @@ FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
                  (!has_floor || floor[raster_index(cell)] != 0) && is_drivable(scene, centre(cell));
     }
   }
-  keep_connected_component(seed);
+  keep_connected_component(scene, z + 0.5 * (options.step_height_m + options.robot_height_m), seed);
 }
 
-void FreeSpace::keep_connected_component(std::optional<Point2> seed) {
-  std::vector<std::uint32_t> component(free_.size(), 0);
-  std::vector<std::size_t> sizes{0};
-  std::vector<Cell> open;
+std::vector<std::vector<std::uint32_t>> FreeSpace::find_connected_components() const {
+  std::vector<std::uint8_t> is_found(free_.size(), 0);
+  std::vector<std::vector<std::uint32_t>> components;
   for (int j = 0; j < rows_; ++j) {
     for (int i = 0; i < columns_; ++i) {
-      if (free_[index({i, j})] == 0 || component[index({i, j})] != 0) continue;
-      const auto number = static_cast<std::uint32_t>(sizes.size());
-      sizes.push_back(0);
-      open.push_back({i, j});
-      component[index({i, j})] = number;
-      while (!open.empty()) {
-        const Cell cell = open.back();
-        open.pop_back();
-        ++sizes[number];
+      if (free_[index({i, j})] == 0 || is_found[index({i, j})] != 0) continue;
+      auto& component = components.emplace_back();
+      const auto add = [&](Cell cell) {
+        if (cell.i < 0 || cell.j < 0 || cell.i >= columns_ || cell.j >= rows_) return;
+        if (free_[index(cell)] == 0 || is_found[index(cell)] != 0) return;
+        is_found[index(cell)] = 1;
+        component.push_back(static_cast<std::uint32_t>(index(cell)));
+      };
+      add({i, j});
+      for (std::size_t next = 0; next < component.size(); ++next) {
+        const int k = static_cast<int>(component[next]);
         // Connect cells across edges only, because a robot cannot pass diagonally between two
         // obstacles.
-        for (std::size_t n = 0; n < 4; ++n) {
-          const Cell next{cell.i + neighbours[n].di, cell.j + neighbours[n].dj};
-          if (next.i < 0 || next.j < 0 || next.i >= columns_ || next.j >= rows_) continue;
-          if (free_[index(next)] == 0 || component[index(next)] != 0) continue;
-          component[index(next)] = number;
-          open.push_back(next);
-        }
+        for (std::size_t n = 0; n < 4; ++n)
+          add({k % columns_ + neighbours[n].di, k / columns_ + neighbours[n].dj});
       }
     }
   }
-  std::uint32_t kept = 0;
+  return components;
+}
+
+// Keeps one component; `z_m` is the height of the robot's middle in the scene.
+void FreeSpace::keep_connected_component(const Scene& scene, double z_m,
+                                         std::optional<Point2> seed) {
+  auto components = find_connected_components();
+  // No surface within the robot's height separates the cells of a component, so that the same
+  // solids are around all of them, except near gaps of surfaces: the median of some cells counts.
+  const auto count_solids = [&](const Solids& solids, const std::vector<std::uint32_t>& component) {
+    std::array<std::size_t, 5> counts{};
+    for (std::size_t n = 0; n < counts.size(); ++n) {
+      const std::size_t probe = (2 * n + 1) * component.size() / (2 * counts.size());
+      const int k = static_cast<int>(component[probe]);
+      const Point2 at = centre({k % columns_, k / columns_});
+      counts[n] = solids.count_around({at.x_m, at.y_m, z_m});
+    }
+    std::ranges::sort(counts);
+    return counts[counts.size() / 2];
+  };
   if (seed) {
     const auto cell = cell_at(*seed);
-    if (cell) kept = component[index(*cell)];
-    if (kept == 0)
+    std::erase_if(components, [&](const std::vector<std::uint32_t>& component) {
+      return !cell || std::ranges::find(component, static_cast<std::uint32_t>(index(*cell))) ==
+                          component.end();
+    });
+    if (components.empty())
       throw ContractError("seed of the free space", format_point(*seed),
                           "a place where the robot can stand");
-  } else {
-    kept = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
-    if (kept == 0) {
-      throw ContractError(
-          "free places between " + format_point(low_) + " and " + format_point(high_), 0.0,
-          ">= 1; the robot stands nowhere");
-    }
+  } else if (components.empty()) {
+    throw ContractError(
+        "free places between " + format_point(low_) + " and " + format_point(high_), 0.0,
+        ">= 1; the robot stands nowhere: set --floor-height-m to the height of the floor, or a "
+        "smaller --cell-m or --robot-radius-m");
   }
-  for (std::size_t k = 0; k < free_.size(); ++k) {
-    free_[k] = component[k] == kept ? 1 : 0;
-    if (free_[k] != 0) free_cells_.push_back(static_cast<std::uint32_t>(k));
+  std::ranges::stable_sort(components,
+                           [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  // Smaller components are corners between obstacles.
+  constexpr std::size_t max_components = 50;
+  components.resize(std::min(components.size(), max_components));
+  const Solids solids(scene);
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  std::size_t kept = 0;
+  for (std::size_t c = 0; c < components.size() && fewest > 0; ++c) {
+    const std::size_t count = count_solids(solids, components[c]);
+    if (count < fewest) kept = c;
+    fewest = std::min(fewest, count);
   }
+  is_inside_solid_ = fewest > 0;
+  std::ranges::fill(free_, std::uint8_t{0});
+  free_cells_ = std::move(components[kept]);
+  std::ranges::sort(free_cells_);
+  for (const std::uint32_t k : free_cells_) free_[k] = 1;
 }
 
 std::optional<FreeSpace::Cell> FreeSpace::cell_at(Point2 position) const noexcept {

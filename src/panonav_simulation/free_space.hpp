@@ -34,11 +34,12 @@ void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
 /// The free space of a robot in a scene: positions inside `floor_low .. floor_high` and the
 /// `drivable` areas, if any; with a surface to stand on within the step height of the floor, unless
 /// the scene has no floor at all; and without a surface between step height and robot height within
-/// the robot's radius. Only one connected component is kept, so that every free position can be
-/// reached from every other: the one that contains `seed`, or the largest without `seed`.
+/// the robot's radius. Only one connected component is kept: the one that contains `seed`; without
+/// `seed` the largest inside of the fewest solids (a table is one; a building with inner walls is
+/// none).
 ///
-/// Computed on a map of square cells; whole cells are free or not. Distances to obstacles are never
-/// overestimated and underestimated by at most 1.5 cells. Building costs O(cells + triangle area).
+/// Computed on a map of square cells. Distances to obstacles are never overestimated and
+/// underestimated by at most 1.5 cells. Building costs O(cells + triangle area).
 class FreeSpace {
  public:
   /// Throws OptionError on options out of range, and ContractError if the scene is not valid, its
@@ -55,6 +56,8 @@ class FreeSpace {
   [[nodiscard]] bool is_free_between(Point2 a, Point2 b) const noexcept;
 
   [[nodiscard]] double area_m2() const noexcept;  ///< of all free cells
+  /// True if the free positions are inside of a solid, because nothing outside is free.
+  [[nodiscard]] bool is_inside_solid() const noexcept { return is_inside_solid_; }
   /// Returns the lower left corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 low() const noexcept { return low_; }
   /// Returns the upper right corner of the map: that of the scene's floor.
@@ -86,12 +89,14 @@ class FreeSpace {
   }
   [[nodiscard]] Point2 centre(Cell cell) const noexcept;
   [[nodiscard]] std::vector<Point2> shorten_path(std::vector<Point2> path) const;
-  void keep_connected_component(std::optional<Point2> seed);
+  [[nodiscard]] std::vector<std::vector<std::uint32_t>> find_connected_components() const;
+  void keep_connected_component(const Scene& scene, double z_m, std::optional<Point2> seed);
 
   Point2 low_, high_;
   double cell_m_;
   int columns_ = 0;
   int rows_ = 0;
+  bool is_inside_solid_ = false;
   std::vector<std::uint8_t> obstacle_;
   std::vector<std::uint8_t> free_;
   std::vector<float> clearance_m_;

@@ -211,7 +211,13 @@ class WorldReader {
         const pugi::xml_node posed = find_pose_element(placed_by) ? placed_by : part;
         add_light(part, world_from(posed, context.world_from_scope, context));
       });
-    } else if (is_element_named(part, {"actor", "population", "road"})) {
+    } else if (kind == "road") {
+      sdf_context_.try_to_add(thing, object, [&] {
+        ElementContext inner = context;
+        if (inner.origin.object.empty()) inner.origin.object = name.empty() ? "road" : name;
+        add_renderable([&] { visuals_.add_road(part, context.world_from_scope, inner.origin); });
+      });
+    } else if (is_element_named(part, {"actor", "population"})) {
       sdf_context_.warn(object, thing + " is left out: panonav shows nothing of this kind");
     }
   }
@@ -287,8 +293,14 @@ class WorldReader {
 
   void add_visual(pugi::xml_node visual, const Affine3& world_from_visual,
                   const ElementContext& context) {
+    add_renderable([&] { visuals_.add(visual, world_from_visual, context.origin); });
+  }
+
+  // Calls `add` and takes back its meshes if they reach too far.
+  template <class Add>
+  void add_renderable(const Add& add) {
     const std::size_t meshes_before = scene_.meshes.size();
-    visuals_.add(visual, world_from_visual, context.origin);
+    add();
     for (std::size_t i = meshes_before; i < scene_.meshes.size(); ++i) {
       if (std::ranges::all_of(scene_.meshes[i].vertices, is_renderable)) continue;
       scene_.meshes.resize(meshes_before);

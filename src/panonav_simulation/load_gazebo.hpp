@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "panonav_simulation/scene.hpp"
@@ -11,24 +12,28 @@ namespace panonav::simulation {
 /// Options for reading a Gazebo world.
 struct GazeboOptions {
   TextureOptions textures{};  ///< for textures of surfaces
-  /// Folders that are searched for `model://NAME` first. The usual places follow: `models` next to
-  /// the world file and next to its folder, and these two folders themselves.
+  /// Folders that are searched for `model://NAME` first. The usual places follow: the folder of the
+  /// world file, the two above it, and `models` in each.
   std::vector<std::filesystem::path> model_folders;
   double camera_height_m = 0.6;  ///< for Scene::camera_height_m
+  /// Called with the path of each mesh file before it is read. An Error that it throws leaves the
+  /// mesh out with a warning. Empty: not called.
+  std::function<void(const std::filesystem::path&)> before_mesh = {};
 };
 
 /// Returns the model folders of the user's Gazebo installation, from the environment variables
 /// GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH and SDF_PATH, in this order.
 [[nodiscard]] std::vector<std::filesystem::path> gazebo_model_folders_of_environment();
 
-/// Reads a scene from a Gazebo world (SDF 1.0 and later; a file with a single model as well):
-/// visuals with their poses, scales, colours and textures; one object per top-level model.
-/// Approximations: coloured lamps become white ones of the same brightness; point and spot lights
-/// shine to all sides; if their sum is brighter than white on the floor, all lights are scaled
-/// down. Visuals that are more than half transparent and invisible parts (collisions, joints,
-/// plugins) are left out. Parts that are missing, faulty or unknown (actors, height maps) are left
-/// out with one line each in Scene::warnings. `model://sun` and `model://ground_plane` need no
-/// folder. Throws FileError if the world is missing, is not XML or contains nothing visible.
+/// Reads a scene from a Gazebo world (SDF 1.0 and later; also a file with a single model):
+/// visuals with their poses, scales, colours and textures, and roads; one object per top-level
+/// model. Approximations: coloured lamps become white ones of the same brightness; point and spot
+/// lights shine to all sides; if their sum is brighter than white on the floor, all lights are
+/// scaled down. Visuals that are more than half transparent and invisible parts (collisions,
+/// joints, plugins) are left out. Parts that are missing, faulty or unknown (actors, height maps)
+/// are left out with one line each in Scene::warnings. `model://sun` and `model://ground_plane`
+/// need no folder. Throws FileError if the world is missing, no XML or contains nothing
+/// visible.
 [[nodiscard]] Scene load_gazebo(const std::filesystem::path& world,
                                 const GazeboOptions& options = {});
 

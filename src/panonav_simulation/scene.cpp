@@ -69,6 +69,13 @@ void validate(const Scene& scene) {
   require(scene.ambient >= 0.0F && std::isfinite(scene.ambient), "ambient", scene.ambient, ">= 0");
 }
 
+void raise_scene(Scene& scene, double height_m) {
+  for (Mesh& mesh : scene.meshes) {
+    for (Vector3& vertex : mesh.vertices) vertex.z_m += height_m;
+  }
+  for (PointLight& light : scene.lights) light.position.z_m += height_m;
+}
+
 void scale_light(Scene& scene, double factor) {
   const auto f = static_cast<float>(factor);
   scene.ambient *= f;

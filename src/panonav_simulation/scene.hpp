@@ -43,7 +43,8 @@ struct Mesh {
   int material = 0;               ///< index among the scene's materials
   std::vector<Vector3> vertices;  ///< corners of the triangles
   std::vector<std::array<float, 2>> texture_coordinates;  ///< u and v per vertex
-  /// Vertex indices of each triangle, in any order, because surfaces are visible from both sides.
+  /// Vertex indices of each triangle. Surfaces are visible from both sides; the order matters only
+  /// for closed ones: counter-clockwise seen from outside encloses a solid (see `FreeSpace`).
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
@@ -96,6 +97,9 @@ struct Scene {
 /// out of range throw, too.
 void validate(const Scene& scene);
 using panonav::validate;  // for options
+
+/// Moves everything in the scene up by `height_m`, lamps as well.
+void raise_scene(Scene& scene, double height_m);
 
 /// Scales all light by `factor`, > 0: lamps, distant and ambient light, emission and the
 /// background. The radiance of every pixel is multiplied by `factor`.

@@ -31,9 +31,9 @@ void visit_options(SceneOptions& options, OptionVisitor& visitor);
 
 /// The simulated camera and the variation of the scene.
 struct SimulationOptions {
-  int kind = 0;                      ///< 0: mirror, 1: panorama, 2: dual-fisheye
-  int rows = 80;                     ///< of panoramas, 1 .. 4096
-  int columns = 512;                 ///< of panoramas, 4 .. 16384
+  int kind = 0;       ///< 0: mirror, 1: panorama, 2: dual-fisheye, 3: equirectangular
+  int rows = 80;      ///< of panoramas, 1 .. 4096
+  int columns = 512;  ///< of panoramas and equirectangular images (even), 4 .. 16384
   double elevation_low_deg = -30.0;  ///< lower edge of panoramas
   double elevation_high_deg = 40.0;  ///< upper edge of panoramas
   int lens_seed = 1;                 ///< see `make_simulated_dual_fisheye`
@@ -53,6 +53,9 @@ struct SimulatedWorldOptions {
   std::optional<Camera> mirror;  ///< of mirror images; nullopt: `make_simulated_mirror_camera`
 };
 
+/// Called with each warning of a scene, before anything else can fail.
+using SceneWarning = std::function<void(const std::string&)>;
+
 /// Returns the name under which the user set an option; nullopt if the user did not set it.
 /// `section` is "simulation", "frame" or "free_space".
 using FindSetOption =
@@ -65,17 +68,20 @@ using FindSetOption =
 class SimulatedWorld {
  public:
   /// `scene` is the name of a built-in scene, or a Gazebo world or mesh file, which is first read
-  /// in a separate process because damaged files may crash the reader. Throws OptionError on a name
-  /// that is neither, and if the user set options for a file that vary only built-in scenes
-  /// (scene_seed, moved_objects, moved_seed); FileError; else as `FreeSpace` and `Renderer`.
+  /// in a separate process because damaged files may crash the reader. The floor of a file is found
+  /// by `find_free_space`, unless the user set its height, and becomes z = 0 of the scene. Throws
+  /// OptionError on a name that is neither, and if the user set options for a file that vary only
+  /// built-in scenes (scene_seed, moved_objects, moved_seed); FileError; else as `FreeSpace` and
+  /// `Renderer`.
   SimulatedWorld(const std::string& scene, SimulatedWorldOptions options,
-                 const FindSetOption& find_set_option, Executor& executor);
+                 const FindSetOption& find_set_option, Executor& executor,
+                 const SceneWarning& on_warning = {});
 
   /// Returns the same world with other recording options and another seed of poses, noise and
   /// odometry.
   [[nodiscard]] SimulatedWorld with(const RecordingOptions& recording, int seed) const;
 
-  /// Returns the scene with its light and moved objects.
+  /// Returns the scene with its light and moved objects; its floor is at z = 0.
   [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
   /// Returns the free space of the robot.
   [[nodiscard]] const FreeSpace& free_space() const noexcept { return *free_space_; }
@@ -109,9 +115,10 @@ class SimulatedWorld {
 };
 
 /// Writes a data set into a new or empty folder, which gets its final name when everything is
-/// written. With `with_path` the poses are a path, and time stamps and odometry are written, too.
-/// `on_image` is called after each image, before its file has its final path. Throws FileError and
-/// removes what was written; files left by a killed process are removed by the next run.
+/// written. Images are PNG files; equirectangular ones are JPEG files with Photo Sphere data. With
+/// `with_path` the poses are a path, and time stamps and odometry are written, too. `on_image` is
+/// called after each image, before its file has its final path. Throws FileError and removes what
+/// was written; files left by a killed process are removed by the next run.
 Dataset record_dataset(const SimulatedWorld& world, const std::filesystem::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
                        const std::function<void(const DatasetEntry&, const Image&)>& on_image = {});

@@ -76,7 +76,7 @@ std::string moment_to_json(const recordings::RunMoment& moment, std::size_t numb
   }
   if (moment.homing) {
     json["homing"] = {rounded_number(moment.homing->direction_rad),
-                      rounded_number(moment.homing->confidence)};
+                      rounded_number(moment.homing->probability)};
   }
   for (const auto& [stage, ms] : moment.stages_ms) json["stages"][stage] = rounded_number(ms);
   if (!moment.particles.empty()) json["particles"] = rounded_numbers(moment.particles);
@@ -130,6 +130,7 @@ std::string retained_to_json(const recordings::RunMoment& moment) {
   }
   if (!moment.plan.empty()) json["plan"] = rounded_numbers(moment.plan);
   if (!moment.directions.empty()) json["directions"] = rounded_numbers(moment.directions);
+  if (!moment.length_unit.empty()) json["unit"] = moment.length_unit;
   if (moment.goal) json["goal"] = rounded_numbers(*moment.goal);
   return json.is_null() ? std::string() : to_text_with_valid_utf8(json);
 }
@@ -141,6 +142,7 @@ void RetainedParts::update_from(const recordings::RunMoment& from) {
     ++replacement_count;
   };
   if (!from.references.empty()) moment.reference_views = from.reference_views;
+  replace(moment.length_unit, from.length_unit);
   replace(moment.references, from.references);
   replace(moment.regions, from.regions);
   replace(moment.walls, from.walls);

@@ -17,8 +17,8 @@ namespace panonav::viewer {
 
 /// "references": [x, y, ...]; "names" and "headings" of these; "regions": [[area, x, y, ...], ...];
 /// "walls": [[x, y, ...], ...]; "edges": [x, y, x, y, kind, ...]; "plan" and "directions": [x, y,
-/// heading, ...]; "goal": [x, y, heading]: only the members that the moment replaces. Returns an
-/// empty text if there are none.
+/// heading, ...]; "goal": [x, y, heading]; "unit": of lengths that are not in metres: only the
+/// members that the moment replaces. Returns an empty text if there are none.
 [[nodiscard]] std::string retained_to_json(const recordings::RunMoment& moment);
 
 /// The newest version of each retained part of a run (shown until it is replaced), and the

@@ -136,6 +136,17 @@ std::string live_page(std::string_view title, bool replay, std::string_view acce
           "</pn-run>");
 }
 
+std::string entrance_page() {
+  return make_page(
+      "panonav", {},
+      "<main>\n<h1>This address is not complete</h1>\n<p>A run of panonav is shown here, but the "
+      "address of its page is longer, so that only those who know it can see the run.</p>\n"
+      "<p>panonav printed the complete address when the run started, in a line that begins with "
+      "<b>Open http://</b>. Open this address, or copy all of it, up to the last slash.</p>\n"
+      "<p>Each run has a new address. An address of an earlier run does not work any more.</p>\n"
+      "</main>");
+}
+
 RunPage::RunPage(std::string title, std::size_t moments)
     : title_(std::move(title)), every_(std::max<std::size_t>(1, (moments + 299) / 300)) {}
 

@@ -23,6 +23,10 @@ namespace panonav::viewer {
 [[nodiscard]] std::string live_page(std::string_view title, bool replay,
                                     std::string_view accepted_input = "");
 
+/// Returns the page for a viewer who opened an address without its secret part: it says where the
+/// complete address is, and nothing about the run.
+[[nodiscard]] std::string entrance_page();
+
 /// A robot's position along a remembered route at one moment.
 struct RouteMark {
   std::optional<double> along_m;       ///< of the matched line; nullopt: not on the route

@@ -20,10 +20,35 @@ std::string element(std::string_view name, std::string_view text) {
   return result.append("</").append(name).append(">");
 }
 
-std::string make_table_row(std::string_view cell, const std::vector<std::string>& texts) {
+std::string make_table_head(const std::vector<std::string>& names) {
   std::string row = "<tr>";
-  for (const auto& text : texts) row += element(cell, text);
+  for (const auto& name : names) row += element("th", name);
   return row + "</tr>\n";
+}
+
+/// Returns a row whose cells also have the names of their columns, for narrow screens, on which
+/// each cell has its own line. The lines of short cells are not broken.
+std::string make_table_row(const std::vector<std::string>& names,
+                           const std::vector<std::string>& texts) {
+  constexpr std::size_t max_short_size = 24;
+  std::string row = "<tr>";
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    row += "<td" + std::string(texts[i].size() <= max_short_size ? " class=\"short\"" : "") +
+           " data-name=\"" + escape_html(names[i]) + "\">" + escape_html(texts[i]) + "</td>";
+  }
+  return row + "</tr>\n";
+}
+
+/// Removes the columns that are empty in all rows.
+void remove_empty_columns(std::vector<std::string>& header,
+                          std::vector<std::vector<std::string>>& rows) {
+  for (std::size_t i = header.size(); i-- > 0;) {
+    if (rows.empty() || std::ranges::any_of(rows, [i](const auto& row) { return !row[i].empty(); }))
+      continue;
+    const auto at = static_cast<std::ptrdiff_t>(i);
+    header.erase(header.begin() + at);
+    for (auto& row : rows) row.erase(row.begin() + at);
+  }
 }
 
 std::string make_panel(std::string_view name, std::string_view title, const std::string& json,
@@ -119,14 +144,16 @@ void ReportPage::add_figures(
   body_.emplace_back(html + "</div>\n", "");
 }
 
-void ReportPage::add_table(const std::vector<std::string>& header,
-                           const std::vector<std::vector<std::string>>& rows) {
-  std::string html = "<div class=\"wide\" tabindex=\"0\"><table>\n" + make_table_row("th", header);
+void ReportPage::add_table(std::vector<std::string> header,
+                           std::vector<std::vector<std::string>> rows) {
   for (const auto& row : rows) {
     require(row.size() == header.size(), "cells of a table row", static_cast<double>(row.size()),
             "as many as the header has");
-    html += make_table_row("td", row);
   }
+  remove_empty_columns(header, rows);
+  std::string html =
+      "<div class=\"wide\" tabindex=\"0\"><table class=\"rows\">\n" + make_table_head(header);
+  for (const auto& row : rows) html += make_table_row(header, row);
   body_.emplace_back(html + "</table></div>\n", "");
 }
 

@@ -75,9 +75,9 @@ class ReportPage {
   void add_text(std::string_view paragraph);
   /// Adds main numbers in large type: "0.09 m" "median error".
   void add_figures(const std::vector<std::pair<std::string, std::string>>& value_and_meaning);
-  /// Adds a table. Throws ContractError unless each row has as many cells as the header.
-  void add_table(const std::vector<std::string>& header,
-                 const std::vector<std::vector<std::string>>& rows);
+  /// Adds a table without the columns that are empty in all rows. Throws ContractError unless each
+  /// row has as many cells as the header.
+  void add_table(std::vector<std::string> header, std::vector<std::vector<std::string>> rows);
   /// Adds pictures, next to each other if the window is wide enough. `write` reads the files.
   void add_pictures(const std::vector<ReportPicture>& pictures);
   /// Adds small pictures; for an empty file name only the caption is shown.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -82,6 +83,76 @@ std::vector<Point2> cut_triangle(const Triangle& triangle, double height_m) {
   return ends;
 }
 
+/// Keeps the part of a polygon for which `inside_m` is not negative: the distance from a line.
+std::vector<Point2> clip_polygon(const std::vector<Point2>& polygon,
+                                 const std::function<double(const Point2&)>& inside_m) {
+  std::vector<Point2> kept;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Point2& a = polygon[i];
+    const Point2& b = polygon[(i + 1) % polygon.size()];
+    const double a_m = inside_m(a);
+    const double b_m = inside_m(b);
+    if (a_m >= 0.0) kept.push_back(a);
+    if ((a_m < 0.0) == (b_m < 0.0)) continue;
+    const double share = a_m / (a_m - b_m);
+    kept.push_back({a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)});
+  }
+  return kept;
+}
+
+/// Cuts off the parts of furniture behind outer walls, as of a shelf in a corner: no camera in the
+/// room sees them. A side of the rectangle around all walls is an outer wall if walls run along
+/// half of it.
+void clip_to_outer_walls(const MapLayer& walls, MapLayer& furniture) {
+  constexpr double tolerance_m = 0.02;
+  if (walls.lines.empty()) return;
+  Point2 low = walls.lines.front().front();
+  Point2 high = low;
+  for (const std::vector<Point2>& line : walls.lines) {
+    for (const Point2& p : line) {
+      low = {std::min(low.x_m, p.x_m), std::min(low.y_m, p.y_m)};
+      high = {std::max(high.x_m, p.x_m), std::max(high.y_m, p.y_m)};
+    }
+  }
+  const std::array<std::function<double(const Point2&)>, 4> sides{
+      [low](const Point2& p) { return p.x_m - low.x_m; },
+      [high](const Point2& p) { return high.x_m - p.x_m; },
+      [low](const Point2& p) { return p.y_m - low.y_m; },
+      [high](const Point2& p) { return high.y_m - p.y_m; }};
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const auto is_on_side = [&](const Point2& p) { return std::abs(sides[i](p)) < tolerance_m; };
+    double wall_m = 0.0;
+    for (const std::vector<Point2>& line : walls.lines) {
+      if (std::ranges::all_of(line, is_on_side)) wall_m += distance(line.front(), line.back());
+    }
+    const double side_m = i < 2 ? high.y_m - low.y_m : high.x_m - low.x_m;
+    if (wall_m < 0.5 * side_m) continue;
+    for (std::vector<Point2>& outline : furniture.filled_polygons) {
+      outline = clip_polygon(outline, sides[i]);
+    }
+  }
+  std::erase_if(furniture.filled_polygons, [](const auto& outline) { return outline.size() < 3; });
+}
+
+/// The corners of a body seen from above, and its range of heights.
+struct BodyExtent {
+  std::vector<Point2> corners;
+  double bottom_m = std::numeric_limits<double>::infinity();
+  double top_m = -std::numeric_limits<double>::infinity();
+};
+
+BodyExtent compute_extent(const std::vector<Triangle>& body) {
+  BodyExtent extent;
+  for (const Triangle& triangle : body) {
+    for (const simulation::Vector3& v : triangle) {
+      extent.corners.push_back({v.x_m, v.y_m});
+      extent.bottom_m = std::min(extent.bottom_m, v.z_m);
+      extent.top_m = std::max(extent.top_m, v.z_m);
+    }
+  }
+  return extent;
+}
+
 }  // namespace
 
 std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
@@ -113,18 +184,10 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
     std::vector<std::vector<Point2>> flat_outlines;
     std::size_t solid_count = 0;
     for (const std::vector<Triangle>& body : bodies) {
-      std::vector<Point2> corners;
-      double bottom_m = std::numeric_limits<double>::infinity();
-      double top_m = -bottom_m;
-      for (const Triangle& triangle : body) {
-        for (const simulation::Vector3& v : triangle) {
-          corners.push_back({v.x_m, v.y_m});
-          bottom_m = std::min(bottom_m, v.z_m);
-          top_m = std::max(top_m, v.z_m);
-        }
-      }
-      if (top_m < min_top_m || bottom_m > max_bottom_m || !is_near(corners)) continue;
-      const std::vector<Point2> outline = compute_convex_hull(std::move(corners));
+      BodyExtent extent = compute_extent(body);
+      if (extent.top_m < min_top_m || extent.bottom_m > max_bottom_m || !is_near(extent.corners))
+        continue;
+      const std::vector<Point2> outline = compute_convex_hull(std::move(extent.corners));
       const auto [west, east] = std::ranges::minmax(outline, {}, &Point2::x_m);
       const auto [south, north] = std::ranges::minmax(outline, {}, &Point2::y_m);
       if (std::max(east.x_m - west.x_m, north.y_m - south.y_m) > max_solid_size_m) {
@@ -142,6 +205,7 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
     if (solid_count == 0)  // else they are faces, as of a shelf
       walls.lines.insert(walls.lines.end(), flat_outlines.begin(), flat_outlines.end());
   }
+  clip_to_outer_walls(walls, furniture);
   return {furniture, walls};
 }
 

@@ -121,6 +121,7 @@ struct ViewServer::Implementation {
       : options(server_options),
         token(make_random_token()),
         page(live_page(options.title, options.replay, to_string(options.takes))),
+        entrance(entrance_page()),
         server({.address = options.address,
                 .port = options.port,
                 .headers = answer_headers,
@@ -143,6 +144,11 @@ struct ViewServer::Implementation {
     if (head.path.starts_with('/') && server::is_same_origin(head) &&
         server::is_same_secret(std::string_view(head.path).substr(1, token.size()), token)) {
       return {.is_trusted = true};
+    }
+    // Who opens the address without its secret part, or with a part of it, reads what to do.
+    if (head.method == "GET" && server::is_same_origin(head)) {
+      return {.refusal = server::HttpAnswer{
+                  .status = 404, .type = "text/html; charset=utf-8", .content = entrance}};
     }
     return {.refusal = server::HttpAnswer{.status = 404}};
   }
@@ -396,6 +402,7 @@ struct ViewServer::Implementation {
   const ViewServerOptions options;
   const std::string token;
   const std::string page;
+  const std::string entrance;
   std::atomic<std::size_t> viewer_count = 0;  // changed only under the mutex
   std::mutex mutex;                           // guards the following members up to the server
   std::condition_variable changed;

@@ -52,6 +52,11 @@ std::vector<NamedCamera> all_cameras() {
   turned.forward_angle_rad = -2.9;
   Camera cut = mirror_camera(HyperboloidalModel{28.095, 23.4125, 500}, 25, 330);
   Camera counter_clockwise = equirectangular_camera(-0.6, 0.9);
+  Camera stretched = mirror_camera(PolynomialModel{{-180, 0, 1.9e-3, 2e-6}}, 0, 225);
+  stretched.affine = {0.98, 0.01, -0.02};
+  Camera distorted = mirror_camera(UnifiedModel{1.3, 300}, 20, 210);
+  distorted.affine = {1.01, 0.0, 0.003};
+  distorted.distortion = {-0.12, 0.03, 0.002, -0.003, 0.001};
   counter_clockwise.direction = ColumnDirection::counter_clockwise;
   return {
       {"hyperboloidal", mirror_camera(HyperboloidalModel{28.095, 23.4125, 500}, 0, 230)},
@@ -68,6 +73,12 @@ std::vector<NamedCamera> all_cameras() {
       {"unified_pinhole", mirror_camera(UnifiedModel{0.0, 200, UnifiedModel::Axis::up}, 0, 230)},
       {"equiangular", mirror_camera(EquiangularModel{-1.2, 0.4}, 35, 220)},
       {"equiangular_looking_up", mirror_camera(EquiangularModel{1.5, -0.2}, 5, 220)},
+      {"fisheye",
+       mirror_camera(FisheyeModel{140, 0.02, -0.003, 1e-3, -1e-4, 1.8, UnifiedModel::Axis::up}, 0,
+                     230)},
+      {"fisheye_looking_down", mirror_camera(FisheyeModel{120, -0.01, 0, 0, 0, 2.1}, 12, 230)},
+      {"stretched", stretched},
+      {"distorted", distorted},
       {"equirectangular", equirectangular_camera(-std::numbers::pi / 2, std::numbers::pi / 2)},
       {"panorama", equirectangular_camera(-0.5, 0.8)},
       {"panorama_counter_clockwise", counter_clockwise},
@@ -205,8 +216,9 @@ TEST_P(EveryCamera, OutsideTheImageNothingIsSeen) {
 TEST_P(EveryCamera, ATurnOfTheRobotTurnsThePictureOnly) {
   // Mirror cameras: the picture of a direction turned by delta is the picture turned about the
   // centre.
-  if (image_circle(camera(), 0).rim_radius_px == 0 || lens_count(camera()) == 2) {
-    GTEST_SKIP() << "no one centre";
+  if (image_circle(camera(), 0).rim_radius_px == 0 || lens_count(camera()) == 2 ||
+      camera().affine != Camera{}.affine) {
+    GTEST_SKIP() << "not symmetric about one centre";
   }
   const ElevationBand band = visible_elevations(camera());
   const double elevation_rad = 0.5 * (band.bottom_rad + band.top_rad);
@@ -255,6 +267,32 @@ TEST(VisibleElevations, EndAtTheFrameWhereItCutsTheMirror) {
   EXPECT_THROW((void)visible_elevations(camera), ContractError);
 }
 
+TEST(VisibleElevations, OfADistortedPictureEndWhereTheFrameCutsIt) {
+  Camera camera = mirror_camera(UnifiedModel{1.3, 300}, 20, 330);
+  camera.distortion = {-0.12, 0.03, 0.002, -0.003, 0.0};
+  const ElevationBand band = visible_elevations(camera);
+  bool is_cut_above = false;
+  for (int i = 0; i < 7200; ++i) {
+    const double azimuth_rad = 2 * std::numbers::pi * i / 7200;
+    EXPECT_TRUE(project(camera, Direction3::from_angles(azimuth_rad, band.top_rad)));
+    const double above_rad = band.top_rad + 1e-3;
+    is_cut_above |= !project(camera, Direction3::from_angles(azimuth_rad, above_rad));
+  }
+  EXPECT_TRUE(is_cut_above);
+}
+
+TEST(PolynomialFit, FollowsOtherModels) {
+  const FisheyeModel fisheye{190, 0.003, 0.0007, -0.002, 0.0002, 1.95, UnifiedModel::Axis::up};
+  const double rim_px = radius_at_angle(fisheye, 1.9);
+  const auto fit = fit_polynomial(
+      [&](double radius_px) { return elevation_at(fisheye, radius_px).value(); }, rim_px);
+  EXPECT_LT(fit.residual_rad, 1e-5);
+  EXPECT_NO_THROW(validate(fit.model, 0, rim_px));
+  EXPECT_NEAR(elevation_at(fit.model, 0.3 * rim_px).value(),
+              elevation_at(fisheye, 0.3 * rim_px).value(), fit.residual_rad + 1e-12);
+  EXPECT_GT(fit_polynomial([](double r) { return r < 50 ? 1.0 : 0.5; }, 100).residual_rad, 0.01);
+}
+
 struct Fault {
   std::string field;
   std::function<void(Camera&)> make;
@@ -274,6 +312,12 @@ TEST(CameraValidation, NamesTheField) {
       {"rim_radius_px", [](Camera& c) { c.rim_radius_px = 10; }},
       {"rim_radius_px", [](Camera& c) { c.rim_radius_px = 601; }},  // f a / b = 600
       {"forward_angle_rad", [&](Camera& c) { c.forward_angle_rad = nan; }},
+      {"affine", [&](Camera& c) { c.affine[1] = nan; }},
+      {"affine",
+       [](Camera& c) {
+         c.affine = {0.5, 1.0, 0.5};
+       }},
+      {"distortion", [](Camera& c) { c.distortion[0] = 0.1; }},  // not of a hyperboloidal mirror
   };
   for (const Fault& fault : faults) {
     Camera camera = good;
@@ -290,6 +334,11 @@ TEST(CameraValidation, NamesTheField) {
       {"xi", UnifiedModel{-0.1, 300}},
       {"focal_length_px", UnifiedModel{1, 0}},
       {"rim_radius_px", UnifiedModel{2, 300}},
+      {"focal_length_px", FisheyeModel{0}},
+      {"k1 to k4", FisheyeModel{100, nan}},
+      {"max_angle_rad", FisheyeModel{100, 0, 0, 0, 0, 3.2}},
+      {"max_angle_rad", FisheyeModel{100, -0.2, 0, 0, 0, 1.5}},  // grows up to 1.29
+      {"rim_radius_px", FisheyeModel{100, 0, 0, 0, 0, 1.5}},
       {"elevation_at_inner_rad", EquiangularModel{-2, 0}},
       {"elevation_at_rim_rad", EquiangularModel{0.1, 0.1}},
       {"elevation_bottom_rad", EquirectangularModel{-1.6, 1}},
@@ -300,6 +349,10 @@ TEST(CameraValidation, NamesTheField) {
     camera.model = model;
     EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(camera); }), field));
   }
+  Camera folded = mirror_camera(UnifiedModel{1.0, 200}, 10, 200);
+  folded.distortion[0] = -0.5;
+  EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(folded); }),
+                       "distortion: it folds the image at the radius"));
   Camera camera = equirectangular_camera(-0.5, 0.8);
   camera.forward_column = 1.5;
   EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(camera); }), "forward_column"));

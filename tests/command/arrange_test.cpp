@@ -26,7 +26,7 @@ class Arrange : public ::testing::Test {
       pose = {0.5 + 0.3 * pose.x_m, 0.5 + 0.3 * pose.y_m, wrap_angle(7.0 * pose.x_m + pose.y_m)};
     }
     write_dataset(folder / "run", world, poses);
-    run_well({"memorise", folder / "run", memory});
+    run_well({"memorise", memory, folder / "run"});
   }
   TemporaryFolder folder;
   ToyWorld world = landmark_world(4);
@@ -109,7 +109,7 @@ TEST_F(Arrange, TellsHowManyViewsTheLargestComponentHolds) {
     write_picture(folder / "both" / view_name(i), landmark_world(77), poses[i]);
   }
   const std::string both = folder / "both.panonav";
-  run_well({"memorise", folder / "both", both});
+  run_well({"memorise", both, folder / "both"});
   const auto answer = answer_of({"arrange", both, "--json"});
   const auto& components = answer["connected_components"];
   ASSERT_GE(components.size(), 2U);

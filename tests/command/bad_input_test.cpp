@@ -26,10 +26,10 @@ class BadInput : public Memorise {
     fs::rename(first_ / view_name(0), first_ / "a.png");
     fs::rename(first_ / view_name(1), first_ / "b.png");
     write_text(first_ / "poses.csv", "file,x_m,y_m,heading_deg\na.png,-1,-1,0\nb.png,-1,-0.5,0\n");
-    run_well({"memorise", first_, memory()});
+    run_well({"memorise", memory(), first_});
   }
   void expect_refused(const std::vector<std::string>& words, int views_kept_at_least = 2) {
-    const auto line = refusal({"memorise", data(), memory(), "--strict"});
+    const auto line = refusal({"memorise", memory(), data(), "--strict"});
     for (const auto& word : words) EXPECT_TRUE(contains(line, word));
     EXPECT_GE(views_in(memory()), views_kept_at_least);
     run_well({"verify", memory()});
@@ -74,47 +74,47 @@ TEST_F(BadInput, WrongTablesAreNamed) {
 TEST_F(BadInput, EmptyFolder) {
   fs::remove_all(data());
   fs::create_directory(data());
-  expect_refusal({"memorise", data(), memory(), "--kind", "panorama"}, "data");
+  expect_refusal({"memorise", memory(), data(), "--kind", "panorama"}, "data");
 }
 
 TEST_F(BadInput, ZeroComponents) {
-  expect_refusal({"memorise", data(), folder_ / "new.panonav", "--components", "0"}, "components");
+  expect_refusal({"memorise", folder_ / "new.panonav", data(), "--components", "0"}, "components");
   EXPECT_FALSE(fs::exists(folder_ / "new.panonav"));
 }
 
 TEST_F(BadInput, DirectoryThatCannotBeWritten) {
   // Root may write anywhere but into what is no real folder.
-  expect_refusal({"memorise", data(), "/proc/m.panonav"}, "/proc");
-  expect_refusal({"memorise", data(), folder_ / "no/such/folder/m.panonav"}, "no/such");
+  expect_refusal({"memorise", "/proc/m.panonav", data()}, "/proc");
+  expect_refusal({"memorise", folder_ / "no/such/folder/m.panonav", data()}, "no/such");
 }
 
 TEST_F(BadInput, FilesThatAreNoMemory) {
   write_text(folder_ / "text.panonav", "hello");
-  expect_refusal({"memorise", data(), folder_ / "text.panonav"}, "text.panonav");
+  expect_refusal({"memorise", folder_ / "text.panonav", data()}, "text.panonav");
   EXPECT_EQ(fs::file_size(folder_ / "text.panonav"), 5U) << "a foreign file was changed";
   expect_refusal({"info", folder_ / "text.panonav"}, "text.panonav");
   expect_refusal({"verify", folder_ / "text.panonav"}, "text.panonav");
 }
 
 TEST_F(BadInput, FullDiskWhileAppendingKeepsWhatWasAppended) {
-  const auto result = run_panonav({"memorise", data(), memory()},
+  const auto result = run_panonav({"memorise", memory(), data()},
                                   {.file_size_limit_bytes = 16384, .kill_after_ms = {}});
   EXPECT_EQ(result.exit_code, 2) << result.err;
   EXPECT_EQ(lines(result.err).size(), 1U) << result.err;
   EXPECT_GE(views_in(memory()), 2);
   run_well({"verify", memory()});
-  ASSERT_EQ(run_panonav({"memorise", data(), memory()}).exit_code, 0) << "resumes";
+  ASSERT_EQ(run_panonav({"memorise", memory(), data()}).exit_code, 0) << "resumes";
   EXPECT_EQ(views_in(memory()), 18);
 }
 
 TEST_F(BadInput, KilledMemoriseResumes) {
   write_dataset(data(), world_, grid_poses(15));
   const std::string whole = folder_ / "whole.panonav";
-  run_well({"memorise", data(), whole});
+  run_well({"memorise", whole, data()});
   const std::string killed_memory = folder_ / "killed.panonav";
   int killed = 0;
   for (int delay_ms = 5; delay_ms < 400; delay_ms += delay_ms < 40 ? 5 : 60) {
-    const auto result = run_panonav({"memorise", data(), killed_memory},
+    const auto result = run_panonav({"memorise", killed_memory, data()},
                                     {.file_size_limit_bytes = {}, .kill_after_ms = delay_ms});
     killed += result.signal == 9 ? 1 : 0;
     if (fs::exists(killed_memory)) {
@@ -122,7 +122,7 @@ TEST_F(BadInput, KilledMemoriseResumes) {
     }
   }
   EXPECT_GE(killed, 3);
-  run_well({"memorise", data(), killed_memory});
+  run_well({"memorise", killed_memory, data()});
   EXPECT_EQ(views_in(killed_memory), 225);
   // A resumed memory answers like one that was made in one go.
   const auto a = run_panonav({"localise", whole, data(), "--json", "--turn-randomly", "1"});

@@ -39,8 +39,8 @@ TEST_F(Evaluate, AShiftedCopyIsRightOnceAligned) {
         lines_of([](int i, double x, double y) { return tum(i, x + 3.0, y - 1.0); }));
   const auto said =
       answer_of({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--json"});
-  for (const char* key : {"pairs", "left_out", "alignment", "ate_m", "heading_rad",
-                          "relative_pairs", "rpe_m", "rpe_heading_rad"}) {
+  for (const char* key : {"formats", "paired_by", "pairs", "left_out", "alignment", "ate_m",
+                          "rotation_rad", "relative_pairs", "rpe_m", "rpe_rotation_rad"}) {
     EXPECT_TRUE(said.contains(key)) << key;
   }
   EXPECT_EQ(said["pairs"], 8);
@@ -48,7 +48,7 @@ TEST_F(Evaluate, AShiftedCopyIsRightOnceAligned) {
   EXPECT_NEAR(said["alignment"]["x_m"], -3.0, 1e-9);
   EXPECT_NEAR(said["alignment"]["y_m"], 1.0, 1e-9);
   const auto as_is = run_panonav(
-      {"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--align", "false", "--json"});
+      {"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--align", "none", "--json"});
   EXPECT_NEAR(json::parse(as_is.out)["ate_m"]["rmse"], std::sqrt(10.0), 1e-9);
 }
 
@@ -56,10 +56,48 @@ TEST_F(Evaluate, TextForPeopleSaysTheSame) {
   write("truth.tum", lines_of(tum));
   write("shifted.tum", lines_of([](int i, double x, double y) { return tum(i, x + 3.0, y); }));
   const auto result =
-      run_panonav({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--align", "false"});
+      run_panonav({"evaluate", folder_ / "shifted.tum", folder_ / "truth.tum", "--align", "none"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_TRUE(contains(result.out, "8 poses compared"));
-  EXPECT_TRUE(contains(result.out, "RMSE 3.000"));
+  EXPECT_TRUE(contains(result.out, "RMSE 3.000000"));
+  EXPECT_TRUE(contains(result.out, "estimate: TUM, ground truth: TUM"));
+  EXPECT_TRUE(contains(result.out, "no alignment"));
+}
+
+TEST_F(Evaluate, CameraAxesAreAlignedInSpace) {
+  write("truth.tum", lines_of(tum));
+  // The same path in axes of a camera: x right, y down, z forward.
+  write("camera.tum", lines_of([](int i, double x, double y) {
+          return std::to_string(i) + " " + std::to_string(-y) + " 0 " + std::to_string(x) +
+                 " 0 0 0 1\n";
+        }));
+  const std::vector<std::string> call{"evaluate", folder_ / "camera.tum", folder_ / "truth.tum"};
+  const auto said = answer_of(with(call, {"--json"}));
+  EXPECT_NEAR(said["ate_m"]["rmse"], 0.0, 1e-9);
+  EXPECT_EQ(said["alignment"]["dimensions"], 3);
+  EXPECT_EQ(said["alignment"]["kind"], "rigid");
+  EXPECT_TRUE(contains(run_panonav(call).out, "rigid alignment in space (SE3)"));
+  EXPECT_TRUE(contains(run_panonav(with(call, {"--align", "similarity"})).out,
+                       "similarity alignment in space (Sim3), scale 1.000000"));
+  EXPECT_TRUE(contains(run_panonav({"evaluate", folder_ / "truth.tum", folder_ / "truth.tum"}).out,
+                       "rigid alignment in the plane"));
+}
+
+TEST_F(Evaluate, PosesWithoutStampsArePairedByTheirOrder) {
+  write("truth.tum", lines_of(tum));
+  write("poses.txt", lines_of([](int, double x, double y) {
+          return "1 0 0 " + std::to_string(x + 3.0) + " 0 1 0 " + std::to_string(y) + " 0 0 1 0\n";
+        }));
+  const std::vector<std::string> call{"evaluate", folder_ / "poses.txt", folder_ / "truth.tum"};
+  const auto said = answer_of(with(call, {"--json"}));
+  EXPECT_EQ(said["formats"], (json{"KITTI", "TUM"}));
+  EXPECT_EQ(said["paired_by"], "order");
+  EXPECT_EQ(said["pairs"], 8);
+  EXPECT_NEAR(said["ate_m"]["rmse"], 0.0, 1e-9);
+  EXPECT_TRUE(contains(run_panonav(call).out, "paired by their order"));
+  write("fewer.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n");
+  expect_refusal({"evaluate", folder_ / "fewer.txt", folder_ / "truth.tum"},
+                 "number of estimated poses is 2; allowed: 8");
 }
 
 TEST_F(Evaluate, NoCommonTimeIsNoAnswer) {

@@ -99,7 +99,7 @@ TEST_F(HostileNames, HomeReportShowsThem) {
   const fs::path report = folder / "h`touch run`\n'\"<i>";
   run_well({"home", run / names[0], run, "--report", report});
   const std::string text = text_of(report / "index.html");
-  for (const std::string& name : names) EXPECT_TRUE(contains(text, "<td>" + name + "</td>"));
+  for (const std::string& name : names) EXPECT_TRUE(contains(text, ">" + name + "</td>"));
   EXPECT_TRUE(contains(text, "Direction home"));
 }
 
@@ -111,7 +111,7 @@ TEST_F(HostileNames, CatchmentReportShowsThem) {
 
 TEST_F(HostileNames, GalleryExportAndAnswersShowThem) {
   const fs::path memory = folder / "m`touch run`<b>.panonav";
-  run_well({"memorise", run, memory});
+  run_well({"memorise", memory, run});
   run_well({"rename", memory, "25", "../../outside.png"});
   const fs::path gallery = folder / "g`touch run`";
   run_well({"gallery", memory, "-o", gallery});
@@ -125,19 +125,19 @@ TEST_F(HostileNames, GalleryExportAndAnswersShowThem) {
   EXPECT_FALSE(fs::exists(out.parent_path().parent_path() / "outside.png"));
   EXPECT_EQ(said["renamed"], 2) << "the long name and the one that leads outside";
   const fs::path again = folder / "again.panonav";
-  run_well({"memorise", out, again, "--config", out / "memorise.toml"});
+  run_well({"memorise", again, out, "--config", out / "memorise.toml"});
   const auto list = answer_of({"list", again, "--json"})["views"];
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(list[i]["name"], names[i]);
 
   const fs::path report = folder / "l`touch run`";
   run_well({"localise", memory, run, "--report", report, "-o", folder / "answers.csv"});
   const std::string page = text_of(report / "index.html");
-  for (std::size_t i = 0; i < 6; ++i) EXPECT_TRUE(contains(page, "<td>" + names[i] + "</td>"));
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_TRUE(contains(page, ">" + names[i] + "</td>"));
 }
 
 TEST_F(HostileNames, PicturesAndTheTrackedRunOfThem) {
   const fs::path memory = folder / "m`touch run`.panonav";
-  run_well({"memorise", run, memory});
+  run_well({"memorise", memory, run});
   const fs::path picture = folder / "p`touch run`\n'\".png";
   run_well({"arrange", memory, "--picture", picture});
   EXPECT_GT(fs::file_size(picture), 2000U);

@@ -72,12 +72,12 @@ std::set<std::string> acknowledged_in(const fs::path& memory) {
   return held;
 }
 
-pid_t start(const std::vector<std::string>& arguments) {
+/// Starts the command with standard error in the file `messages`.
+pid_t start(const std::vector<std::string>& arguments, const fs::path& messages = "/dev/null") {
   const pid_t child = ::fork();
   if (child != 0) return child;
-  const int nothing = ::open("/dev/null", O_RDWR);
-  ::dup2(nothing, STDOUT_FILENO);
-  ::dup2(nothing, STDERR_FILENO);
+  ::dup2(::open("/dev/null", O_RDWR), STDOUT_FILENO);
+  ::dup2(::open(messages.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
   std::vector<std::string> words = with({PANONAV_COMMAND}, arguments);
   std::vector<char*> argv;
   for (auto& word : words) argv.push_back(word.data());
@@ -123,14 +123,14 @@ class Kill : public ::testing::Test {
   [[nodiscard]] fs::path run() const { return folder_ / "run"; }
   [[nodiscard]] fs::path bare() const { return folder_ / "bare"; }
 
-  /// A verb with the arguments `before`, the memory and `after` it; `base`: the memory that it
-  /// changes, empty: none. `whole`: the verb's changes are one transaction. `repeats`: run again,
-  /// it makes what a run that nobody killed makes.
-  void kill_at_random(const std::vector<std::string>& before, const std::vector<std::string>& after,
+  /// The words of a verb, then the memory, then the arguments `after` it; `base`: the memory that
+  /// it changes, empty: none. `whole`: the verb's changes are one transaction. `repeats`: run
+  /// again, it makes what a run that nobody killed makes.
+  void kill_at_random(const std::vector<std::string>& words, const std::vector<std::string>& after,
                       const fs::path& base, bool whole, bool repeats = true) {
-    const std::string verb = before.front() == "route" ? "route record" : before.front();
+    const std::string verb = words.front() == "route" ? "route record" : words.front();
     const fs::path memory = folder_ / "m.panonav";
-    const auto arguments = with(with(before, {memory}), after);
+    const auto arguments = with(with(words, {memory}), after);
     const auto restore = [&] {
       for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(memory.string() + suffix);
       if (!base.empty()) fs::copy(base, memory);
@@ -205,7 +205,7 @@ class Kill : public ::testing::Test {
   /// A memory with links and a map.
   fs::path mapped() {
     const fs::path base = folder_ / "base.panonav";
-    run_well({"map", run(), base});
+    run_well({"map", base, run()});
     return base;
   }
 
@@ -218,7 +218,7 @@ class Kill : public ::testing::Test {
     }
     write_dataset(folder_ / "second", landmark_world(3), poses);
     const fs::path memory = folder_ / "second.panonav";
-    run_well({"map", folder_ / "second", memory});
+    run_well({"map", memory, folder_ / "second"});
     return memory;
   }
 
@@ -226,20 +226,20 @@ class Kill : public ::testing::Test {
 };
 
 TEST_F(Kill, Memorise) {
-  kill_at_random({"memorise", run()}, {}, {}, false);
+  kill_at_random({"memorise"}, {run()}, {}, false);
 }
 
 TEST_F(Kill, Map) {
-  kill_at_random({"map", bare()}, {}, {}, false);
+  kill_at_random({"map"}, {bare()}, {}, false);
 }
 
 TEST_F(Kill, RouteRecord) {
-  kill_at_random({"route", "record", run()}, {"--every-m", "0.05"}, {}, false);
+  kill_at_random({"route", "record"}, {run(), "--every-m", "0.05"}, {}, false);
 }
 
 TEST_F(Kill, Arrange) {
   const fs::path base = folder_ / "base.panonav";
-  run_well({"memorise", run(), base});
+  run_well({"memorise", base, run()});
   kill_at_random({"arrange"}, {}, base, true);
 }
 
@@ -255,7 +255,7 @@ TEST_F(Kill, Rename) {
 TEST_F(Kill, LocaliseUpdate) {
   const fs::path base = folder_ / "base.panonav";
   write_dataset(folder_ / "grid", landmark_world(3), grid_poses(6));
-  run_well({"memorise", folder_ / "grid", base});
+  run_well({"memorise", base, folder_ / "grid"});
   // Along y = 1 m, with something else in the middle.
   std::vector<Pose2> drive;
   for (int i = 0; i < 21; ++i) drive.push_back({0.125 * i, 1.05, 0.0});
@@ -289,6 +289,48 @@ TEST_F(Kill, Undo) {
 TEST_F(Kill, LocaliseAdd) {
   // The views that it adds depend on those that it knows, so that a second run adds others.
   kill_at_random({"localise"}, {run(), "--add"}, {}, false, false);
+}
+
+// Ctrl-C says what is kept and how to continue, and the same command then does so.
+TEST_F(Kill, InterruptionIsExplained) {
+  struct Case {
+    std::vector<std::string> arguments;
+    fs::path begun;  // exists once the verb has begun to write
+    std::string message;
+  };
+  const fs::path memory = folder_ / "m.panonav";
+  const fs::path tried = folder_ / "tried";
+  const std::vector<Case> cases = {
+      {{"memorise", memory, run()},
+       memory,
+       "panonav memorise: interrupted. Views stored so far are kept. To continue, run the same "
+       "command again.\n"},
+      {{"try", run(), "-o", tried},
+       tried / "run.panonav",
+       "panonav try: interrupted. The page is not complete. To start over, run the same command "
+       "again.\n"},
+  };
+  for (const Case& interrupted : cases) {
+    SCOPED_TRACE(interrupted.arguments.front());
+    bool was_interrupted = false;
+    for (int round = 0; round < 20 && !was_interrupted; ++round) {
+      fs::remove(memory);
+      fs::remove_all(tried);
+      const pid_t child = start(interrupted.arguments, folder_ / "messages");
+      while (!fs::exists(interrupted.begun) && ::waitpid(child, nullptr, WNOHANG) == 0) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      ::kill(child, SIGINT);
+      int status = 0;
+      was_interrupted = ::waitpid(child, &status, 0) == child && WIFSIGNALED(status);
+      if (was_interrupted) EXPECT_EQ(WTERMSIG(status), SIGINT);
+    }
+    ASSERT_TRUE(was_interrupted) << "the verb ended before each signal";
+    EXPECT_EQ(bytes_of(folder_ / "messages"), interrupted.message);
+    const auto again = run_panonav(interrupted.arguments);
+    EXPECT_EQ(again.exit_code, 0) << again.err;
+  }
+  EXPECT_TRUE(contains(bytes_of(tried / "index.html"), "Next commands"));
 }
 
 // One succeeds and the other is refused because the memory exists: neither replaces the other's.

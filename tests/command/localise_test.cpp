@@ -37,7 +37,7 @@ class Localise : public ::testing::Test {
     }
     query_poses_ = query_poses;
     write_dataset(*folder_ / "queries", *world_, query_poses);
-    run_well({"memorise", *folder_ / "grid", memory()});
+    run_well({"memorise", memory(), *folder_ / "grid"});
   }
   static void TearDownTestSuite() { folder_.reset(); }
   static std::string memory() { return *folder_ / "grid.panonav"; }
@@ -79,6 +79,20 @@ TEST_F(Localise, UpdatesWhatHasChangedAndUndoTakesItBack) {
   EXPECT_TRUE(changes()[0].at("undoable"));
   run_well({"undo", file});
   EXPECT_EQ(views(), before);
+  EXPECT_TRUE(changes().empty());
+
+  // A run that changes nothing says why: in another place no image is localised; one image alone
+  // has no witness.
+  write_dataset(*folder_ / "away", landmark_world(99), drive);
+  write_file(*folder_ / "away" / "poses.csv", std::string_view(csv));
+  const auto away = run_panonav({"localise", file, *folder_ / "away", "--update"});
+  EXPECT_TRUE(contains(away.err, "no view of " + file + " was updated: ")) << away.err;
+  EXPECT_TRUE(contains(away.err, "no image was localised with a probability")) << away.err;
+  write_dataset(*folder_ / "alone", *world_, {drive.front()});
+  write_file(*folder_ / "alone" / "poses.csv",
+             std::string_view(csv.substr(0, csv.find(view_name(1)))));
+  const auto alone = run_panonav({"localise", file, *folder_ / "alone", "--update"});
+  EXPECT_TRUE(contains(alone.err, "at least three other images")) << alone.err;
   EXPECT_TRUE(changes().empty());
 
   const auto refused = [&](const std::vector<std::string>& more, std::string_view part) {
@@ -124,8 +138,20 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
   ASSERT_EQ(all.size(), 20U);
   for (const auto& answer : all) {
     EXPECT_EQ(keys_of(answer),
-              (std::set<std::string>{"bytes_read", "components", "file", "heading_rad", "known",
-                                     "known_probability", "matches", "position", "turned_rad"}));
+              (std::set<std::string>{"alternatives", "bytes_read", "components", "file",
+                                     "heading_rad", "known", "known_probability", "matches",
+                                     "position", "probability", "turned_rad"}));
+    double shared = answer["probability"];
+    for (const auto& other : answer["alternatives"]) {
+      EXPECT_EQ(keys_of(other),
+                (std::set<std::string>{"heading_rad", "match", "position", "probability"}));
+      shared += other["probability"].get<double>();
+    }
+    EXPECT_NEAR(shared, answer["known_probability"].get<double>(), 1e-9);
+    if (!answer["position"].is_null()) {
+      EXPECT_EQ(keys_of(answer["position"]),
+                (std::set<std::string>{"along_route", "radius_m", "x_m", "y_m"}));
+    }
     EXPECT_TRUE(answer["known"].is_boolean());
     EXPECT_TRUE(answer["components"].is_number_integer());
     EXPECT_TRUE(answer["bytes_read"].is_number_unsigned());
@@ -139,8 +165,10 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
       EXPECT_TRUE(match.at("heading_rad").is_number() || match.at("heading_rad").is_null());
     }
     if (!answer["position"].is_null()) {
-      EXPECT_EQ(answer["position"].size(), 3U);
-      EXPECT_GT(answer["position"].at("radius_m").get<double>(), 0.0);
+      EXPECT_EQ(answer["position"].size(), 4U);
+      EXPECT_TRUE(answer["position"].at("along_route").is_null()) << "the views form a grid";
+      const json& radius_m = answer["position"].at("radius_m");
+      EXPECT_TRUE(radius_m.is_null() || radius_m.get<double>() > 0.0);
     }
   }
 }
@@ -256,9 +284,10 @@ TEST_F(Localise, SeveralPicturesAndATable) {
   const auto rows = lines(bytes_of(table));
   ASSERT_EQ(rows.size(), 5U);
   EXPECT_EQ(rows[0],
-            "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"
-            "difference,turn_deg,next,next_dissimilarity,next_column_difference,error");
-  EXPECT_EQ(rows[1].find(gone + ",unreadable,,,,,,,,,,,,,"), 0U) << rows[1];
+            "file,answer,known_probability,x_m,y_m,radius_m,along_route_m,heading_deg,best,"
+            "dissimilarity,column_difference,turn_deg,next,next_dissimilarity,next_column_"
+            "difference,probability,alternative,alternative_probability,error");
+  EXPECT_EQ(rows[1].find(gone + ",unreadable,,,,,,,,,,,,,,,,,"), 0U) << rows[1];
   EXPECT_EQ(rows[2].find(pictures[1] + ",known," + format_fixed(one["known_probability"], 4) + "," +
                          to_text(one["position"]["x_m"].get<double>())),
             0U)
@@ -290,6 +319,21 @@ TEST_F(Localise, RunsInOrderKeepImagesThatCannotBeRead) {
   EXPECT_TRUE(contains(none.err, view_name(0)));
 }
 
+TEST_F(Localise, ABoundIsNeverRoundedToZero) {
+  const std::string data = *folder_ / "tiny";
+  write_dataset(data, *world_, grid_poses(6));
+  std::string csv = "file,x_m,y_m,heading_deg\n";  // of a place of a few millimetres
+  for (std::size_t i = 0; i < 36; ++i) {
+    csv += view_name(i) + "," + to_text(0.0005 * static_cast<double>(i / 6)) + "," +
+           to_text(0.0005 * static_cast<double>(i % 6)) + ",0\n";
+  }
+  write_file(*folder_ / "tiny" / "poses.csv", std::string_view(csv));
+  run_well({"memorise", *folder_ / "tiny.panonav", data});
+  const auto result = run_panonav({"localise", *folder_ / "tiny.panonav", data});
+  EXPECT_TRUE(contains(result.out, "within 0.01 m")) << result.out;
+  EXPECT_FALSE(contains(result.out, "within 0.00")) << result.out;
+}
+
 TEST_F(Localise, ANewMemoryHasNothingToReport) {
   const std::filesystem::path data = *folder_ / "few";
   const std::filesystem::path report = *folder_ / "few_report";
@@ -318,7 +362,7 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
     known += is_known ? 1 : 0;
     const std::string title =
         view_name(i) + ": " +
-        (is_known ? "near " + best["file"].get<std::string>() : "unknown place");
+        (is_known ? "near the stored view " + best["file"].get<std::string>() : "unknown place");
     const json& shown = run["moments"][i];
     EXPECT_EQ(shown["values"]["image"].get<std::string>() + ": " +
                   shown["values"]["answer"].get<std::string>(),
@@ -354,7 +398,7 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
   EXPECT_TRUE(contains(page, "<b>" + std::to_string(known) + " of 20</b>"));
 
   // A memory that keeps no thumbnails.
-  run_well({"memorise", grid(), *folder_ / "bare.panonav", "--no-thumbnails"});
+  run_well({"memorise", *folder_ / "bare.panonav", grid(), "--no-thumbnails"});
   run_well({"localise", *folder_ / "bare.panonav", grid(), "--report", report});
   const std::string bare = bytes_of(report / "index.html");
   EXPECT_TRUE(contains(bare, "no thumbnail of the best match"));
@@ -424,11 +468,11 @@ TEST_F(Localise, AreasShrinkAndAreListedComponentByComponent) {
   EXPECT_EQ(coarse.front()["areas"].size(), 2U);
   const std::string plain = *folder_ / "plain.panonav";
   std::filesystem::create_directory(*folder_ / "plain");
-  for (const int i : {0, 7, 13}) {
-    std::filesystem::copy_file(std::filesystem::path(grid()) / view_name(static_cast<size_t>(i)),
-                               *folder_ / "plain" / view_name(static_cast<size_t>(i)));
+  for (const int i : {0, 7, 13}) {  // unrelated worlds, which no map connects
+    write_picture(*folder_ / "plain" / view_name(static_cast<std::size_t>(i)),
+                  landmark_world(100 + i), {});
   }
-  run_well({"memorise", *folder_ / "plain", plain, "--kind", "panorama", "--elevation-deg", "-20",
+  run_well({"memorise", plain, *folder_ / "plain", "--kind", "panorama", "--elevation-deg", "-20",
             "20"});
   const auto result = run_panonav({"localise", plain, *folder_ / "plain", "--areas", "--json"});
   EXPECT_LE(result.exit_code, 1) << result.err;

@@ -36,7 +36,7 @@ class Map : public ::testing::Test {
   void SetUp() override { write_dataset(folder_ / "run", landmark_world(3), round_trip()); }
   [[nodiscard]] std::string memory() const { return folder_ / "m.panonav"; }
   [[nodiscard]] json map(const std::vector<std::string>& more = {}) const {
-    const auto arguments = with({"map", folder_ / "run", memory(), "--json"}, more);
+    const auto arguments = with({"map", memory(), folder_ / "run", "--json"}, more);
     const auto result = run_panonav(arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(result.err, "");
@@ -145,7 +145,7 @@ TEST_F(Map, TheLibraryMakesTheSameMapOnePictureAtATime) {
 }
 
 TEST_F(Map, SaysWhatItWroteAndWhatAPictureShows) {
-  const auto result = run_panonav({"map", folder_ / "run", memory(), "--tum", folder_ / "m.tum",
+  const auto result = run_panonav({"map", memory(), folder_ / "run", "--tum", folder_ / "m.tum",
                                    "--picture", folder_ / "m.svg", "--report", folder_ / "report"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   const std::string page = bytes_of(folder_ / "report/index.html");
@@ -163,7 +163,7 @@ TEST_F(Map, SaysWhatItWroteAndWhatAPictureShows) {
 TEST_F(Map, AHeightOfTheCameraThatHasNoEffectIsRefused) {
   write_file(folder_ / "run" / "dataset.toml", std::string_view("[images]\nkind = \"panorama\"\n"
                                                                 "[poses]\nfile = \"poses.csv\"\n"));
-  const auto line = refusal({"map", folder_ / "run", memory(), "--camera-height-m", "0.5"});
+  const auto line = refusal({"map", memory(), folder_ / "run", "--camera-height-m", "0.5"});
   EXPECT_TRUE(contains(line, "elevations")) << line;
   EXPECT_FALSE(fs::exists(memory()));
 }
@@ -171,9 +171,9 @@ TEST_F(Map, AHeightOfTheCameraThatHasNoEffectIsRefused) {
 TEST_F(Map, ARecordingWithoutPositionsCanBeMappedAgain) {
   for (const char* table : {"dataset.toml", "poses.csv"})
     fs::remove(folder_.path() / "run" / table);
-  const std::vector<std::string> line{"map",      folder_ / "run",   memory(), "--kind",
-                                      "panorama", "--elevation-deg", "-30",    "40",
-                                      "--json"};
+  const std::vector<std::string> line{"map",    memory(),   folder_ / "run",
+                                      "--kind", "panorama", "--elevation-deg",
+                                      "-30",    "40",       "--json"};
   const auto first = answer_of(line);
   EXPECT_GT(answer_of({"info", memory(), "--json"})["views_with_position"], 0) << "the map's";
   const auto again = answer_of(line);
@@ -182,11 +182,11 @@ TEST_F(Map, ARecordingWithoutPositionsCanBeMappedAgain) {
 }
 
 TEST_F(Map, WrongUseIsRefused) {
-  expect_refusal({"map", folder_ / "run", memory(), "--scale-m", "0"}, "scale_m");
+  expect_refusal({"map", memory(), folder_ / "run", "--scale-m", "0"}, "scale_m");
   EXPECT_FALSE(fs::exists(memory()));
-  expect_refusal({"map", folder_ / "none", memory()}, "none");
+  expect_refusal({"map", memory(), folder_ / "none"}, "none");
   static_cast<void>(map());
-  expect_refusal({"map", folder_ / "run", memory(), "--components", "9"},
+  expect_refusal({"map", memory(), folder_ / "run", "--components", "9"},
                  "--components is 9; allowed: 15, as");
   expect_refusal({"prune", folder_ / "none.panonav"}, "none.panonav");
 }
@@ -197,7 +197,7 @@ TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
   run_well({"simulate", "loop", run, "--path", "tour", "--heading", "path", "--spacing-m", "0.2",
             "--kind", "panorama", "--columns", "256"});
   const auto scale_with = [&](const std::string& memory, std::vector<std::string> more) {
-    std::vector<std::string> arguments{"map",   run,      memory,      "--wheels",
+    std::vector<std::string> arguments{"map",   memory,   run,         "--wheels",
                                        "false", "--json", "--scale-m", "4"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const auto result = run_panonav(arguments);
@@ -206,7 +206,7 @@ TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
   };
   // Narrow rooms: what stands on the ground makes lengths up to 15 % too long.
   EXPECT_NEAR(scale_with(folder / "ground.panonav", {"--camera-height-m", "0.6"}), 1.0, 0.2);
-  expect_refusal({"map", run, folder / "wheels.panonav", "--camera-height-m", "0.6"}, "odometry");
+  expect_refusal({"map", folder / "wheels.panonav", run, "--camera-height-m", "0.6"}, "odometry");
   EXPECT_LT(scale_with(folder / "guess.panonav", {}), 0.7) << "guard: the guess is wrong";
 }
 

@@ -32,14 +32,14 @@ class Navigate : public ::testing::Test {
     run_well({"simulate", "office", *folder / "run", "--grid", "0.5", "--kind", "panorama",
               "--rows", "40", "--columns", "256"});
     memory = *folder / "office.panonav";
-    run_well({"memorise", *folder / "run", memory});
+    run_well({"memorise", memory, *folder / "run"});
     bare = *folder / "bare.panonav";
     std::filesystem::copy_file(memory, bare);
     run_well({"arrange", memory});
     // Row by row of the grid.
     with_route = *folder / "with_route.panonav";
     std::filesystem::copy_file(memory, with_route);
-    run_well({"route", "record", *folder / "run", with_route, "--name", "rows"});
+    run_well({"route", "record", with_route, *folder / "run", "--name", "rows"});
   }
   static void TearDownTestSuite() { folder.reset(); }
   /// The view that is nearest to a place.
@@ -281,7 +281,7 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
   }
   write_dataset(folder.path() / "run", world, poses);
   const auto memory = folder / "hall.panonav";
-  ASSERT_EQ(run_panonav({"memorise", folder / "run", memory}).exit_code, 0);
+  ASSERT_EQ(run_panonav({"memorise", memory, folder / "run"}).exit_code, 0);
   const auto goal = view_name(poses.size() - 2);
   EXPECT_THROW(RobotNavigator(memory, goal, {.edges = RobotNavigatorOptions::GraphOrigin::links}),
                FileError)

@@ -44,7 +44,7 @@ TEST(Usage, AnOptionThatDoesNothingIsRefused) {
       {"calibrate a -o c --xi 0.9", "--xi", "--profile unified"},
       {"calibrate a -o c --mirror-a-mm 9", "--mirror-a-mm", "--profile hyperboloidal"},
       {"calibrate a -o c --profile unified --inner-elevation-deg 9", "--inner-elevation-deg", ""},
-      {"evaluate a b --align false --align-scale true", "--align-scale", ""},
+      {"evaluate a b --align none --align-reflection true", "--align-reflection", ""},
       {"catchment x --ahead 2 --up-to-m 1", "--up-to-m", ""},
       {"catchment x --ahead 2 --max-step-m 1", "--max-step-m", ""},
       {"catchment x --goal y", "--goal", "--report r"},
@@ -118,7 +118,7 @@ TEST(Usage, AMemoryKeepsEveryOptionThatItWasMadeWith) {
   const std::string data = folder / "data";
   const std::string memory = folder / "m.panonav";
   write_dataset(data, landmark_world(5), grid_poses(2));
-  run_well({"memorise", data, memory});
+  run_well({"memorise", memory, data});
   const auto info = answer_of({"info", memory, "--json"});
   const SignatureOptions kept{info["rows"].get<int>(), info["panorama_columns"].get<int>(),
                               info["components"].get<int>()};
@@ -135,21 +135,21 @@ TEST(Usage, AMemoryKeepsEveryOptionThatItWasMadeWith) {
     expect_refusal(with(line, {"--config", folder / "c.toml"}), other.flag + " is ");
   };
   for (const auto& other : signature) {
-    refused({"memorise", data, memory}, other, "[signature]");
-    refused({"map", data, memory}, other, "[signature]");
+    refused({"memorise", memory, data}, other, "[signature]");
+    refused({"map", memory, data}, other, "[signature]");
     if (other.name != "components") {
       refused({"home", "1", data, "--memory", memory}, other, "[signature]");
     }
   }
   for (const auto& other : preprocessing) {
-    refused({"memorise", data, memory}, other, "[preprocessing]");
+    refused({"memorise", memory, data}, other, "[preprocessing]");
     refused({"home", "1", data, "--memory", memory}, other, "[preprocessing]");
   }
   // The same values are no contradiction.
   std::vector<std::string> same{"--rows", std::to_string(kept.rows), "--components",
                                 std::to_string(kept.components)};
-  run_well(with({"memorise", data, memory, "--remove-mean", "true"}, same));
-  run_well(with({"map", data, memory}, same));
+  run_well(with({"memorise", memory, data, "--remove-mean", "true"}, same));
+  run_well(with({"map", memory, data}, same));
   run_well(with({"home", "1", data, "--memory", memory}, same));
 }
 
@@ -162,11 +162,11 @@ TEST(Usage, AMemoryKeepsItsBandOfElevations) {
     std::filesystem::remove(std::filesystem::path(data) / table);
   }
   const std::vector<std::string> kind{"--kind", "panorama", "--elevation-deg"};
-  run_well(with(with({"memorise", data, memory}, kind), {"-30", "40"}));
+  run_well(with(with({"memorise", memory, data}, kind), {"-30", "40"}));
   for (const std::vector<std::string>& line :
-       std::vector<std::vector<std::string>>{{"memorise", data, memory},
+       std::vector<std::vector<std::string>>{{"memorise", memory, data},
                                              {"localise", memory, data},
-                                             {"map", data, memory},
+                                             {"map", memory, data},
                                              {"home", "1", data, "--memory", memory}}) {
     EXPECT_TRUE(contains(refusal(with(with(line, kind), {"-60", "60"})),
                          "--elevation-deg is -60 60; allowed: -30 40, the band of " + memory))
@@ -180,12 +180,11 @@ TEST(Usage, AFolderOfPicturesAloneIsToldHowToBecomeADataSet) {
   const TemporaryFolder folder;
   const std::string bare = folder / "bare";
   write_dataset(bare, landmark_world(5), grid_poses(2));
-  run_well({"memorise", bare, folder / "m.panonav"});
+  run_well({"memorise", folder / "m.panonav", bare});
   for (const char* table : {"dataset.toml", "poses.csv"}) {
     std::filesystem::remove(std::filesystem::path(bare) / table);
   }
-  std::vector<std::vector<std::string>> all{{"route", "record", bare, folder / "m.panonav"},
-                                            {"arrange", folder / "m.panonav", "--odometry", bare}};
+  std::vector<std::vector<std::string>> all{{"arrange", folder / "m.panonav", "--odometry", bare}};
   all.push_back({"catchment", bare});
   for (const auto& line : all) {
     const auto said = refusal(line);

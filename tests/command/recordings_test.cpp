@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
+#include <tuple>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -50,8 +54,9 @@ void write_walk(const fs::path& folder, const ToyWorld& world, const std::vector
   write_file(folder / "poses.csv", std::string_view(csv + "\n"));
 }
 
-/// All messages, packed in another way.
-void repack(const fs::path& from, const fs::path& to, recordings::McapCompression compression) {
+/// All messages, packed in another way; of odometry without those from `begin` to before `end`.
+void repack(const fs::path& from, const fs::path& to, recordings::McapCompression compression,
+            std::size_t begin = 0, std::size_t end = 0) {
   const auto recording = recordings::Recording::open(from);
   recordings::McapWriter writer(to, {.compression = compression, .chunk_bytes = 20'000});
   std::vector<std::uint32_t> topics;
@@ -63,9 +68,12 @@ void repack(const fs::path& from, const fs::path& to, recordings::McapCompressio
                            writer.add_schema(recordings::ros::ros2_type_name(topic.type), "ros2msg",
                                              recordings::ros::ros2_schema(topic.type))));
   }
+  std::size_t number = 0;
   recording->for_each(
       topics, {},
       [&](const recordings::MessageLocation& place, std::span<const std::uint8_t> bytes) {
+        const bool is_odometry = recording->topics()[place.topic].name == "/odom";
+        if (is_odometry && number++ >= begin && number <= end) return;
         writer.write(channels[place.topic], place.time_ns, place.time_ns, bytes);
       });
   writer.close();
@@ -189,7 +197,7 @@ class Recordings : public ::testing::Test {
     repack(walk("_zstd.mcap"), walk("_lz4.mcap"), recordings::McapCompression::lz4);
     write_bag(walk("_zstd.mcap"), walk("_ros1.bag"));
     write_rosbag2(walk("_zstd.mcap"), walk("_rosbag2"));
-    run_well({"memorise", walk(), memory()});
+    run_well({"memorise", memory(), walk()});
   }
   static void TearDownTestSuite() { folder_.reset(); }
   static std::string walk(const std::string& more = "") { return *folder_ / ("walk" + more); }
@@ -210,7 +218,7 @@ TEST_F(Recordings, GiveTheMemoryOfTheirFolder) {
   for (const std::string& form : forms) {
     SCOPED_TRACE(form);
     const std::string path = *folder_ / ("own" + fs::path(form).filename().string() + ".panonav");
-    run_well(with({"memorise", walk(form), path}, kind));
+    run_well(with({"memorise", path, walk(form)}, kind));
     const auto own_file = MemoryFile::open(path, Access::read_only);
     const VisualMemory own = own_file.load();
     EXPECT_EQ(own_file.header().source, file.header().source);
@@ -226,7 +234,7 @@ TEST_F(Recordings, GiveTheMemoryOfTheirFolder) {
     }
     EXPECT_EQ(own.info(expected.views()[0]).name, "1700000000_100000000");
     // Once more there is nothing to do, and the memory knows how the pictures lie.
-    EXPECT_EQ(answer_of({"memorise", walk(form), path, "--json"})["known_before"], 16);
+    EXPECT_EQ(answer_of({"memorise", path, walk(form), "--json"})["known_before"], 16);
   }
 }
 
@@ -309,8 +317,8 @@ TEST_F(Recordings, PicturesAloneGetASecondEach) {
 
 TEST_F(Recordings, InfoSaysWhatIsInThem) {
   const auto info = answer_of({"info", walk("_lz4.mcap"), "--json"});
-  EXPECT_EQ(keys_of(info),
-            (std::set<std::string>{"recording", "begin_s", "end_s", "topics", "warnings"}));
+  EXPECT_EQ(keys_of(info), (std::set<std::string>{"recording", "begin_s", "end_s", "topics",
+                                                  "warnings", "verbs"}));
   EXPECT_NEAR(info["end_s"].get<double>() - info["begin_s"].get<double>(), 6.0, 1e-6);
   EXPECT_TRUE(info["warnings"].empty());
   ASSERT_EQ(info["topics"].size(), 3U);
@@ -347,9 +355,11 @@ TEST_F(Recordings, OfSeveralCamerasOneIsNamed) {
       writer.write(channel, 1'000'000'000, 1'000'000'000, recordings::ros::write_message(message));
     }
   }
-  EXPECT_EQ(refusal({"localise", memory(), both}),
-            "panonav localise: " + both +
-                ": has images of several topics: /left, /right; choose one with --image-topic");
+  const auto chosen = run_panonav({"localise", memory(), both});
+  EXPECT_LE(chosen.exit_code, 1) << chosen.err;
+  EXPECT_TRUE(contains(chosen.err, both + ": images of several topics: /left, /right; used: /left; "
+                                          "choose another with --image-topic"))
+      << chosen.err;
   const auto right = answers_of({"localise", memory(), both, "--image-topic", "/right", "--json"});
   write_picture(*folder_ / "right.png", *world_, {0.5, 0.5, -0.5});
   const auto picture = answers_of({"localise", memory(), *folder_ / "right.png", "--json"});
@@ -358,8 +368,86 @@ TEST_F(Recordings, OfSeveralCamerasOneIsNamed) {
                  "has no topic /up of sensor_msgs/Image");
 }
 
+// Odometry that begins later, pauses or ends early is still that of the other images.
+TEST_F(Recordings, ImagesWithoutOdometryLeaveThatOfTheOthers) {
+  const auto positions = [](const std::string& input) {
+    std::vector<std::array<double, 2>> found;
+    for (const json& each : answers_of({"track", memory(), input, "--start-x-m", "0", "--start-y-m",
+                                        "0", "--start-heading-deg", "0", "--json"})) {
+      if (!each["pose"].is_null())
+        found.push_back({each["pose"]["x_m"].get<double>(), each["pose"]["y_m"].get<double>()});
+    }
+    return found;
+  };
+  const auto expected = positions(walk("_zstd.mcap"));
+  ASSERT_EQ(expected.size(), 16U);
+  for (const auto& [begin, end, where] : {std::tuple{0U, 2U, "1 before its first message"},
+                                          {5U, 7U, "2 in pauses of more than"},
+                                          {14U, 16U, "1 after its last message"}}) {
+    SCOPED_TRACE(where);
+    const std::string gap = *folder_ / ("gap" + std::to_string(begin) + ".mcap");
+    repack(walk("_zstd.mcap"), gap, recordings::McapCompression::none, begin, end);
+    const auto found = positions(gap);
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      EXPECT_NEAR(found[i][0], expected[i][0], 0.25) << i;
+      EXPECT_NEAR(found[i][1], expected[i][1], 0.25) << i;
+    }
+    const auto recorded = run_panonav(
+        with({"route", "record", gap + ".panonav", gap, "--odometry", "--every-m", "0", "--json"},
+             kind));
+    EXPECT_EQ(recorded.exit_code, 0) << recorded.err;
+    EXPECT_TRUE(contains(recorded.err, std::string("images have no odometry: ") + where))
+        << recorded.err;
+    EXPECT_TRUE(contains(recorded.err, "images have no odometry and are left out"));
+    const std::size_t missing = where[0] == '2' ? 2 : 1;
+    EXPECT_EQ(json::parse(recorded.out)["lines"], 16 - missing);
+    const std::string back = gap + "_folder";
+    EXPECT_EQ(answer_of(with({"convert", gap, back, "--json"}, kind))["odometry"], true);
+    const Dataset dataset = read_dataset(back);
+    EXPECT_EQ(
+        std::ranges::count_if(dataset.entries,
+                              [](const DatasetEntry& each) { return each.odometry.has_value(); }),
+        static_cast<std::ptrdiff_t>(16 - missing));
+    const auto of_folder = positions(back);
+    ASSERT_EQ(of_folder.size(), found.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      EXPECT_NEAR(of_folder[i][0], found[i][0], 1e-6);
+      EXPECT_NEAR(of_folder[i][1], found[i][1], 1e-6);
+    }
+    const auto mapped = answer_of(with({"map", gap + "_map.panonav", gap, "--json"}, kind));
+    EXPECT_EQ(mapped["nodes"], 16);
+  }
+}
+
+TEST_F(Recordings, TheCommandThatInfoSuggestsWorks) {
+  for (const std::string& form : {"_lz4.mcap", "_rosbag2", "_ros1.bag"}) {
+    SCOPED_TRACE(form);
+    const std::string last = lines(run_panonav({"info", walk(form)}).out).back();
+    const std::string start = "Next: panonav ";
+    ASSERT_TRUE(last.starts_with(start)) << last;
+    std::vector<std::string> words;
+    std::istringstream text(last.substr(start.size()));
+    for (std::string word; text >> word;) words.push_back(word);
+    ASSERT_EQ(words.size(), 5U) << last;
+    EXPECT_EQ(words[0], "memorise");
+    words[1] = *folder_ / ("suggested_" + words[1]);
+    run_well(words);
+  }
+}
+
+TEST_F(Recordings, AnEmptyRecordingIsDescribed) {
+  const std::string empty = *folder_ / "nothing.mcap";
+  { recordings::McapWriter writer(empty); }
+  const auto said = run_panonav({"info", empty});
+  EXPECT_EQ(said.exit_code, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "0 messages of 0 topics"));
+  EXPECT_TRUE(contains(said.out, "it is empty")) << said.out;
+  expect_refusal({"localise", memory(), empty}, "has no images that can be read");
+}
+
 TEST_F(Recordings, OptionsThatDoNotFitAreRefused) {
-  expect_refusal({"memorise", walk("_lz4.mcap"), *folder_ / "new.panonav"},
+  expect_refusal({"memorise", *folder_ / "new.panonav", walk("_lz4.mcap")},
                  "does not give the type of its images; set the type with --kind");
   expect_refusal({"localise", memory(), walk(), "--imu-topic", "/imu"},
                  walk() + " has no topics; leave out --imu-topic");
@@ -378,14 +466,14 @@ TEST_F(Recordings, OptionsThatDoNotFitAreRefused) {
 TEST_F(Recordings, RoutesAndMotionComeFromThem) {
   const std::string routes = *folder_ / "routes.panonav";
   const auto recorded = answer_of(with(
-      {"route", "record", walk("_none.mcap"), routes, "--odometry", "--every-m", "0", "--json"},
+      {"route", "record", routes, walk("_none.mcap"), "--odometry", "--every-m", "0", "--json"},
       kind));
   EXPECT_EQ(recorded["lines"], 16);
   const auto followed = run_panonav({"route", "follow", routes, walk("_none.mcap"), "--json"});
   EXPECT_LE(followed.exit_code, 1) << followed.err;
   EXPECT_EQ(lines(followed.out).size(), 16U);
   const std::string own = *folder_ / "moved.panonav";
-  run_well(with({"memorise", walk("_none.mcap"), own}, kind));
+  run_well(with({"memorise", own, walk("_none.mcap")}, kind));
   run_well({"arrange", own, "--odometry", walk("_lz4.mcap")});
 }
 

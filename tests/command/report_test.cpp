@@ -37,7 +37,7 @@ void expect_eight_parts(const fs::path& folder) {
   const std::string page = bytes_of(folder / "index.html");
   const std::string first_screen = page.substr(0, page.find("<nav"));
   EXPECT_EQ(count_of(first_screen, "<section><h2><a href=\"#part"), 4U);
-  EXPECT_TRUE(contains(first_screen, "panonav memorise photos")) << "how to use it";
+  EXPECT_TRUE(contains(first_screen, "panonav memorise place.panonav photos")) << "how to use it";
   EXPECT_GE(count_of(first_screen, "<img "), 1U);
   EXPECT_EQ(count_of(first_screen, "<pn-plan>"), 3U);
   std::size_t at = page.find("</nav>");

@@ -33,8 +33,8 @@ void expect_same_signatures(const VisualMemory& a, const VisualMemory& b) {
 }
 
 TEST_F(Walk, AVideoGivesTheMemoryAndTheAnswersOfItsPictures) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
-  run_well(with({"memorise", path("walk.mp4"), path("b.panonav")}, panoramas_));
+  run_well({"memorise", path("a.panonav"), path("walk")});
+  run_well(with({"memorise", path("b.panonav"), path("walk.mp4")}, panoramas_));
   expect_same_signatures(views(path("a.panonav")), views(path("b.panonav")));
   const auto by_folder = answers_of({"localise", path("a.panonav"), path("walk"), "--json"});
   const auto by_video = answers_of({"localise", path("a.panonav"), path("walk.mp4"), "--json"});
@@ -45,7 +45,7 @@ TEST_F(Walk, AVideoGivesTheMemoryAndTheAnswersOfItsPictures) {
   }
   // The same again knows every view.
   const json again =
-      answer_of(with({"memorise", path("walk.mp4"), path("b.panonav"), "--json"}, {}));
+      answer_of(with({"memorise", path("b.panonav"), path("walk.mp4"), "--json"}, {}));
   EXPECT_EQ(again.at("known_before"), count);
 }
 
@@ -60,7 +60,7 @@ TEST_F(Walk, InfoSaysWhatIsInAVideo) {
 TEST_F(Walk, PartsOfAVideoAreTaken) {
   const auto names = [&](const std::vector<std::string>& part) {
     std::vector<std::string> found;
-    run_well({"memorise", path("walk"), path("a.panonav")});
+    run_well({"memorise", path("a.panonav"), path("walk")});
     for (const auto& answer :
          answers_of(with({"localise", path("a.panonav"), path("walk.mp4"), "--json"}, part))) {
       found.push_back(answer.at("matches").at(0).at("file"));
@@ -80,24 +80,25 @@ TEST_F(Walk, PartsOfAVideoAreTaken) {
   expect_refusal({"localise", path("a.panonav"), path("walk"), "--to", "1"}, "stamp_s");
   expect_refusal({"localise", path("a.panonav"), path("walk/view_000.png"), "--every", "2"},
                  "one image");
-  expect_refusal({"memorise", path("walk.mp4"), path("c.panonav")}, "--kind");
+  expect_refusal({"memorise", path("c.panonav"), path("walk.mp4")}, "--kind");
   expect_refusal(with({"catchment", path("walk.mp4")}, panoramas_),
                  "a recording of topics needs poses");
-  expect_refusal(with({"route", "record", path("walk.mp4"), path("c.panonav")}, panoramas_),
-                 "a recording of topics needs odometry");
+  expect_refusal(
+      with({"route", "record", path("c.panonav"), path("walk.mp4"), "--odometry"}, panoramas_),
+      "has no odometry");
 }
 
 TEST_F(Walk, StandardInputGivesTheMemoryOfItsPictures) {
-  run_well(with({"memorise", path("jpegs"), path("a.panonav")}, panoramas_));
+  run_well(with({"memorise", path("a.panonav"), path("jpegs")}, panoramas_));
   const std::string command =
-      quote_for_shell(PANONAV_COMMAND) + " memorise - " + quote_for_shell(path("b.panonav")) +
-      " --json --kind panorama --elevation-deg -20 20 < " + quote_for_shell(path("walk.mjpeg"));
+      quote_for_shell(PANONAV_COMMAND) + " memorise " + quote_for_shell(path("b.panonav")) +
+      " - --json --kind panorama --elevation-deg -20 20 < " + quote_for_shell(path("walk.mjpeg"));
   EXPECT_EQ(json::parse(said_by_shell(command, folder.path())).at("appended"), count);
   expect_same_signatures(views(path("a.panonav")), views(path("b.panonav")));
 }
 
 TEST_F(Walk, PicturesOnStandardInputAreAnsweredAndTrackedAsTheyCome) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   const std::string command = " < " + quote_for_shell(path("walk.mjpeg")) + " 2> /dev/null";
   const auto answers = objects(said_by_shell(
       quote_for_shell(PANONAV_COMMAND) + " localise " + quote_for_shell(path("a.panonav")) +
@@ -124,7 +125,7 @@ TEST_F(Walk, PicturesOnStandardInputAreAnsweredAndTrackedAsTheyCome) {
 }
 
 TEST_F(Walk, ALiveSourceIsReadWhileItIsOpen) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   // The writer waits for the answer to the first picture before it ends its own stream.
   const std::string command =
       "mkfifo " + quote_for_shell(path("pipe")) + " && (" + quote_for_shell(PANONAV_COMMAND) +
@@ -169,7 +170,7 @@ TEST_F(Walk, LocaliseAddsANewPlaceOnceAndKnowsItThen) {
 }
 
 TEST_F(Walk, ARecordOfAStreamHoldsItsJpegsToTheByte) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   said_by_shell(quote_for_shell(PANONAV_COMMAND) + " localise " +
                     quote_for_shell(path("a.panonav")) + " - --record " +
                     quote_for_shell(path("run.mcap")) + " < " +
@@ -186,7 +187,7 @@ TEST_F(Walk, ARecordOfAStreamHoldsItsJpegsToTheByte) {
 }
 
 TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   const auto answers = answers_of(
       {"localise", path("a.panonav"), path("walk"), "--json", "--record", path("run.mcap")});
   const auto topics = topics_of(path("run.mcap"));
@@ -236,7 +237,7 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
 }
 
 TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustAdded) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   run_well({"forget", path("a.panonav"), view_name(count - 1)});  // ids are not used twice
   write_dataset(folder / "other", landmark_world(77), poses_);
   for (std::size_t i = 0; i < count; ++i) {
@@ -254,7 +255,7 @@ TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustAdded) {
 }
 
 TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   (void)run_panonav({"track", path("a.panonav"), path("walk"), "--record", path("track.mcap")});
   const auto topics = topics_of(path("track.mcap"));
   for (const char* topic : {"/camera/image/compressed", "/best_match/compressed", "/particles",
@@ -278,7 +279,7 @@ TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
 }
 
 TEST_F(Walk, AnswersAreRecordedAndARecordIsInputAgain) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   const std::vector<std::string> ask{"localise", path("a.panonav")};
   const auto by_folder =
       answers_of(with(ask, {path("walk"), "--json", "--record", path("answers.mcap")}));
@@ -299,7 +300,7 @@ TEST_F(Walk, AnswersAreRecordedAndARecordIsInputAgain) {
 }
 
 TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   expect_refusal({"localise", path("a.panonav"), path("walk"), "--record", path("none/run.mcap")},
                  "none/run.mcap");
   const std::vector<std::string> ask{"localise", path("a.panonav"), path("walk"), "--json",
@@ -313,7 +314,7 @@ TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
 
 TEST_F(Walk, RunRecordsARouteAndFollowsIt) {
   const std::string memory = path("a.panonav");
-  run_well({"memorise", path("walk"), memory});
+  run_well({"memorise", memory, path("walk")});
   const std::vector<std::string> ask{"localise", memory, path("walk"), "--route", "round"};
   expect_refusal(ask, "route");  // there is none
   const auto added = run_panonav(with(ask, {"--add", "--quiet"}));
@@ -341,7 +342,7 @@ TEST_F(Walk, RunRecordsARouteAndFollowsIt) {
 }
 
 TEST_F(Walk, PicturesThatCannotBeReadAreCountedAndDoNotFlood) {
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   fs::create_directories(folder / "bad");
   for (std::size_t i = 0; i < 200; ++i) {
     write_file(folder / "bad" / (std::to_string(i) + ".png"), std::string_view("no image"));
@@ -361,7 +362,7 @@ TEST_F(Walk, PicturesThatCannotBeReadAreCountedAndDoNotFlood) {
 
 TEST_F(Walk, RunRefusesWhatHasNoEffect) {
   expect_refusal({"localise", path("none.panonav"), path("walk"), "--route", "round"}, "--add");
-  run_well({"memorise", path("walk"), path("a.panonav")});
+  run_well({"memorise", path("a.panonav"), path("walk")});
   const std::vector<std::string> ask{"localise", path("a.panonav"), path("walk")};
   expect_refusal(with(ask, {"--add-interval-s", "1"}), "without --add");
   expect_refusal(with(ask, {"--camera-width", "96", "--camera-height", "12"}), "not a live source");
@@ -375,7 +376,7 @@ TEST_F(Walk, RunRefusesWhatHasNoEffect) {
   expect_refusal(
       {"localise", path("a.panonav"), "/dev/video99", "b.png", "--record", path("r.mcap")},
       "live source");
-  expect_refusal({"map", "/dev/video99", path("b.panonav"), "--kind", "panorama"}, "live source");
+  expect_refusal({"map", path("b.panonav"), "/dev/video99", "--kind", "panorama"}, "live source");
 }
 
 }  // namespace

@@ -100,19 +100,49 @@ TEST_F(Simulate, ARecordOfASimulatedRunIsTheDataSetAgain) {
       });
 }
 
-TEST_F(Simulate, AMeshThatCrashesItsReaderGivesOneLine) {
-  // A node that contains itself: the packaged reader follows it until its stack ends.
-  const auto mesh = folder.write("cycle.dae",
-                                 R"(<?xml version="1.0"?>
+/// A node that contains itself: the packaged reader follows it until its stack ends.
+constexpr std::string_view cyclic_mesh = R"(<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><up_axis>Z_UP</up_axis></asset>
 <library_nodes><node id="a" name="a"><instance_node url="#a"/></node></library_nodes>
 <library_visual_scenes><visual_scene id="s"><node id="n"><instance_node url="#a"/></node>
 </visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>)");
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>)";
+
+TEST_F(Simulate, AMeshThatCrashesItsReaderGivesOneLine) {
+  const auto mesh = folder.write("cycle.dae", cyclic_mesh);
   const auto line = refusal({"simulate", mesh, folder / "out", "--grid", "1"});
   EXPECT_TRUE(contains(line, mesh.string() + ": is damaged: the reader of its format crashes"));
   EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+TEST_F(Simulate, AWorldLoadsWithoutTheMeshesThatCrashTheirReader) {
+  const auto visual = [](const std::string& name, const std::string& shape) {
+    return "<visual name='" + name + "'><geometry>" + shape + "</geometry></visual>";
+  };
+  const auto crashing = [&](const std::string& name) {
+    folder.write(name, cyclic_mesh);
+    return visual(name, "<mesh><uri>" + name + "</uri></mesh>");
+  };
+  const std::string broken = crashing("first.dae") + crashing("second.dae");
+  const auto write = [&](const std::string& name, const std::string& visuals) {
+    return folder.write(name + ".world",
+                        "<sdf version='1.6'><world name='w'><model name='m'><link "
+                        "name='l'>" +
+                            visuals + "</link></model></world></sdf>");
+  };
+  const auto world = write("damaged", broken + visual("floor", "<box><size>3 3 0.02</size></box>"));
+  const auto result =
+      run_panonav({"simulate", world, folder / "run", "--grid", "1", "--kind", "panorama"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const std::string& name : std::vector<std::string>{"first.dae", "second.dae"}) {
+    EXPECT_TRUE(contains(result.err, "visual \"" + name + "\" is left out: ")) << result.err;
+    EXPECT_TRUE(contains(result.err, name + ": is damaged: the reader of its format crashes on it"))
+        << result.err;
+  }
+  EXPECT_GE(read_dataset(folder / "run").entries.size(), 4U);
+  EXPECT_TRUE(contains(refusal({"simulate", write("empty", broken), folder / "out", "--grid", "1"}),
+                       "shows nothing: no visual with a shape"));
 }
 
 TEST_F(Simulate, ArenaOnAGridNeedsNoFurtherFlags) {
@@ -175,6 +205,127 @@ TEST_F(Simulate, AMeasuredTiltIsWrittenAndTakenOutOfTheViews) {
     }
     EXPECT_LT(levelled_error, 0.35 * tilted_error);
   }
+}
+
+/// A world with a ground plane of 100 m and `more`.
+std::string ground_world(const std::string& more) {
+  return "<sdf version='1.6'><world name='w'><model name='ground'><link name='l'><visual "
+         "name='v'><geometry><plane><normal>0 0 1</normal><size>100 100</size></plane></geometry>"
+         "</visual></link></model>" +
+         more + "</world></sdf>";
+}
+
+std::string box_model(const std::string& name, const std::string& pose, const std::string& size) {
+  return "<model name='" + name + "'><pose>" + pose +
+         "</pose><link name='l'><visual name='v'><geometry><box><size>" + size +
+         "</size></box></geometry></visual></link></model>";
+}
+
+TEST_F(Simulate, RobotsStandOutsideOfSolidsOnTheGround) {
+  const auto positions = [&](const std::string& name, const std::string& more) {
+    const auto world = folder.write(name + ".world", ground_world(more));
+    run_well(with_small({"simulate", world, folder / name, "--random", "20"}));
+    return read_dataset(folder / name).entries;
+  };
+  for (const auto& entry : positions("big", box_model("table", "0 0 0.4 0 0 0", "3 4 0.8"))) {
+    EXPECT_GT(std::max(std::abs(entry.pose->x_m) - 1.5, std::abs(entry.pose->y_m) - 2.0), 0.2);
+  }
+  std::set<std::pair<bool, bool>> sides;
+  for (const auto& entry : positions("small", box_model("table", "0.4 0 0.4 0 0 0", "0.3 0.4 0.8")))
+    sides.insert({entry.pose->x_m > 0.4, entry.pose->y_m > 0.0});
+  EXPECT_EQ(sides.size(), 4U) << "all around the table";
+}
+
+TEST_F(Simulate, TheCameraStandsOnTheFloorThatIsFound) {
+  // A wall of 10 m on a slab, and the same on the ground: alike but for the ground around the slab.
+  const auto image = [&](const std::string& name, const std::string& more) {
+    std::ofstream(folder / "way.csv") << "stamp_s,x_m,y_m,heading_deg\n0,0,0,0\n";
+    const auto world = folder.write(name + ".world", ground_world(more));
+    run_well({"simulate", world, folder / name, "--trajectory", folder / "way.csv", "--kind",
+              "panorama", "--rows", "35", "--columns", "32"});
+    return read_image(fs::path(folder / name) / "view_00000.png");
+  };
+  const Image raised = image("raised", box_model("slab", "0 0 0.1 0 0 0", "20 20 0.2") +
+                                           box_model("wall", "4 0 0.7 0 0 0", "0.1 19 1"));
+  const Image level = image("level", box_model("slab", "0 0 -0.1 0 0 0", "20 20 0.2") +
+                                         box_model("wall", "4 0 0.5 0 0 0", "0.1 19 1"));
+  // The wall ahead: its upper edge at 5.7 degrees, its lower one at 8.5 degrees below the horizon.
+  double difference = 0.0;
+  for (int row = 0; row < 35; ++row) difference += std::abs(raised.at(16, row) - level.at(16, row));
+  EXPECT_LT(difference / 35.0, 12.0);
+  EXPECT_GT(std::abs(level.at(16, 12) - level.at(16, 19)), 20) << "the wall is not seen";
+}
+
+TEST_F(Simulate, WarningsOfAWorldComeBeforeItsFailure) {
+  const auto world =
+      folder.write("room.world", ground_world("<include><uri>model://not_here</uri></include>" +
+                                              box_model("table", "0 0 0.4 0 0 0", "3 4 0.8")));
+  const auto result = run_panonav(
+      with_small({"simulate", world, folder / "out", "--random", "1", "--robot-radius-m", "10"}));
+  EXPECT_EQ(result.exit_code, 2);
+  const auto warning =
+      result.err.find("warning: " + world.string() + ": include \"model://not_here");
+  const auto failure = result.err.find("the robot stands nowhere");
+  ASSERT_NE(warning, std::string::npos) << result.err;
+  ASSERT_NE(failure, std::string::npos) << result.err;
+  EXPECT_LT(warning, failure);
+  for (const char* option : {"--floor-height-m", "--cell-m", "--robot-radius-m"}) {
+    EXPECT_TRUE(contains(result.err.substr(failure), option)) << result.err;
+    EXPECT_TRUE(contains(run_panonav({"simulate", "--help-all"}).out, option)) << option;
+  }
+}
+
+TEST_F(Simulate, EquirectangularImagesAreMemorisedAndLocalised) {
+  const auto record = [&](const std::string& name, const std::vector<std::string>& more) {
+    run_well(with({"simulate", "office", folder / name, "--kind", "equirectangular", "--columns",
+                   "256", "--rays-per-axis", "1"},
+                  more));
+    return read_dataset(folder / name);
+  };
+  const Dataset places = record("places", {"--grid", "1"});
+  EXPECT_EQ(places.source.kind, PictureKind::equirectangular);
+  const Image image = read_image(places.entries[0].path);
+  EXPECT_EQ(image.size(), (ImageSize{256, 128}));
+  const std::string bytes = bytes_of(places.entries[0].path);
+  EXPECT_EQ(bytes.substr(0, 2), "\xFF\xD8");
+  for (const char* property :
+       {"GPano:ProjectionType=\"equirectangular\"", "GPano:FullPanoWidthPixels=\"256\"",
+        "GPano:FullPanoHeightPixels=\"128\"", "GPano:CroppedAreaImageWidthPixels=\"256\"",
+        "GPano:CroppedAreaImageHeightPixels=\"128\"", "GPano:CroppedAreaLeftPixels=\"0\"",
+        "GPano:CroppedAreaTopPixels=\"0\"", "GPano:PoseHeadingDegrees=\"90\""}) {
+    EXPECT_TRUE(contains(bytes, property)) << property;
+  }
+  EXPECT_FALSE(contains(bytes, "GPano:PosePitchDegrees"));
+  // The same view as a panorama of the band that is kept.
+  run_well({"simulate", "office", folder / "band", "--grid", "1", "--kind", "panorama", "--columns",
+            "256", "--rows", "50", "--rays-per-axis", "1"});
+  const Dataset band = read_dataset(folder / "band");
+  const Panorama of_sphere =
+      PanoramaReader(places.source, {.rows = 50}).read(places.entries[0].path);
+  const Panorama of_band = PanoramaReader(band.source, {}).read(band.entries[0].path);
+  ASSERT_EQ(of_sphere.values().size(), of_band.values().size());
+  double difference = 0.0;
+  for (std::size_t i = 0; i < of_band.values().size(); ++i)
+    difference += std::abs(of_sphere.values()[i] - of_band.values()[i]);
+  EXPECT_LT(difference / static_cast<double>(of_band.values().size()), 0.02);
+  run_well({"memorise", folder / "office.panonav", folder / "places"});
+  const Dataset queries = record("queries", {"--random", "5", "--seed", "3"});
+  int near = 0;
+  for (const auto& entry : queries.entries) {
+    const auto said = answer_of({"localise", folder / "office.panonav", entry.path, "--json"});
+    if (!said["known"].get<bool>()) continue;
+    const auto& position = said["position"];
+    const double error_m = std::hypot(position["x_m"].get<double>() - entry.pose->x_m,
+                                      position["y_m"].get<double>() - entry.pose->y_m);
+    if (error_m < 1.5) ++near;
+  }
+  EXPECT_GE(near, 4);
+  expect_refusal(
+      {"simulate", "office", folder / "odd", "--kind", "equirectangular", "--columns", "255"},
+      "columns is 255");
+  expect_refusal(
+      {"simulate", "office", folder / "odd", "--kind", "equirectangular", "--rows", "50"},
+      "--rows");
 }
 
 TEST_F(Simulate, FollowsATrajectory) {

@@ -20,6 +20,11 @@
 namespace panonav::testing {
 namespace {
 
+constexpr std::array<const char*, 7> group_titles{
+    "First steps:",     "Memory:",         "Localisation and tracking:",
+    "Maps and routes:", "Several robots:", "Tools:",
+    "Experiments:"};
+
 /// The first words of lines that are two blanks further in, such as verbs and flags.
 std::vector<std::string> rows_after(const std::string& text, const std::string& title) {
   std::vector<std::string> names;
@@ -37,7 +42,10 @@ std::vector<std::string> rows_after(const std::string& text, const std::string& 
 }
 
 std::vector<std::string> verbs() {
-  return rows_after(run_panonav({"--help"}).out, "Verbs:");
+  const std::string help = run_panonav({"--help"}).out;
+  std::vector<std::string> all;
+  for (const auto* title : group_titles) all = with(all, rows_after(help, title));
+  return all;
 }
 
 std::string help_of(const std::string& verb, const std::string& flag = "--help") {
@@ -90,6 +98,33 @@ TEST(Usage, VersionAndHelpGoToStandardOutput) {
   for (const auto& line : lines(help.out)) EXPECT_LE(line.size(), 80U) << line;
 }
 
+TEST(Usage, TheOverviewHasEachVerbInOneLineBelowItsGroup) {
+  const std::string help = run_panonav({"--help"}).out;
+  std::size_t at = 0;
+  for (const auto* title : group_titles) {
+    const std::size_t found = help.find("\n\n" + std::string(title) + "\n", at);
+    if (rows_after(help, title).empty()) continue;  // a build may leave out all verbs of a group
+    ASSERT_NE(found, std::string::npos) << title;
+    at = found;
+  }
+  EXPECT_EQ(rows_after(help, "Memory:").front(), "memorise");
+  EXPECT_EQ(rows_after(help, "Maps and routes:"),
+            (std::vector<std::string>{"map", "scale", "arrange", "route record", "route follow"}));
+  const auto all = verbs();
+  EXPECT_EQ(std::set<std::string>(all.begin(), all.end()).size(), all.size());
+  const std::string list = help.substr(0, help.find("panonav help VERB"));
+  for (const auto& line : lines(list)) {
+    EXPECT_FALSE(line.starts_with("   ")) << "a second line of a summary: " << line;
+  }
+  // Every verb that completion knows stands in a group.
+  const auto completed = words_of(run_panonav({"completion", "fish"}).out);
+  for (std::size_t i = 0; i + 1 < completed.size(); ++i) {
+    if (completed[i] != "__fish_use_subcommand" || completed[i + 1] != "-a") continue;
+    const std::string& word = completed.at(i + 2);
+    EXPECT_TRUE(contains(list, "  " + word + " ") || word.ends_with("ize")) << word;
+  }
+}
+
 TEST(Usage, WrongUseIsOneLineWithAHint) {
   expect_refusal({}, "a verb is missing; see panonav --help");
   expect_refusal({"frobnicate"}, "'frobnicate' is not a verb; see");
@@ -135,8 +170,15 @@ TEST(Usage, FilesOfOptionsProposeTheNearestNameAndOnlyThisVerbsSections) {
 TEST(Usage, SwappedArgumentsAreRecognised) {
   expect_refusal({"localise", "my image.jpg", "memory.panonav"},
                  "did you mean 'panonav localise memory.panonav 'my image.jpg''?");
-  expect_refusal({"memorise", "m.panonav", "folder"},
-                 "MEMORY is 'folder' and INPUT is 'm.panonav'");
+  for (const auto& [verb, input] : {std::pair("memorise", "INPUT"), {"map", "DATASET"}}) {
+    const auto line = refusal({verb, "folder", "m.panonav", "--kind", "panorama", "-q"});
+    EXPECT_TRUE(contains(line, "MEMORY is 'folder' and " + std::string(input) + " is 'm.panonav'"));
+    EXPECT_TRUE(contains(line, "did you mean 'panonav " + std::string(verb) +
+                                   " m.panonav folder --kind panorama -q'?"))
+        << line;
+  }
+  expect_refusal({"route", "record", "walk.mp4", "m.panonav"},
+                 "did you mean 'panonav route record m.panonav walk.mp4'?");
   expect_refusal({"forget", "a.png", "b.png", "m.panonav"}, "in the wrong order");
   // No memory stands in the place of another one.
   EXPECT_EQ(refusal({"serve", "a=postgresql://127.0.0.1:1/none", "no.panonav"})
@@ -328,6 +370,7 @@ TEST(Usage, ManualPagesNameEveryOptionAndFormatWithoutWarnings) {
   const std::string overview = bytes_of(folder / "man/panonav.1");
   EXPECT_EQ(run_panonav({"man"}).out, overview);
   for (const auto& verb : verbs()) EXPECT_TRUE(contains(overview, "\n\\fB" + verb + "\\fR\n"));
+  EXPECT_TRUE(contains(overview, ".SS \"Maps and routes\"\n.TP\n\\fBmap\\fR\n"));
   if (has_groff) {
     EXPECT_EQ(shell("groff -man -Tascii -ww -z '" + (folder / "man/panonav.1").string() + "'"), "");
   }
@@ -346,7 +389,7 @@ TEST(Usage, NextLinesHaveWordsAsAShellWantsThem) {
   const std::string start = "Next: panonav memorise ";
   ASSERT_EQ(said.back().find(start), 0U) << said.back();
   const std::string words = said.back().substr(start.size());
-  EXPECT_EQ(shell("set -- " + words + "; printf '%s\\n' \"$#\" \"$1\""), "2\n" + out + "\n");
+  EXPECT_EQ(shell("set -- " + words + "; printf '%s\\n' \"$#\" \"$2\""), "2\n" + out + "\n");
 }
 
 TEST(Usage, QuietLeavesTheResultAndVerboseAddsTheStages) {
@@ -355,7 +398,7 @@ TEST(Usage, QuietLeavesTheResultAndVerboseAddsTheStages) {
   EXPECT_EQ(quiet.exit_code, 0);
   EXPECT_TRUE(quiet.err.empty()) << quiet.err;
   EXPECT_EQ(lines(quiet.out).size(), 1U) << quiet.out;
-  EXPECT_TRUE(contains(quiet.out, "1 views of office"));
+  EXPECT_TRUE(contains(quiet.out, "1 view of office"));
   const auto usual = run_panonav(simulate_one(folder / "b"));
   EXPECT_TRUE(usual.err.empty()) << usual.err;
   const auto verbose = run_panonav(with(simulate_one(folder / "c"), {"-v"}));

@@ -24,7 +24,7 @@ class Views : public InTemporaryFolder {
     std::string toml = bytes_of(folder / "grid" / "dataset.toml");
     toml.replace(toml.find("= 0.5\n"), 5, "= " + to_text(picture_forward_column(96)));
     write_file(folder / "grid" / "dataset.toml", std::string_view(toml));
-    run_well({"memorise", folder / "grid", memory});
+    run_well({"memorise", memory, folder / "grid"});
   }
   /// The same pictures without positions and thumbnails.
   fs::path bare() const {
@@ -34,7 +34,7 @@ class Views : public InTemporaryFolder {
       fs::copy_file(folder / "grid" / view_name(i), run / view_name(i));
     }
     const fs::path file = folder / "bare.panonav";
-    run_well({"memorise", run, file, "--kind", "panorama", "--elevation-deg", "-20", "20",
+    run_well({"memorise", file, run, "--kind", "panorama", "--elevation-deg", "-20", "20",
               "--no-thumbnails"});
     return file;
   }
@@ -65,9 +65,24 @@ TEST_F(Views, ListShowsWhatTheFileKnows) {
 }
 
 TEST_F(Views, ListOfAMemoryWithoutPositionsHasNoEmptyColumns) {
-  const auto table = lines(run_panonav({"list", bare()}).out);
+  const fs::path one = folder / "one.panonav";
+  run_well({"memorise", one, folder / "grid" / view_name(1), "--kind", "panorama",
+            "--elevation-deg", "-20", "20", "--no-thumbnails"});
+  const auto table = lines(run_panonav({"list", one}).out);
   EXPECT_EQ(table.front(), "id  name");
-  EXPECT_EQ(table[2], " 2  view_001.png");
+  EXPECT_EQ(table[1], " 1  view_001.png");
+}
+
+TEST_F(Views, ListOfAMapOfImagesHasNoMetres) {
+  const fs::path memory_of_images = bare();
+  const auto table = lines(run_panonav({"list", memory_of_images}).out);
+  EXPECT_TRUE(contains(table.front(), "x [view steps]")) << table.front();
+  EXPECT_FALSE(contains(table.front(), "[m]"));
+  const json said = answer_of({"list", memory_of_images, "--json"});
+  EXPECT_TRUE(said["views"][0]["pose"].contains("x_steps"));
+  EXPECT_FALSE(said["views"][0]["pose"].contains("x_m"));
+  EXPECT_EQ(lines(run_panonav({"list", memory_of_images, "--csv"}).out).front(),
+            "id,name,x_steps,y_steps,heading_deg,stamp_s,links,component,thumbnail");
 }
 
 TEST_F(Views, ListTakesNamesAndPlaces) {
@@ -86,7 +101,7 @@ TEST_F(Views, ListNamesMapsRoutesAndComponents) {
   std::vector<Pose2> poses;
   for (int i = 0; i < 12; ++i) poses.push_back({0.1 * i, 0.0, 0.0});
   write_dataset(drive, world, poses);
-  run_well({"map", drive, folder / "map.panonav"});
+  run_well({"map", folder / "map.panonav", drive});
   const json said = answer_of({"list", folder / "map.panonav", "--json"});
   EXPECT_EQ(said["maps"], json::parse(R"(["map"])"));
   EXPECT_EQ(said["views"][3]["connected_component"], 0);
@@ -144,15 +159,38 @@ TEST_F(Views, GalleryIsOnePageWithAllThumbnails) {
   }
   EXPECT_EQ(pictures, 16U);
   for (std::size_t i = 0; i < 16; ++i) EXPECT_TRUE(contains(page, ": " + view_name(i) + ", x "));
-  // Squares are listed by place from the upper left, each with its views.
+  // Squares are listed with their views.
   EXPECT_LT(page.find("x 0 to 2 m, y 0 to 2 m (16 views)"), page.find(view_name(0)));
 
-  run_well({"gallery", memory, "-o", out, "--near", "0,0,0.1"});
+  const auto replaced = run_panonav({"gallery", memory, "-o", out, "--near", "0,0,0.1"});
+  EXPECT_EQ(replaced.exit_code, 0);
+  EXPECT_TRUE(contains(replaced.err, "gallery.html: replaced the file that was there"));
   EXPECT_TRUE(contains(bytes_of(out / "gallery.html"), "(1 view)"));
   expect_refusal({"gallery", memory, "-o", folder / "grid"}, "not made by panonav");
   expect_refusal({"gallery", bare(), "-o", folder / "none"},
                  "contains no thumbnails of these 16 views; to get them, memorise");
   EXPECT_FALSE(fs::exists(folder / "none"));
+}
+
+TEST_F(Views, GalleryListsThePartsOfAMapByNumber) {
+  const fs::path walk = folder / "parts";
+  fs::create_directory(walk);
+  constexpr std::size_t images = 9;  // of each part
+  for (std::size_t part = 0; part < 11; ++part) {
+    const ToyWorld place = landmark_world(200 + static_cast<int>(part));
+    for (std::size_t i = 0; i < images; ++i) {
+      write_picture(walk / view_name(part * images + i), place,
+                    {0.1 * static_cast<double>(i), 0.0, 0.0});
+    }
+  }
+  const std::string file = folder / "parts.panonav";
+  run_well({"memorise", file, walk, "--kind", "panorama", "--elevation-deg", "-20", "20"});
+  run_well({"gallery", file, "-o", folder / "parts_gallery"});
+  const std::string page = bytes_of(folder / "parts_gallery" / "gallery.html");
+  const std::size_t second = page.find("part 2 of the map");
+  const std::size_t tenth = page.find("part 10 of the map");
+  ASSERT_NE(tenth, std::string::npos);
+  EXPECT_LT(second, tenth);
 }
 
 TEST_F(Views, AThumbnailThatIsNoPictureReachesNoPage) {
@@ -176,7 +214,7 @@ TEST_F(Views, AThumbnailThatIsNoPictureReachesNoPage) {
   EXPECT_EQ(said["views"], 17);
   EXPECT_EQ(said["images"], 16);
   EXPECT_TRUE(contains(run_panonav({"export", memory, "-o", folder / "other"}).out,
-                       "1 views without a thumbnail are not in the data set."));
+                       "1 view without a thumbnail left out of the data set."));
 }
 
 TEST_F(Views, ExportMemorisedAgainIsTheSameMemory) {
@@ -186,7 +224,7 @@ TEST_F(Views, ExportMemorisedAgainIsTheSameMemory) {
   EXPECT_EQ(said["views"], 16);
   EXPECT_EQ(said["images"], 16);
   EXPECT_EQ(said["enlarged"], false);
-  const std::vector<std::string> back{"memorise", out, again, "--config", out / "memorise.toml",
+  const std::vector<std::string> back{"memorise", again, out, "--config", out / "memorise.toml",
                                       "--json"};
   EXPECT_EQ(answer_of(back)["appended"], 16);
   EXPECT_EQ(answer_of(back)["known_before"], 16) << "going on";
@@ -207,13 +245,13 @@ TEST_F(Views, ExportOfLargePanoramasFindsTheSameViews) {
   for (std::size_t i = 0; i < 16; ++i) {
     write_picture(run / view_name(i), world, grid_poses(4)[i], 512, 40);
   }
-  run_well({"memorise", run, folder / "wide.panonav", "--remove-mean", "false"});
+  run_well({"memorise", folder / "wide.panonav", run, "--remove-mean", "false"});
   const fs::path out = folder / "out";
   const json said = answer_of({"export", folder / "wide.panonav", "-o", out, "--json"});
   EXPECT_EQ(said["enlarged"], true);
   EXPECT_EQ(read_image_size(out / view_name(0)), read_image_size(run / view_name(0)));
   const fs::path again = folder / "again.panonav";
-  run_well({"memorise", out, again, "--config", out / "memorise.toml"});
+  run_well({"memorise", again, out, "--config", out / "memorise.toml"});
   const json before = answer_of({"info", folder / "wide.panonav", "--json"});
   const json after = answer_of({"info", again, "--json"});
   for (const char* key : {"rows", "components", "panorama_columns", "preprocessing"}) {
@@ -268,7 +306,7 @@ TEST_F(Views, ARenamedRouteIsFollowedAndComesBack) {
   std::vector<Pose2> poses;
   for (int i = 0; i < 30; ++i) poses.push_back({0.1 * i, 0.0, 0.0});
   write_dataset(folder / "drive", world, poses);
-  run_well({"route", "record", folder / "drive", memory, "--half-band-rad", "0.1"});
+  run_well({"route", "record", memory, folder / "drive", "--half-band-rad", "0.1"});
   const auto follow = [&](const std::string& name) {
     return answers_of({"route", "follow", memory, folder / "drive", "--name", name, "--json"});
   };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,15 +20,44 @@ TEST(ToReadableLine, KeepsUtf8AndReplacesTheRest) {
   EXPECT_EQ(to_readable_line(fine), fine);
   EXPECT_EQ(to_readable_line(""), "");
   EXPECT_EQ(to_readable_line("a\nb\tc\r\x7F" + std::string(1, '\0') + "\xC2\x85."), "a b c    .");
-  const std::string replaced = "\xEF\xBF\xBD";
-  EXPECT_EQ(to_readable_line("a\xFFz"), "a" + replaced + "z");
-  EXPECT_EQ(to_readable_line("\x80"), replaced);
-  EXPECT_EQ(to_readable_line("\xC3"), replaced) << "cut short";
-  EXPECT_EQ(to_readable_line("\xE2\x82z"), replaced + replaced + "z");
-  EXPECT_EQ(to_readable_line("\xC0\xAF"), replaced + replaced) << "a longer form of '/'";
-  EXPECT_EQ(to_readable_line("\xE0\x80\xAF"), replaced + replaced + replaced);
-  EXPECT_EQ(to_readable_line("\xED\xA0\x80"), replaced + replaced + replaced) << "half of a pair";
-  EXPECT_EQ(to_readable_line("\xF4\x90\x80\x80"), replaced + replaced + replaced + replaced);
+  EXPECT_EQ(to_readable_line("a\xFFz"), "a%FFz");
+  EXPECT_EQ(to_readable_line("\x80"), "%80");
+  EXPECT_EQ(to_readable_line("\xC3"), "%C3") << "cut short";
+  EXPECT_EQ(to_readable_line("\xE2\x82z"), "%E2%82z");
+  EXPECT_EQ(to_readable_line("\xC0\xAF"), "%C0%AF") << "a longer form of '/'";
+  EXPECT_EQ(to_readable_line("\xE0\x80\xAF"), "%E0%80%AF");
+  EXPECT_EQ(to_readable_line("\xED\xA0\x80"), "%ED%A0%80") << "half of a pair";
+  EXPECT_EQ(to_readable_line("\xF4\x90\x80\x80"), "%F4%90%80%80");
+}
+
+TEST(EscapeName, IsReversibleAndKeepsNamesApart) {
+  EXPECT_EQ(escape_name("K\xFC"
+                        "che.png"),
+            "K%FCche.png");
+  EXPECT_EQ(escape_name("K%FCche.png"), "K%25FCche.png") << "a file of that name";
+  for (const char* same : {"",
+                           "K\xC3\xBC"
+                           "che.png",
+                           "50%.png", "a%20b", "%fc", "%7F", "%2", "%"}) {
+    EXPECT_EQ(escape_name(same), same);
+  }
+  // All names of up to five pieces that could be confused.
+  const std::vector<std::string> pieces{"%", "25", "FC", "F", "C", "\xFC", "\xC3", "\xBC", "a"};
+  std::set<std::string> escaped;
+  std::vector<std::string> names{""};
+  for (std::size_t i = 0, end = 0; i < 5; ++i) {
+    const std::size_t begin = end;
+    end = names.size();
+    for (std::size_t j = begin; j < end; ++j) {
+      for (const std::string& piece : pieces) names.push_back(names[j] + piece);
+    }
+  }
+  for (const std::string& name : std::set<std::string>(names.begin(), names.end())) {
+    const std::string shown = escape_name(name);
+    ASSERT_TRUE(is_utf8(shown));
+    ASSERT_EQ(unescape_name(shown), name);
+    ASSERT_TRUE(escaped.insert(shown).second) << shown;
+  }
 }
 
 TEST(DecodePercent, ReadsEscapesAndRefusesOthers) {
@@ -91,6 +121,12 @@ TEST(NumberText, IsThatOfTheCLocale) {
   EXPECT_EQ(whole, 7);
   EXPECT_EQ(split_words(" a\tb\n\nc "), (std::vector<std::string>{"a", "b", "c"}));
   EXPECT_TRUE(split_words(" \n").empty());
+}
+
+TEST(FormatCount, HasTheNounInItsNumber) {
+  EXPECT_EQ(format_count(0U, "image"), "0 images");
+  EXPECT_EQ(format_count(1U, "image"), "1 image");
+  EXPECT_EQ(format_count(-2, "view step"), "-2 view steps");
 }
 
 TEST(ShortenMiddle, LeavesOutTheMiddleAndCutsNoCharacter) {

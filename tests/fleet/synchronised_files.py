@@ -20,7 +20,7 @@ def synchronised(server, folder):
     """The verb: what it says, who may what, a server that is older than before, rows that nobody wrote."""
     address = server.memory("fleet", more="&robot=one")
     one, two = folder / "one.panonav", folder / "two.panonav"
-    run(PANONAV, "memorise", folder / "grid", one)
+    run(PANONAV, "memorise", one, folder / "grid")
     views = json.loads(run(PANONAV, "list", one, "--json"))["views"]
 
     def sync(file, address, *more):
@@ -54,7 +54,7 @@ def synchronised(server, folder):
     reads, adds, curates = (server.memory("fleet", user) for user in ("reads", "adds", "curates"))
     run(PANONAV, "copy", two, folder / "three.panonav")
     three = folder / "three.panonav"
-    run(PANONAV, "memorise", recorded(folder / "third", "of_three_", 20), three)
+    run(PANONAV, "memorise", three, recorded(folder / "third", "of_three_", 20))
     run(PANONAV, "forget", three, "view_00001.png")
     added = len(names(three)) - len(views) + 1
     assert added == 20
@@ -93,7 +93,7 @@ def synchronised(server, folder):
     backup.mkdir()
     tables = ("memories", "views", "thumbnails", "features", "links", "uploads")
     server.sql("; ".join(f"CREATE TABLE public.{table} AS SELECT * FROM panonav.{table}" for table in tables))
-    run(PANONAV, "memorise", recorded(folder / "more", "more_", 7), one)
+    run(PANONAV, "memorise", one, recorded(folder / "more", "more_", 7))
     assert sync(one, address)["uploaded"] == 7
     assert sync(two, address)["downloaded"] == 7
     expected = names(two)
@@ -101,7 +101,7 @@ def synchronised(server, folder):
     server.sql("".join(f"DELETE FROM panonav.{table} WHERE memory = {identity}; INSERT INTO panonav.{table} SELECT * FROM "
                        f"public.{table} WHERE memory = {identity};" for table in tables[1:]) +
                f"UPDATE panonav.memories m SET last_view = b.last_view FROM public.memories b WHERE b.id = m.id")
-    run(PANONAV, "memorise", folder / "grid", folder / "four.panonav")
+    run(PANONAV, "memorise", folder / "four.panonav", folder / "grid")
     # A file that knows nothing of it, with the view that was removed and the one that was renamed.
     assert sync(folder / "four.panonav", address)["uploaded"] == 2
     expected = sorted(expected + ["view_00001.png", "view_00002.png"])
@@ -117,7 +117,7 @@ def synchronised(server, folder):
     server.sql("".join(f"DELETE FROM panonav.{table} WHERE memory = {identity}; INSERT INTO panonav.{table} SELECT * FROM "
                        f"public.{table} WHERE memory = {identity};" for table in tables[1:]) +
                f"UPDATE panonav.memories m SET last_view = b.last_view FROM public.memories b WHERE b.id = m.id")
-    run(PANONAV, "memorise", recorded(folder / "others", "other_", 30), server.memory("fleet"))
+    run(PANONAV, "memorise", server.memory("fleet"), recorded(folder / "others", "other_", 30))
     back = sync(two, address)
     assert back["restored"] and back["uploaded"] == 9 and back["downloaded"] == 30, back
     sync(one, address)

@@ -181,5 +181,153 @@ TEST(ShapeDifference, RefusesShapesWithoutExtent) {
   EXPECT_THROW((void)shape_difference(Points{{0, 0}, {1, 0}}, Points{{0, 0}}), ContractError);
 }
 
+using Points3 = std::vector<Point3>;
+
+Points3 random_points3(Random& random, std::size_t count) {
+  Points3 points(count);
+  for (auto& p : points) {
+    p = {random.uniform(-4.0, 4.0), random.uniform(-2.0, 2.0), random.uniform(-3.0, 3.0)};
+  }
+  return points;
+}
+
+Rotation3 random_rotation(Random& random) {
+  Rotation3 q{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
+  const double length = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+  return {q.w / length, q.x / length, q.y / length, q.z / length};
+}
+
+Points3 transformed(const Alignment3& map, const Points3& points) {
+  Points3 result;
+  for (const Point3& p : points) result.push_back(map.apply(p));
+  return result;
+}
+
+double rms(const Points3& a, const Points3& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += std::pow(distance(a[i], b[i]), 2);
+  return std::sqrt(sum / static_cast<double>(a.size()));
+}
+
+TEST(Rotation3, ComposesAndInvertsAsMatricesDo) {
+  Random random(3);
+  for (int round = 0; round < 50; ++round) {
+    const Rotation3 a = random_rotation(random);
+    const Rotation3 b = random_rotation(random);
+    const Point3 p{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
+    EXPECT_NEAR(distance((a * b) * p, a * (b * p)), 0.0, 1e-12);
+    EXPECT_NEAR(distance(inverse(a) * (a * p), p), 0.0, 1e-12);
+    const Point3 x = a * Point3{1, 0, 0};
+    const Point3 y = a * Point3{0, 1, 0};
+    const Point3 z = a * Point3{0, 0, 1};
+    const auto same =
+        Rotation3::from_matrix({x.x_m, y.x_m, z.x_m, x.y_m, y.y_m, z.y_m, x.z_m, y.z_m, z.z_m});
+    EXPECT_NEAR((inverse(a) * same).angle_rad(), 0.0, 1e-7);
+    EXPECT_NEAR(a.yaw_rad(), std::atan2(x.y_m, x.x_m), 1e-12);
+  }
+  EXPECT_NEAR(Rotation3::from_yaw(-2.5).angle_rad(), 2.5, 1e-12);
+  EXPECT_NEAR(Rotation3::from_yaw(-2.5).yaw_rad(), -2.5, 1e-12);
+}
+
+TEST(Alignment3, FindsEverySimilarityOfSpace) {
+  Random random(11);
+  for (int round = 0; round < 100; ++round) {
+    const Points3 from = random_points3(random, 8);
+    const Alignment3 map{
+        random.uniform(0.2, 5.0), random_rotation(random), {4, -7, 2}, false, true};
+    const Points3 to = transformed(map, from);
+    const Alignment3 found = align_in_space(from, to, {.allow_scale = true});
+    EXPECT_TRUE(found.is_unique);
+    EXPECT_NEAR(found.scale, map.scale, 1e-9);
+    EXPECT_LT(rms(transformed(found, from), to), 1e-9);
+    EXPECT_NEAR((inverse(found.rotation) * map.rotation).angle_rad(), 0.0, 1e-7);
+    EXPECT_GT(rms(transformed(align_in_space(from, to), from), to),
+              1e-3);  // the scale is not allowed
+  }
+}
+
+TEST(Alignment3, NoSmallChangeIsBetter) {
+  Random random(12);
+  for (int round = 0; round < 40; ++round) {
+    const Points3 from = random_points3(random, 6);
+    const Points3 to = random_points3(random, 6);
+    const bool allow_scale = round % 2 == 0;
+    const Alignment3 found = align_in_space(from, to, {.allow_scale = allow_scale});
+    const double found_rms = rms(transformed(found, from), to);
+    for (int change = 0; change < 30; ++change) {
+      Alignment3 other = found;
+      const Rotation3 small{1.0, random.normal(0, 1e-3), random.normal(0, 1e-3),
+                            random.normal(0, 1e-3)};
+      const double length =
+          std::sqrt(1.0 + small.x * small.x + small.y * small.y + small.z * small.z);
+      other.rotation =
+          Rotation3{small.w / length, small.x / length, small.y / length, small.z / length} *
+          found.rotation;
+      other.translation.x_m += random.normal(0, 1e-3);
+      if (allow_scale) other.scale *= 1.0 + random.normal(0, 1e-3);
+      EXPECT_GE(rms(transformed(other, from), to), found_rms - 1e-12);
+    }
+  }
+}
+
+TEST(Alignment3, MirrorsOnlyWhenAllowed) {
+  Random random(13);
+  const Points3 from = random_points3(random, 9);
+  const Alignment3 map{1.0, random_rotation(random), {1, 2, 3}, true, true};
+  const Points3 to = transformed(map, from);
+  const Alignment3 proper = align_in_space(from, to);
+  EXPECT_FALSE(proper.reflected);
+  EXPECT_GT(rms(transformed(proper, from), to), 0.1);
+  const Alignment3 mirrored = align_in_space(from, to, {.allow_reflection = true});
+  EXPECT_TRUE(mirrored.reflected);
+  EXPECT_LT(rms(transformed(mirrored, from), to), 1e-9);
+  // A mirrored pose keeps its axes x and z and reverses y.
+  const Pose3 pose{{0.5, -1.0, 2.0}, random_rotation(random)};
+  const Pose3 seen = mirrored.apply(pose);
+  for (const auto& [axis, sign] : {std::pair{Point3{1, 0, 0}, 1.0}, {Point3{0, 1, 0}, -1.0}}) {
+    const Point3 tip = pose.rotation * axis;
+    const Point3 end = mirrored.apply(Point3{
+        pose.position.x_m + tip.x_m, pose.position.y_m + tip.y_m, pose.position.z_m + tip.z_m});
+    const Point3 turned = seen.rotation * axis;
+    EXPECT_NEAR(end.x_m - seen.position.x_m, sign * turned.x_m, 1e-9);
+    EXPECT_NEAR(end.z_m - seen.position.z_m, sign * turned.z_m, 1e-9);
+  }
+}
+
+TEST(Alignment3, PointsOnALineGetTheSmallestRotation) {
+  Random random(14);
+  for (int round = 0; round < 20; ++round) {
+    const Rotation3 q = random_rotation(random);
+    Points3 from;
+    for (int i = 0; i < 7; ++i) from.push_back({0.3 * i, 0.2 * i, -0.7 * i});
+    const Alignment3 map{1.0, q, {5, 6, -7}, false, true};
+    const Points3 to = transformed(map, from);
+    const Alignment3 found = align_in_space(from, to);
+    EXPECT_FALSE(found.is_unique);
+    EXPECT_LT(rms(transformed(found, from), to), 1e-9);
+    EXPECT_LE(found.rotation.angle_rad(), q.angle_rad() + 1e-9);
+  }
+  const Points3 still(4, Point3{1, 2, 3});
+  const Alignment3 moved_only = align_in_space(still, Points3(4, Point3{4, 4, 4}), {true, true});
+  EXPECT_EQ(moved_only.rotation, Rotation3{});
+  EXPECT_EQ(moved_only.scale, 1.0);
+  EXPECT_EQ(moved_only.apply(Point3{1, 2, 3}), (Point3{4, 4, 4}));
+  EXPECT_THROW((void)align_in_space(Points3{}, Points3{}), ContractError);
+  EXPECT_THROW((void)align_in_plane(still, Points3(3)), ContractError);
+}
+
+TEST(Alignment3, InThePlaneNothingIsTurnedOver) {
+  Random random(15);
+  Points3 from;
+  for (const Point2& p : random_points(random, 9)) from.push_back({p.x_m, p.y_m, 0.4});
+  const Alignment3 map{2.0, Rotation3::from_yaw(0.8), {1, 2, 3}, false, true};
+  const Alignment3 same = align_in_plane(from, transformed(map, from), {.allow_scale = true});
+  EXPECT_LT(rms(transformed(same, from), transformed(map, from)), 1e-9);
+  Points3 mirrored = from;
+  for (Point3& p : mirrored) p.y_m = -p.y_m;
+  EXPECT_LT(rms(transformed(align_in_space(mirrored, from), mirrored), from), 1e-9);
+  EXPECT_GT(rms(transformed(align_in_plane(mirrored, from), mirrored), from), 0.1);
+}
+
 }  // namespace
 }  // namespace panonav

@@ -120,6 +120,30 @@ TEST_F(AnyBytes, CsvTrajectory) {
                          [](const auto& path) { EXPECT_GE(read_trajectory(path).size(), 1U); });
 }
 
+TEST_F(AnyBytes, TrajectoriesOfOtherFormats) {
+  for (const char* text :
+       {"1 0 0 0 0 1 0 0 0 0 1 0\n0 0 1 4 -1 0 0 5 0 -1 0 6\n",
+        "#timestamp, p_RS_R_x [m]\n1403636580838555648,4.6,-1.7,0.7,0.6,-0.8,0,0,1,2\n"}) {
+    expect_values_or_lines("t.txt", text, [](const auto& path) {
+      EXPECT_GE(read_trajectory_file(path).poses.size(), 1U);
+    });
+  }
+}
+
+TEST_F(AnyBytes, CalibrationsOfOtherPrograms) {
+  for (const char* text :
+       {"cam0:\n  camera_model: omni\n  intrinsics: [1.3, 70, 70, 32, 24]\n"
+        "  distortion_model: radtan\n  distortion_coeffs: [-0.2, 0.1, 0, 0]\n"
+        "  resolution: [64, 48]\n",
+        "%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\nK: !!opencv-matrix\n   rows: 3\n"
+        "   data: [ 20., 0., 32., 0.,\n     20., 24., 0., 0., 1. ]\nD: !!opencv-matrix\n"
+        "   data: [ 0.1, 0., 0., 0. ]\n",
+        "#polynomial\n3 -30 0 1e-2\n2 4 5\n24 32\n1 0 0\n48 64\n"}) {
+    expect_values_or_lines("c.yaml", text,
+                           [](const auto& path) { validate(read_camera(path).camera); });
+  }
+}
+
 TEST_F(AnyBytes, OptionFile) {
   expect_values_or_lines("o.toml", "[search]\ntop = 3\n[other]\nname = \"x\"\nlist = [1, [2, 3]]\n",
                          [](const auto& path) { (void)OptionFile(path).has("search", "top"); });

@@ -6,7 +6,6 @@
 #include <fstream>
 
 #include "panonav/core/error.hpp"
-#include "panonav/io/trajectory_file.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/test_cameras.hpp"
 
@@ -39,17 +38,24 @@ TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
        {CameraModel{HyperboloidalModel{}}, CameraModel{PolynomialModel{{-180.0, 0.0, 0.002}}},
         CameraModel{UnifiedModel{0.9, 280.0}},
         CameraModel{UnifiedModel{0.9, 280.0, UnifiedModel::Axis::up}},
-        CameraModel{EquiangularModel{-1.0, 0.3}}}) {
-    const CameraFile file{mirror_camera(model), std::nullopt};
+        CameraModel{EquiangularModel{-1.0, 0.3}}, CameraModel{FisheyeModel{}},
+        CameraModel{FisheyeModel{150.0, 0.01, -0.002, 1e-3, -1e-4, 1.6, UnifiedModel::Axis::up}}}) {
+    CameraFile file{mirror_camera(model), std::nullopt};
+    file.camera.affine = {1.001, -0.0002, 0.0003};
+    if (std::holds_alternative<UnifiedModel>(model)) {
+      file.camera.distortion = {-0.01, 0.002, 1e-4, -2e-4, 3e-5};
+    }
     write_camera(path, file);
     const CameraFile back = read_camera(path);
     EXPECT_EQ(back.camera.model, model);
+    EXPECT_EQ(back.camera.affine, file.camera.affine);
+    EXPECT_EQ(back.camera.distortion, file.camera.distortion);
     EXPECT_EQ(back.camera.centre, file.camera.centre);
     EXPECT_NEAR(back.camera.forward_angle_rad, 0.3, 1e-12);
     EXPECT_EQ(back.camera.direction, file.camera.direction);
     ++models;
   }
-  EXPECT_EQ(models, 5);
+  EXPECT_EQ(models, 7);
   const CameraFile dual{dual_fisheye_camera(), std::nullopt};
   write_camera(path, dual);
   EXPECT_EQ(read_camera(path).camera, dual.camera);
@@ -96,40 +102,6 @@ TEST_F(CameraFiles, FaultsNameFieldValueAndRange) {
   EXPECT_TRUE(contains(with("lens0_centre_u_px", "lens0_centre_u_px = 500"), "0 .. 320"));
   EXPECT_TRUE(contains(with("lens1_roll_rad", ""), "lens1_roll_rad is missing"));
   EXPECT_TRUE(contains(with("baseline_m", "rim_radius_px = 3\nbaseline_m = 0"), "rim_radius_px"));
-}
-
-using TrajectoryFile = InTemporaryFolder;
-
-TEST_F(TrajectoryFile, TumAndCsvReadBackTheSame) {
-  std::vector<StampedPose> trajectory;
-  for (int i = 0; i < 20; ++i) {
-    trajectory.push_back({0.1 * i, {0.3 * i, -0.01 * i * i, wrap_angle(0.5 * i)}});
-  }
-  for (const char* name : {"trajectory.tum", "trajectory.csv"}) {
-    const fs::path path = folder / name;
-    write_trajectory(path, trajectory);
-    const auto back = read_trajectory(path);
-    ASSERT_EQ(back.size(), trajectory.size());
-    for (std::size_t i = 0; i < back.size(); ++i) {
-      EXPECT_DOUBLE_EQ(back[i].stamp_s, trajectory[i].stamp_s);
-      EXPECT_EQ(back[i].pose.position(), trajectory[i].pose.position());
-      EXPECT_NEAR(angle_difference(back[i].pose.heading_rad, trajectory[i].pose.heading_rad), 0.0,
-                  1e-12);
-    }
-  }
-}
-
-TEST_F(TrajectoryFile, FaultsNameTheLine) {
-  const fs::path path = folder / "trajectory.tum";
-  const auto message = [&](const std::string& text) -> std::string {
-    std::ofstream(path) << text;
-    return message_of<FileError>([&] { (void)read_trajectory(path); });
-  };
-  EXPECT_TRUE(contains(message("0 1 2 0 0 0 0 1\n1 2 3\n"), "line 2"));
-  EXPECT_TRUE(contains(message("0 1 nan 0 0 0 0 1\n"), "line 1"));
-  EXPECT_TRUE(contains(message("0 1 2 0 0 0 0 0.5\n"), "quaternion"));
-  EXPECT_TRUE(contains(message("1 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n"), "stamp"));
-  EXPECT_TRUE(contains(message("# nothing\n"), "no pose"));
 }
 
 }  // namespace

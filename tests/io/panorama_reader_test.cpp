@@ -59,8 +59,8 @@ TEST(PanoramaReader, LevelsTheBandOfASphere) {
   source.kind = PictureKind::equirectangular;
   source.layout.elevations = ElevationBand{-std::numbers::pi / 2.0, std::numbers::pi / 2.0};
   for (const bool cut : {true, false}) {
-    if (cut) source.layout.kept_elevations = ElevationBand{radians(-30.0), radians(40.0)};
-    if (!cut) source.layout.kept_elevations.reset();
+    source.layout.kept_elevations =
+        cut ? ElevationBand{radians(-30.0), radians(40.0)} : *source.layout.elevations;
     const PanoramaReader reader(source, {cut ? 60 : 0, 256});
     const Image level = make_image({});
     const Image tilted = make_image(leaning);
@@ -68,6 +68,26 @@ TEST(PanoramaReader, LevelsTheBandOfASphere) {
     expect_like(reader.convert(tilted.view(), leaning), truth, 0.01);
     EXPECT_EQ(reader.convert(level.view(), {}), truth);
   }
+}
+
+// The floor and the ceiling of a sphere are left out unless they are part of a stated band.
+TEST(PanoramaReader, TheBandAroundTheHorizonIsTheDefaultOfASphere) {
+  Image picture(360, 180, 1);
+  for (int v = 0; v < 180; ++v) {
+    for (int u = 0; u < 360; ++u) picture.at(u, v) = grey(v >= 50 && v < 120 ? u / 800.0 : 1.0);
+  }
+  PictureSource source{.kind = PictureKind::equirectangular};
+  const PanoramaReader reader(source, {});
+  const Panorama band = reader.convert(picture.view());
+  EXPECT_EQ(band.elevations(), default_equirectangular_band);
+  EXPECT_EQ(band.rows(), 70);
+  EXPECT_LT(*std::ranges::max_element(band.values()), 0.6F);
+  source.layout.elevations = ElevationBand{-std::numbers::pi / 2.0, std::numbers::pi / 2.0};
+  source.layout.kept_elevations = default_equirectangular_band;
+  EXPECT_EQ(reader.source(), source);
+  EXPECT_EQ(PanoramaReader(source, {}).convert(picture.view()), band);
+  source.layout.kept_elevations = source.layout.elevations;
+  EXPECT_EQ(PanoramaReader(source, {}).convert(picture.view()).rows(), 180);
 }
 
 TEST(PanoramaReader, LevelsMirrorPicturesBeyondTheBandThatIsKept) {

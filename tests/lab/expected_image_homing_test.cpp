@@ -138,7 +138,7 @@ TEST(ExpectedImageHoming, IdenticalViewsAreHomeAndFlatOnesTellNothing) {
   const HomeVector here = homing.home_vector(view, view);
   EXPECT_EQ(here.length(), 0.0);
   EXPECT_EQ(here.heading_rad, 0.0);
-  EXPECT_EQ(here.confidence, 0.0);
+  EXPECT_FALSE(here.has_direction());
   EXPECT_NEAR(here.residual, 0.0, 1e-5);
   EXPECT_NEAR(here.correlation, 1.0, 1e-5);
   const std::vector<float> flat(columns, 0.4F);

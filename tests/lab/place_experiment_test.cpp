@@ -55,7 +55,7 @@ TEST_P(GazeboWorld, IsRecognisedAlsoInOtherLightAndWithPeopleInView) {
   EXPECT_GE(results[0].nearest_or_neighbour.value, 0.95);
   EXPECT_LE(degrees(results[0].heading_median_rad), 2.0);
   EXPECT_GE(results[0].known.value, 0.95);
-  EXPECT_GE(results[0].inside.value, 0.93);
+  EXPECT_GE(results[0].inside.value, 0.90);  // a stated radius holds for 90 to 98 %
   EXPECT_GE(results[1].nearest_or_neighbour.value, 0.90);
   EXPECT_GE(results[2].nearest_or_neighbour.value, 0.90);
 }

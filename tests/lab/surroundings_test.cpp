@@ -135,6 +135,30 @@ TEST(SceneLayers, AnOfficeHasFurnitureAndWallsAllAround) {
   EXPECT_GE(around_m, 2.0 * (width + depth));
 }
 
+TEST(SceneLayers, NoFurnitureReachesThroughAnOuterWall) {
+  for (const auto* name : {"office", "loop"}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      const Drawn drawn(simulation::make_scene(name, {.seed = seed}));
+      Point2 low{1e9, 1e9};
+      Point2 high{-1e9, -1e9};
+      for (const auto& line : drawn.walls) {
+        for (const Point2& p : line) {
+          low = {std::min(low.x_m, p.x_m), std::min(low.y_m, p.y_m)};
+          high = {std::max(high.x_m, p.x_m), std::max(high.y_m, p.y_m)};
+        }
+      }
+      EXPECT_GE(drawn.things.size(), 5U);
+      for (const auto& outline : drawn.things) {
+        for (const Point2& p : outline) {
+          EXPECT_TRUE(p.x_m > low.x_m - 1e-6 && p.x_m < high.x_m + 1e-6 && p.y_m > low.y_m - 1e-6 &&
+                      p.y_m < high.y_m + 1e-6)
+              << name << ' ' << seed << ": " << p.x_m << ' ' << p.y_m;
+        }
+      }
+    }
+  }
+}
+
 TEST(SceneLayers, AScreenIsALineAsItStands) {
   simulation::Scene scene{.floor_low = {-2.0, -2.0}, .floor_high = {2.0, 2.0}};
   const Pose2 across{0.5, 0.25, 0.6};

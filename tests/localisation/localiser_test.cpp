@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
 #include "support/remembered_worlds.hpp"
+#include "support/skips.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -44,6 +45,62 @@ TEST(Localiser, FindsAMemorisedViewItsPositionAndTheTurn) {
     // The turn lies between two steps of the columns.
     EXPECT_LT(distance(turned.position->position(), truth.position()), 0.25 * place.step_m);
   }
+}
+
+// The hall looks the same after half a turn about its centre.
+TEST(Localiser, NamesTheOppositeSideOfASymmetricHallAndSharesTheProbability) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const Room half(53, {5.0, 4.0, 4, 0.12});
+  constexpr Point2 sum{10.0, 4.0};  // of a position and of that after half a turn
+  Random random(53);
+  std::vector<FourierSignature> signatures;
+  std::vector<std::optional<ReferencePose>> poses;
+  const auto add_grid = [&](Point2 first, bool is_opposite) {
+    for (double x_m = first.x_m; x_m < 5.0; x_m += 0.3) {
+      for (double y_m = first.y_m; y_m < 4.0; y_m += 0.3) {
+        if (!half.is_free({x_m, y_m})) continue;
+        signatures.push_back(
+            compute_signature(half.see({x_m, y_m, 0.0}, 16, 96, {1.0, 0.01}, random.next())));
+        poses.push_back(is_opposite ? ReferencePose{sum.x_m - x_m, sum.y_m - y_m, -std::numbers::pi}
+                                    : ReferencePose{x_m, y_m, 0.0});
+      }
+    }
+  };
+  add_grid({0.3, 0.3}, false);
+  const VisualMemory one_side = make_memory(signatures, poses);
+  add_grid({0.4, 0.25}, true);
+  const VisualMemory both_sides = make_memory(signatures, poses);
+  const Localiser with_one(one_side);
+  const Localiser with_both(both_sides);
+  int known = 0;
+  int named = 0;
+  int named_with_one = 0;
+  for (int i = 0; i < 40; ++i) {
+    const Pose2 pose{random.uniform(0.6, 4.4), random.uniform(0.6, 3.4), random.uniform(-3.0, 3.0)};
+    if (!half.is_free(pose.position())) continue;
+    const FourierSignature seen =
+        compute_signature(half.see(pose, 16, 96, {1.0, 0.01}, random.next()));
+    const Place single = with_one.localise(pack(seen, one_side.full_scale()));
+    named_with_one += single.alternatives.empty() ? 0 : 1;
+    const Place found = with_both.localise(pack(seen, both_sides.full_scale()));
+    if (!found.known) continue;
+    ++known;
+    double shared = found.probability;
+    for (const AlternativePlace& other : found.alternatives) shared += other.probability;
+    EXPECT_NEAR(shared, found.known_probability, 1e-9);
+    if (found.alternatives.empty()) continue;
+    const AlternativePlace& other = found.alternatives.front();
+    ASSERT_TRUE(other.position && other.heading_rad);
+    const bool is_opposite =
+        std::abs(found.position->x_m + other.position->x_m - sum.x_m) < 0.3 &&
+        std::abs(found.position->y_m + other.position->y_m - sum.y_m) < 0.3 &&
+        std::abs(angle_difference(*found.heading_rad, *other.heading_rad + std::numbers::pi)) <
+            radians(15.0);
+    named += is_opposite && found.probability < 0.95 * found.known_probability ? 1 : 0;
+  }
+  EXPECT_GE(known, 25);
+  EXPECT_GE(named, 0.9 * known);
+  EXPECT_LE(named_with_one, 0.1 * known);
 }
 
 // Leaving a view out is only then honest when its neighbours are not supported by it either.

@@ -92,7 +92,7 @@ MemoryUpdate::Changes run(const Room& room, const Room* changed, const VisualMem
                                      seen(is_changed ? *changed : room, poses[i], memory), sure,
                                      std::nullopt, std::nullopt};
     if (is_changed && use.runs == 0) {
-      view.known_probability = 0.0;
+      view.probability = 0.0;
     } else {
       view.pose = poses[i];
     }

@@ -91,6 +91,34 @@ TEST(MonteCarlo, FindsItselfFromNothingAndStaysThere) {
   EXPECT_GE(headed, images * 95 / 100);
 }
 
+// A robot that stands among views without headings cannot know where it looks.
+TEST(MonteCarlo, ReportsAPositionWithoutHeadingWhereViewsHaveNone) {
+  const RememberedRoom place(71, {}, 0.3);
+  VisualMemory memory = place.memory;
+  for (const ViewId view : place.memory.views()) {
+    ReferenceInfo info = place.memory.info(view);
+    info.pose->heading_rad.reset();
+    memory.remove(view);
+    memory.append(place.memory.packed(view), info);
+  }
+  int position_known = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Walk run = walk(place, 1, 200 + seed);
+    MonteCarloLocaliser filter = quick_filter(memory);
+    MonteCarloLocaliser with_headings = quick_filter(place.memory);
+    EXPECT_EQ(with_headings.observe(run.views[0]).state, LocalisationState::localised);
+    const MonteCarloEstimate found = filter.observe(run.views[0]);
+    if (found.state != LocalisationState::position_known) continue;
+    ++position_known;
+    EXPECT_FALSE(found.pose);
+    ASSERT_TRUE(found.position);
+    EXPECT_LT(distance(*found.position, run.poses[0].position()), 2.0 * place.step_m);
+    EXPECT_GT(found.modes[0].weight, 0.9);
+    EXPECT_GT(found.modes[0].heading_spread_rad, radians(60.0));
+  }
+  EXPECT_GE(position_known, 4);
+}
+
 TEST(MonteCarlo, WeightsSumToOneAndNumbersStayWithinTheirBounds) {
   const RememberedRoom place(72, {}, 0.4);
   MonteCarloLocaliser filter =

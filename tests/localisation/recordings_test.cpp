@@ -60,13 +60,14 @@ double known_share(const Localiser& localiser, const VisualMemory& memory,
 
 struct PositionErrors {
   std::vector<double> nearest_m, interpolated_m;
-  double inside = 0.0;  // share within the radius
+  double inside = 0.0;  // share within the stated bound
 };
 
 PositionErrors position_errors(const Part& memorised, const Part& queried) {
   const VisualMemory memory = make_memory(memorised.signatures, memorised.poses);
   const Localiser localiser(memory);
   PositionErrors errors;
+  int stated = 0;
   for (std::size_t i = 0; i < queried.signatures.size(); ++i) {
     const Place found = localiser.localise(pack(queried.signatures[i], memory.full_scale()));
     const Point2 truth = queried.poses[i]->position();
@@ -74,9 +75,19 @@ PositionErrors position_errors(const Part& memorised, const Part& queried) {
         distance(memory.info(found.matches[0].view).pose->position(), truth));
     if (!found.position) continue;
     errors.interpolated_m.push_back(distance(found.position->position(), truth));
-    errors.inside += errors.interpolated_m.back() <= found.position->radius_m.value() ? 1.0 : 0.0;
+    if (const auto& radius_m = found.position->radius_m) {
+      ++stated;
+      errors.inside += errors.interpolated_m.back() <= *radius_m ? 1.0 : 0.0;
+    } else if (const auto& along = found.position->along_route) {
+      const double x_m = found.position->x_m - truth.x_m;
+      const double y_m = found.position->y_m - truth.y_m;
+      const double along_m =
+          x_m * std::cos(along->direction_rad) + y_m * std::sin(along->direction_rad);
+      ++stated;
+      errors.inside += std::abs(along_m) <= along->within_m ? 1.0 : 0.0;
+    }
   }
-  errors.inside /= static_cast<double>(errors.interpolated_m.size());
+  errors.inside /= stated;
   return errors;
 }
 

@@ -88,9 +88,33 @@ TEST(VisualOdometry, ViewsWithoutStructureShowNoStep) {
   EXPECT_FALSE(odometry.add(view).has_value());
   EXPECT_EQ(odometry.breaks(), 0);
   EXPECT_FALSE(odometry.add(nothing).has_value());
+  EXPECT_EQ(odometry.breaks(), 1);
+  EXPECT_EQ(odometry.add(view).value().views, 2);
+  EXPECT_EQ(odometry.breaks(), 1);
+  for (std::size_t i = 0; i < VisualOdometry::max_tried_views; ++i) {
+    EXPECT_FALSE(odometry.add(nothing).has_value());
+  }
   EXPECT_FALSE(odometry.add(view).has_value());
-  EXPECT_EQ(odometry.breaks(), 2);
-  EXPECT_EQ(odometry.pose(), Pose2{});
+  EXPECT_EQ(odometry.breaks(), 2 + static_cast<int>(VisualOdometry::max_tried_views));
+  EXPECT_NEAR(std::hypot(odometry.pose().x_m, odometry.pose().y_m), 0.0, 1e-9);
+}
+
+TEST(VisualOdometry, RefusesStepsBetweenUnrelatedScenes) {
+  int believed = 0;
+  int unchecked = 0;
+  int neighbours = 0;
+  constexpr int pairs = 40;
+  for (int i = 0; i < pairs; ++i) {
+    const OdometryView here = view_at(striped_round_room(radius_m, 100 + i), {});
+    const OdometryView there = view_at(striped_round_room(radius_m, 200 + i), {});
+    const OdometryView near = view_at(striped_round_room(radius_m, 100 + i), {0.1, 0.05, 0.2});
+    const VisualOdometryOptions options{.max_residual = 1.0};
+    believed += visual_step(here, there, options) ? 1 : 0;
+    unchecked += visual_step(here, there, {.max_residual = 1.0, .min_probability = 0.0}) ? 1 : 0;
+    neighbours += visual_step(here, near, options) ? 1 : 0;
+  }
+  EXPECT_LE(4 * believed, unchecked);
+  EXPECT_EQ(neighbours, pairs);
 }
 
 TEST(VisualOdometry, FollowsARoundTrip) {
@@ -120,6 +144,63 @@ TEST(VisualOdometry, FollowsARoundTrip) {
     found.push_back(sideways.pose());
   }
   EXPECT_LT(shape_difference(positions(found), positions(truth)).value, 0.02);
+}
+
+TEST(VisualOdometry, ExpectsTurnsAsBeforeInASymmetricRoom) {
+  constexpr int columns = 256;
+  const auto view_of = [&](int turned) {
+    Panorama panorama(1, columns, std::nullopt);
+    for (int x = 0; x < columns; ++x) {
+      // Both halves of the room are alike.
+      const double phi = 4.0 * std::numbers::pi * (x + turned) / columns;
+      panorama.at(0, x) =
+          static_cast<float>(0.5 + 0.2 * std::cos(phi) + 0.1 * std::sin(2.0 * phi + 0.4));
+    }
+    return OdometryView(compute_signature(panorama, 14));
+  };
+  VisualOdometry odometry;
+  double largest_rad = 0.0;
+  for (int i = 0; i < 40; ++i) {
+    const auto step = odometry.add(view_of(3 * i % columns));
+    if (i == 0) continue;
+    ASSERT_TRUE(step.has_value());
+    largest_rad = std::max(largest_rad, std::abs(step->before_from_after.heading_rad));
+  }
+  EXPECT_LT(largest_rad, 0.2);
+}
+
+TEST(VisualOdometry, LengthsDoNotDependOnTheSizeOfTheRoom) {
+  const auto drive = [](bool steady_speed) {
+    VisualOdometry odometry({.scale_m = radius_m, .steady_speed = steady_speed});
+    double last_m = 0.0;
+    for (const double room_m : {radius_m, 2.5 * radius_m}) {
+      const ToyWorld world = striped_round_room(room_m, 3);
+      for (int i = 0; i < 20; ++i) {
+        const auto step = odometry.add(view_at(world, {-1.0 + 0.1 * i, 0.2, 0.3}));
+        if (step) last_m = std::hypot(step->before_from_after.x_m, step->before_from_after.y_m);
+      }
+    }
+    return last_m;
+  };
+  EXPECT_NEAR(drive(true), 0.1, 0.02);
+  EXPECT_NEAR(drive(false), 0.1 / 2.5, 0.01);
+}
+
+TEST(MotionPrior, MakesUsualTurnsAndKnownStepsProbable) {
+  const MotionPrior prior{.mean_turn_rad = 0.1, .share_right = 0.9};
+  EXPECT_GT(prior.log_density(0.0), prior.log_density(0.3));
+  EXPECT_GT(prior.log_density(0.3), prior.log_density(std::numbers::pi));
+  double sum = 0.0;  // over all turns
+  constexpr int parts = 100000;
+  for (int i = 0; i < parts; ++i) {
+    const double turn = 2.0 * std::numbers::pi * (static_cast<double>(i) / parts - 0.5);
+    sum += std::exp(prior.log_density(turn)) * 2.0 * std::numbers::pi / parts;
+  }
+  EXPECT_NEAR(sum, 1.0, 1e-3);
+  EXPECT_DOUBLE_EQ(MotionPrior{}.posterior(0.3), 0.3);
+  EXPECT_GT(prior.posterior(0.3), 0.7);
+  EXPECT_EQ(prior.posterior(0.0), 0.0);
+  EXPECT_EQ(prior.posterior(1.0), 1.0);
 }
 
 TEST(VisualOdometry, KnownStepsTellTheScale) {

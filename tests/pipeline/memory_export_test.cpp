@@ -65,18 +65,19 @@ TEST_F(Export, NamesThatCannotBeFilesGetOthersAndNothingLeavesTheFolder) {
   EXPECT_EQ(there, 0U);
 }
 
-TEST_F(Export, WhatSomeViewsLackIsLeftOutOfTheDataSetAlone) {
+TEST_F(Export, WhatSomeViewsLackIsEmptyInTheDataSet) {
   {
     MemoryFile file = file_of({"a.png", "b.png"});
     file.set_pose(ViewId{2}, ReferencePose{1.0, 2.0, {}});
     const MemoryExport done = export_memory(file, out);
     EXPECT_TRUE(done.positions);
-    EXPECT_FALSE(done.headings);
+    EXPECT_TRUE(done.headings);
     file.set_pose(ViewId{2}, std::nullopt);
-    EXPECT_FALSE(export_memory(file, folder / "bare").positions);
+    EXPECT_TRUE(export_memory(file, folder / "bare").positions);
   }
   EXPECT_EQ(read_dataset(out).entries[1].pose, (ReferencePose{1.0, 2.0, {}}));
-  EXPECT_FALSE(read_dataset(folder / "bare").entries[0].pose);
+  EXPECT_TRUE(read_dataset(folder / "bare").entries[0].pose);
+  EXPECT_FALSE(read_dataset(folder / "bare").entries[1].pose);
 }
 
 TEST_F(Export, ThumbnailsTooSmallForTheComponentsAreNoPictures) {

@@ -147,7 +147,8 @@ TEST(ViewEncoder, RefusesWhatTheMemoryCannotCompare) {
   };
   EXPECT_EQ(message_of(blotchy_image({320, 240}, 1)), "");
   EXPECT_NE(message_of(Image(320, 200)).find("320 x 200"), std::string::npos);
-  EXPECT_NE(message_of(Panorama(20, 64, header.elevations)).find("columns"), std::string::npos);
+  EXPECT_NE(message_of(Panorama(20, 64, header.elevations)).find("size is 64 x 20"),
+            std::string::npos);
   EXPECT_NE(message_of(Panorama(20, 128, {})).find("elevation band"), std::string::npos);
 
   Observation tilted(blotchy_image({320, 240}, 1));

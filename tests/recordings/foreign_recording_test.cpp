@@ -137,6 +137,28 @@ TEST_F(RecordingTest, AFolderOfRosbag2IsReadWithoutTheFilesThatAreMissing) {
   }
 }
 
+TEST_F(RecordingTest, AFolderWithoutMetadataIsReadInTheOrderOfItsFiles) {
+  EXPECT_FALSE(is_recording(folder.path()));
+  fs::copy(golden("rosbag2") / "rosbag2_0.db3", folder / "drive_9.db3");
+  fs::copy(golden("rosbag2") / "rosbag2_1.db3", folder / "drive_10.db3");
+  folder.write("drive_10.db3-shm", "x");
+  ASSERT_TRUE(is_recording(folder.path()));
+  const auto recording = Recording::open(folder.path());
+  EXPECT_EQ(in_sequence(*recording), golden_messages());
+  ASSERT_EQ(recording->warnings().size(), 1U);
+  EXPECT_EQ(recording->warnings()[0],
+            "has no metadata.yaml, as the recorder was not closed; files read: 2");
+  EXPECT_EQ(recording->locations(all_topics(*recording)).back().file, 1U);
+  // Another recording beside it, or a picture: which files belong together is not known.
+  fs::copy(golden("mcap_lz4.mcap"), folder / "other_0.mcap");
+  EXPECT_FALSE(is_recording(folder.path()));
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)Recording::open(folder.path()); }),
+                       "has no metadata.yaml and is no recording; allowed: folders of rosbag2"));
+  fs::remove(folder / "other_0.mcap");
+  folder.write("view.PNG", "x");
+  EXPECT_FALSE(is_recording(folder.path()));
+}
+
 TEST_F(RecordingTest, ADatabaseOfSomethingElseIsRefused) {
   std::string bytes = bytes_of(golden("packed.db3"));
   const auto refusal = [&](const std::string& changed) {

@@ -10,6 +10,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav_recordings/recorded_poses.hpp"
 #include "support/picture_samples.hpp"
 #include "support/recorded_messages.hpp"
 #include "support/text.hpp"
@@ -123,9 +124,22 @@ TEST_P(RecordedTopics, OdometryEndsAnIntervalBeyondItsLastMessage) {
     if (expected[i].second) expect_odometry(entry, expected[i].first * ms);
   }
   ASSERT_EQ(read_back.warnings.size(), 1U);
-  EXPECT_EQ(read_back.warnings[0],
-            "3 of 7 images have no odometry: it begins later, ends before or pauses for more than "
-            "a second");
+  EXPECT_EQ(
+      read_back.warnings[0],
+      "3 of 7 images have no odometry: 1 before its first message, 1 in pauses of more than a "
+      "second, 1 after its last message");
+}
+
+// Without a message in every second, nothing better than the mean of the neighbours is known.
+TEST_P(RecordedTopics, OdometryThatAlwaysComesSlowlyIsInterpolated) {
+  for (int i = 0; i <= 4; ++i) add_odometry(i * 1400 * ms);
+  add_odometry(8400 * ms);  // one is missing
+  for (const int after_ms : {700, 2100, 6900}) add_picture(after_ms * ms);
+  const auto read_back = read();
+  EXPECT_TRUE(read_back.entries[0].odometry && read_back.entries[1].odometry);
+  EXPECT_FALSE(read_back.entries[2].odometry);
+  ASSERT_EQ(read_back.warnings.size(), 1U);
+  EXPECT_TRUE(contains(read_back.warnings[0], "1 of 3 images have no odometry: 1 in pauses"));
 }
 
 TEST_P(RecordedTopics, TransformsGiveOdometryAlongTheirChain) {
@@ -156,6 +170,31 @@ TEST_P(RecordedTopics, TransformsGiveOdometryAlongTheirChain) {
             "1 transforms give a frame another parent than before and are left out");
 }
 
+TEST_P(RecordedTopics, TransformsToAnotherBaseAreFoundOrNamed) {
+  for (int i = 0; i <= 10; ++i) {
+    add_transform("/tf", "odom", "base_footprint", i * 100 * ms, pose_at(0.1 * i));
+  }
+  add_picture(650 * ms);
+  const auto found = read();
+  EXPECT_TRUE(found.warnings.empty());
+  ASSERT_TRUE(found.entries.at(0).odometry);
+  EXPECT_NEAR(found.entries[0].odometry->x_m, pose_at(0.65).x_m, 1e-9);
+}
+
+TEST_P(RecordedTopics, TransformsThatGiveNoOdometryAreNamed) {
+  for (int i = 0; i <= 10; ++i) {
+    add_transform("/tf", "t265_odom", "t265", i * 100 * ms, pose_at(0.1 * i));
+  }
+  add_picture(650 * ms);
+  const auto found = read();
+  EXPECT_FALSE(found.entries.at(0).odometry);
+  ASSERT_EQ(found.warnings.size(), 1U);
+  EXPECT_TRUE(
+      contains(found.warnings[0],
+               "no odometry: no transforms lead from odom to base_link or base_footprint; "
+               "it has: t265_odom -> t265; choose two frames with the option odometry_frames"));
+}
+
 TEST_P(RecordedTopics, TransformsInACircleConnectNothing) {
   add_transform("/tf", "a", "base_link", 0, {});
   add_transform("/tf", "b", "a", 0, {});
@@ -170,17 +209,18 @@ TEST_P(RecordedTopics, TransformsInACircleConnectNothing) {
 }
 
 TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
-  EXPECT_TRUE(contains(error(),
-                       "drive.bag: has no images of sensor_msgs/Image or "
-                       "sensor_msgs/CompressedImage; its topics: none"));
+  EXPECT_TRUE(contains(error(), "drive.bag: has no images that can be read (sensor_msgs/Image"));
+  EXPECT_TRUE(contains(error(), "; its topics: none"));
   add_picture(0, "/left");
   add_picture(0, "/right");
   add_odometry(0, "/wheels");
   add_odometry(0, "/filtered");
   add_imu(0, {}, "/imu0");
   add_imu(0, {}, "/imu1");
-  EXPECT_EQ(error(),
-            "drive.bag: has images of several topics: /left, /right; choose one with the option "
+  const auto chosen = read();
+  EXPECT_EQ(read_picture(chosen.entries.at(0)), images_[0]);
+  EXPECT_EQ(chosen.warnings.at(0),
+            "images of several topics: /left, /right; used: /left; choose another with the option "
             "image_topic");
   const auto right = read({.image = "/right"});
   EXPECT_EQ(read_picture(right.entries.at(0)), images_[1]);
@@ -195,19 +235,21 @@ TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
   const auto named = read({.image = "/right", .odometry = "/wheels", .imu = "/imu1"});
   EXPECT_TRUE(named.warnings.empty());
   EXPECT_TRUE(named.entries[0].odometry && named.entries[0].tilt);
-  EXPECT_EQ(error({.image = "/imu0"}),
-            "drive.bag: has no topic /imu0 of sensor_msgs/Image or sensor_msgs/CompressedImage; it "
-            "has: /left, /right");
+  EXPECT_TRUE(
+      contains(error({.image = "/imu0"}), "drive.bag: has no topic /imu0 of sensor_msgs/I"));
   EXPECT_EQ(error({.image = "/left", .odometry = "/none"}),
-            "drive.bag: has no topic /none of nav_msgs/Odometry; it has: /filtered, /wheels");
+            "drive.bag: has no topic /none of nav_msgs/Odometry; it has: /filtered "
+            "(nav_msgs/Odometry), /imu0 (sensor_msgs/Imu), /imu1 (sensor_msgs/Imu), /left "
+            "(sensor_msgs/Image), /right (sensor_msgs/Image), /wheels (nav_msgs/Odometry)");
 }
 
 TEST_P(RecordedTopics, HostileNamesStayOnOneLine) {
   add_picture(0, "/left\n\x1b[2J");
   add_picture(0, std::string(5000, 'x'));
-  const std::string line = error();
-  EXPECT_EQ(line.find_first_of("\n\x1b"), std::string::npos);
-  EXPECT_LE(line.size(), 600U);
+  for (const std::string& line : {read().warnings.at(0), error({.image = "/up"})}) {
+    EXPECT_EQ(line.find_first_of("\n\x1b"), std::string::npos);
+    EXPECT_LE(line.size(), 6000U);
+  }
 }
 
 TEST_P(RecordedTopics, WithoutStampsTheTimesOfRecordingServe) {
@@ -272,19 +314,21 @@ TEST_P(RecordedTopics, DamagedMessagesAreLeftOut) {
   recorded_->add("/camera", start_ns + 400 * ms, late);
   recorded_->add("/camera", "sensor_msgs/Image", start_ns + 500 * ms, {1, 2, 3});
   const Dataset dataset = read();
-  ASSERT_EQ(dataset.entries.size(), 4U);
-  expect_odometry(dataset.entries[1], 150 * ms);
-  ASSERT_EQ(dataset.warnings.size(), 3U);
+  ASSERT_EQ(dataset.entries.size(), 3U);
+  expect_odometry(dataset.entries[2], 150 * ms);
+  ASSERT_EQ(dataset.warnings.size(), 4U);
   EXPECT_TRUE(contains(dataset.warnings[0],
-                       "2 messages cannot be read and are left out; the first: "
+                       "left out: 2 messages that cannot be read; the first: "
                        "nav_msgs/Odometry message: position is nan"));
-  EXPECT_EQ(dataset.warnings[1], "stamps run back at 1 of 4 images");
-  EXPECT_EQ(dataset.warnings[2], "1 of 4 images are not of the size of the first, 8 x 4 px");
-  // In the order of recording.
-  EXPECT_EQ(dataset.entries[0].file, "1700000000_140000000");
-  EXPECT_EQ(dataset.entries[1].file, "1700000000_150000000");
-  EXPECT_EQ(dataset.entries[2].file, "1700000000_150000000_2");
-  EXPECT_EQ(dataset.entries[3].file, "1700000000_100000000");
+  EXPECT_EQ(dataset.warnings[1],
+            "2 of 4 images were recorded late; all are used in the order of their stamps");
+  EXPECT_EQ(dataset.warnings[2],
+            "1 of 4 images have the stamp of another image; the first image of each stamp is used");
+  EXPECT_EQ(dataset.warnings[3], "1 of 3 images are not of the size of the first, 8 x 4 px");
+  EXPECT_EQ(dataset.entries[0].file, "1700000000_100000000");
+  EXPECT_EQ(dataset.entries[1].file, "1700000000_140000000");
+  EXPECT_EQ(dataset.entries[2].file, "1700000000_150000000");
+  EXPECT_EQ(read_picture(dataset.entries[2]), images_[0]);
 }
 
 TEST_P(RecordedTopics, GroundTruthGivesPoses) {
@@ -307,6 +351,45 @@ TEST(RecordedTopicsLimit, MorePicturesThanAMillionAreRefused) {
   for (int i = 0; i <= 1'000'000; ++i) recorded->add("/camera", i, ros::CompressedImage{});
   EXPECT_EQ(message_of<FileError>([&] { (void)read_recording(recorded, "drive.bag", sphere); }),
             "drive.bag: has more than 1000000 images; allowed: as many");
+}
+
+TEST_P(RecordedTopics, PosesOfOneTopicAreATrajectoryInSpace) {
+  const auto poses = [&](const std::optional<std::string>& topic = {}) {
+    return read_recorded_poses(*recorded_, "drive.bag", topic);
+  };
+  const auto refusal = [&](const std::optional<std::string>& topic = {}) {
+    return message_of<FileError>([&] { (void)poses(topic); });
+  };
+  add_picture(0);
+  EXPECT_TRUE(contains(refusal(), "drive.bag: has no topic with poses"));
+  for (int i = 0; i < 3; ++i) add_odometry(i * 100 * ms);
+  EXPECT_EQ(poses().format, "topic /odom (nav_msgs/Odometry)");
+  ros::TransformStamped vicon;
+  vicon.header = {start_ns + 50 * ms, "world"};
+  vicon.child_frame_id = "robot";
+  vicon.transform = {{1.0, 2.0, 3.0}, {0.5, 0.5, 0.5, 0.5}};
+  recorded_->add("/vicon", start_ns, vicon);
+  ros::PoseStamped pose;
+  pose.header = vicon.header;
+  pose.pose = vicon.transform;
+  recorded_->add("/pose", start_ns, pose);
+  EXPECT_EQ(refusal(), "drive.bag: has poses of several topics: /odom, /vicon, /pose; choose one");
+  EXPECT_EQ(
+      refusal("/camera"),
+      "drive.bag: has no poses on topic /camera; its topics with poses: /odom, /vicon, /pose");
+  const auto odometry = poses("/odom").poses;
+  ASSERT_EQ(odometry.size(), 3U);
+  EXPECT_NEAR(odometry[1].stamp_s, 1.7e9 + 0.1, 3e-7);  // of the header, not of the recording
+  EXPECT_NEAR(to_pose2(odometry[1].pose).x_m, pose_at(0.1).x_m, 1e-12);
+  EXPECT_NEAR(to_pose2(odometry[1].pose).heading_rad, pose_at(0.1).heading_rad, 1e-12);
+  const Pose3 expected{{1.0, 2.0, 3.0}, {0.5, 0.5, 0.5, 0.5}};
+  EXPECT_EQ(poses("/vicon").poses.at(0).pose, expected);
+  EXPECT_EQ(poses("/pose").poses.at(0).pose, expected);
+  pose.header.stamp_ns -= 5000 * ms;
+  recorded_->add("/pose", start_ns + 100 * ms, pose);
+  EXPECT_EQ(refusal("/pose"),
+            "drive.bag: topic /pose: the clock goes back at message 2; allowed: one run; cut the "
+            "recording there");
 }
 
 }  // namespace

@@ -296,7 +296,7 @@ TEST_F(RecordingTest, WhatIsNoRecordingIsRefusedInOneLine) {
   EXPECT_TRUE(contains(refusal(folder / "none.mcap"), "is missing"));
   EXPECT_TRUE(contains(refusal(folder.write("empty.mcap", "")), "is not a recording"));
   EXPECT_TRUE(contains(refusal(folder.write("text.mcap", "hello")), "is not a recording"));
-  EXPECT_TRUE(contains(refusal(folder.path()), "is not a recording"));
+  EXPECT_TRUE(contains(refusal(folder.path()), "is no recording"));
   // A file that ends behind its first bytes is one without messages.
   const auto recording = Recording::open(folder.write("begun.mcap", "\x89MCAP0\r\n"));
   EXPECT_TRUE(recording->topics().empty());

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <numeric>
@@ -297,6 +298,77 @@ TEST(RosPictures, YuvGivesTheColoursOfBt601) {
   }
 }
 
+TEST(RosPictures, NamesOfEncodingsMayBeInCapitalsAndHaveAliases) {
+  const Blob yuyv = bytes_from({16, 128, 235, 90, 81, 90, 81, 240});
+  const Image expected = ros::to_image(raw_image(yuyv, 4, 1, "yuv422_yuy2", 8));
+  for (const char* name : {"YUYV", "YUY2", "yuy2", "YUV422_YUY2"})
+    EXPECT_EQ(ros::to_image(raw_image(yuyv, 4, 1, name, 8)), expected) << name;
+  const Blob yvyu = bytes_from({16, 90, 235, 128, 81, 240, 81, 90});
+  EXPECT_EQ(ros::to_image(raw_image(yvyu, 4, 1, "YVYU", 8)), expected);
+  const Blob uyvy = bytes_from({128, 16, 90, 235, 90, 81, 240, 81});
+  EXPECT_EQ(ros::to_image(raw_image(uyvy, 4, 1, "UYVY", 8)), expected);
+  const Blob grey = bytes_from({1, 2, 3, 4});
+  EXPECT_EQ(ros::to_image(raw_image(grey, 4, 1, "MONO8", 4)),
+            ros::to_image(raw_image(grey, 4, 1, "8UC1", 4)));
+}
+
+TEST(RosPictures, DeepPixelsAreScaledToBytes) {
+  const Blob blue_first = bytes_from({0x34, 0x12, 0xFF, 0xFF, 0x00, 0x80});
+  const Image bgr = ros::to_image(raw_image(blue_first, 1, 1, "bgr16", 6));
+  ASSERT_EQ(bgr.channels(), 3);
+  EXPECT_EQ((std::vector<std::uint8_t>(bgr.pixels().begin(), bgr.pixels().end())),
+            (std::vector<std::uint8_t>{0x80, 0xFF, 0x12}));
+  const Image rgb = ros::to_image(raw_image(blue_first, 1, 1, "rgb16", 6));
+  EXPECT_EQ(rgb.at(0, 0, 0), 0x12);
+  EXPECT_EQ(rgb.at(0, 0, 2), 0x80);
+  EXPECT_EQ(ros::to_image(raw_image(blue_first, 3, 1, "16UC1", 6)),
+            ros::to_image(raw_image(blue_first, 3, 1, "mono16", 6)));
+  const auto floats = [](std::vector<float> values) {
+    Blob bytes(4 * values.size());
+    std::memcpy(bytes.data(), values.data(), bytes.size());
+    return bytes;
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const Blob unit = floats({0.0F, 0.5F, 1.0F, nan, -3.0F, 1.001F});
+  const Image of_unit = ros::to_image(raw_image(unit, 6, 1, "32FC1", 24));
+  EXPECT_EQ((std::vector<std::uint8_t>(of_unit.pixels().begin(), of_unit.pixels().end())),
+            (std::vector<std::uint8_t>{0, 128, 255, 0, 0, 255}));
+  const Blob bytes = floats({0.0F, 100.0F, 255.0F, 300.0F, 1.0F, nan});
+  const Image of_bytes = ros::to_image(raw_image(bytes, 6, 1, "32FC1", 24));
+  EXPECT_EQ((std::vector<std::uint8_t>(of_bytes.pixels().begin(), of_bytes.pixels().end())),
+            (std::vector<std::uint8_t>{0, 100, 255, 255, 1, 0}));
+}
+
+TEST(RosPictures, PlanesOfYuvGiveThePixelsOfPackedYuv) {
+  // 4 x 2 px with a padded row; two colours of 2 x 2 px.
+  const Blob uyvy = bytes_from({90, 16, 240, 60, 100, 90, 50, 120,  //
+                                90, 130, 240, 160, 100, 190, 50, 235});
+  const Image expected = ros::to_image(raw_image(uyvy, 4, 2, "uyvy", 8));
+  const std::vector<int> luma{16, 60, 90, 120, 0, 0, 130, 160, 190, 235, 0, 0};
+  const auto with_luma = [&](std::vector<int> colours) {
+    colours.insert(colours.begin(), luma.begin(), luma.end());
+    return bytes_from(colours);
+  };
+  const std::vector<std::pair<std::string, Blob>> planes{
+      {"nv12", with_luma({90, 240, 100, 50, 0, 0})},
+      {"NV21", with_luma({240, 90, 50, 100, 0, 0})},
+      {"i420", with_luma({90, 100, 0, 240, 50, 0})},
+      {"yuv420p", with_luma({90, 100, 0, 240, 50, 0})},
+      {"yv12", with_luma({240, 50, 0, 90, 100, 0})},
+      {"nv24", with_luma({90, 240, 90, 240, 100, 50, 100, 50, 0, 0, 0, 0,  //
+                          90, 240, 90, 240, 100, 50, 100, 50, 0, 0, 0, 0})}};
+  for (const auto& [name, data] : planes) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(ros::to_image(raw_image(data, 4, 2, name, 6)), expected);
+    // Some drivers count the rows of the colours.
+    const auto rows = static_cast<std::uint32_t>(data.size() / 6);
+    EXPECT_EQ(ros::to_image(raw_image(data, 4, rows, name, 6)), expected);
+    const Blob cut(data.begin(), data.end() - 1);
+    EXPECT_THROW((void)ros::to_image(raw_image(cut, 4, 2, name, 6)), ContractError);
+  }
+  EXPECT_THROW((void)ros::to_image(raw_image(planes[0].second, 3, 2, "nv12", 6)), ContractError);
+}
+
 TEST(RosPictures, WhatDoesNotFitIsOneLine) {
   const Blob data(24);
   const auto error = [&](const ros::Image& message, const ImageLimits& limits = {}) {
@@ -315,8 +387,8 @@ TEST(RosPictures, WhatDoesNotFitIsOneLine) {
             "sensor_msgs/Image size is 0 x 2; allowed: 1 .. 32768 px a side and at most 134217728 "
             "px in all");
   EXPECT_NE(error(raw_image(data, 6, 4, "mono8", 6), {.area_px = 23}), "no error");
-  EXPECT_TRUE(error(raw_image(data, 4, 2, "32FC1", 16))
-                  .starts_with("sensor_msgs/Image encoding is 32FC1; allowed: mono8, 8UC1"));
+  EXPECT_TRUE(error(raw_image(data, 4, 2, "64FC1", 32))
+                  .starts_with("sensor_msgs/Image encoding is 64FC1; allowed: mono8, 8UC1"));
   // An area that overflows 32 bits is compared as what it is.
   ros::Image huge = raw_image(data, 4, 2, "mono8", 12);
   huge.height = 0xFFFFFFFF;

@@ -14,6 +14,8 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/open_input.hpp"
+#include "panonav_recordings/internal/foreign_pictures.hpp"
 #include "support/comma_locale.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/text.hpp"
@@ -139,6 +141,12 @@ TEST_F(Video, CutAndForeignFilesAreRefusedInOneLine) {
   };
   std::ofstream(folder / "empty.mp4").flush();
   refused(folder / "empty.mp4");
+  // The camera writes the index (moov) at the end.
+  const fs::path unfinished = make("unfinished.mp4", "-c:v libx264rgb -qp 0");
+  fs::resize_file(unfinished, fs::file_size(unfinished) / 2);
+  refused(unfinished);
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)read_video(unfinished, {}); }),
+                       "has no index (moov), because the recording was cut off"));
   std::ofstream(folder / "text.mp4") << "this is not a video\n" << std::string(5000, 'x');
   refused(folder / "text.mp4");
   refused(folder / "missing.mp4");
@@ -153,6 +161,152 @@ TEST_F(Video, PicturesBeyondTheLimitsAreRefusedBeforeTheyAreDecoded) {
   const std::string error =
       message_of<FileError>([&] { (void)read_picture(video.entries.front()); });
   EXPECT_NE(error.find("64 x 32"), std::string::npos) << error;
+}
+
+// Cameras give videos names of their own, and a name does not make a video.
+TEST_F(Video, ContentDecidesWhatAFileIs) {
+  for (const auto& [name, codec] : {std::pair{"walk.insv", "-c:v libx264rgb -qp 0 -f mp4"},
+                                    {"walk.lrv", "-c:v ffv1 -pix_fmt bgr0 -f matroska"},
+                                    {"walk", "-c:v ffv1 -pix_fmt bgr0 -f avi"}}) {
+    const fs::path file = make(name, codec);
+    EXPECT_TRUE(is_video(file)) << name;
+    const Dataset video = read_video(file, {});
+    ASSERT_EQ(video.entries.size(), count) << name;
+    EXPECT_EQ(read_picture(video.entries[4]), noise(4)) << name;
+  }
+  const fs::path stream = make("walk.ts", "-c:v mpeg2video -pix_fmt yuv420p -f mpegts -r 25");
+  EXPECT_TRUE(is_video(stream));
+  const Dataset video = read_video(stream, {});
+  EXPECT_GE(video.entries.size(), std::size_t{count});
+  EXPECT_EQ(read_picture(video.entries[2]).size(), (ImageSize{64, 32}));
+  fs::copy_file(folder / "n0.png", folder / "picture.mp4");
+  EXPECT_FALSE(is_video(folder / "picture.mp4"));
+  EXPECT_FALSE(is_video(folder / "n0.png"));
+  EXPECT_FALSE(is_video(folder.path())) << "a folder of images and videos";
+}
+
+TEST_F(Video, TheTracksOfTwoLensesAreSetSideBySide) {
+  const std::string halves =
+      "-filter_complex \"[0]split[a][b];[a]crop=32:32:0:0[l];[b]crop=32:32:32:0[r]\" "
+      "-map \"[l]\" -map \"[r]\" -c:v ffv1 -pix_fmt bgr0 -f matroska";
+  const Dataset video = read_video(make("lenses.insv", halves), {});
+  ASSERT_EQ(video.entries.size(), count);
+  for (const int i : {0, 1, 7, 3, 19}) {
+    EXPECT_EQ(read_picture(video.entries[static_cast<std::size_t>(i)]), noise(i)) << i;
+  }
+  EXPECT_NEAR(*video.entries[7].stamp_s, 0.7, 1e-3);
+  // The faces of a cube map are no lenses; another track of another size is a preview.
+  const std::string cube =
+      "-filter_complex \"[0]split[a][b];[a]scale=96:32[l];[b]scale=96:32[r]\" -map \"[l]\" -map "
+      "\"[r]\" -c:v ffv1 -f matroska";
+  const fs::path max = make("GS010001.360", cube);
+  const std::string error = message_of<FileError>([&] { (void)read_video(max, {}); });
+  EXPECT_TRUE(contains(error, "GS010001.360")) << error;
+  EXPECT_TRUE(contains(error, "cube")) << error;
+  // The command that the error names makes a video of 360 degree images.
+  const std::string convert = error.substr(error.find("ffmpeg -i"));
+  EXPECT_EQ(std::system(("cd " + quote_for_shell(folder.path().string()) + " && " + convert +
+                         " -nostdin -v error")
+                            .c_str()),
+            0)
+      << convert;
+  const Dataset sphere = read_video(folder / "equirectangular.mp4", {});
+  ASSERT_EQ(sphere.entries.size(), count);
+  EXPECT_EQ(read_picture(sphere.entries[0]).size(), (ImageSize{128, 64}));
+  const std::string preview =
+      "-filter_complex \"[0]split[a][b];[a]scale=16:8[l]\" -map \"[l]\" -map \"[b]\" -c:v ffv1 "
+      "-pix_fmt bgr0 -f matroska";
+  const Dataset large = read_video(make("both.mkv", preview), {});
+  EXPECT_EQ(read_picture(large.entries[5]), noise(5));
+}
+
+TEST_F(Video, FilesOfTwoLensesAreSetSideBySide) {
+  const auto lens = [&](const std::string& name, const std::string& crop) {
+    return make(name, "-vf crop=" + crop + " -c:v ffv1 -pix_fmt bgr0 -f matroska");
+  };
+  const fs::path left = lens("VID_20261127_101010_00_001.insv", "32:32:0:0");
+  EXPECT_EQ(read_picture(read_video(left, {}).entries[3]).size(), (ImageSize{32, 32}));
+  const fs::path right = lens("VID_20261127_101010_10_001.insv", "32:32:32:0");
+  const fs::path both = folder / "both";
+  fs::create_directory(both);
+  fs::copy_file(left, both / left.filename());
+  fs::copy_file(right, both / right.filename());
+  std::ofstream(both / "LRV_20261127_101010_11_001.insv") << std::ifstream(left).rdbuf();
+  using Files = std::vector<fs::path>;
+  for (const Files& typed :
+       {Files{left}, Files{right}, Files{left, right}, Files{right, left}, Files{both}}) {
+    const Dataset video = read_videos(typed, {});
+    ASSERT_EQ(video.entries.size(), count) << typed.front();
+    for (const int i : {0, 1, 7, 3, 19}) {
+      EXPECT_EQ(read_picture(video.entries[static_cast<std::size_t>(i)]), noise(i)) << i;
+    }
+    EXPECT_TRUE(video.warnings.empty());
+  }
+  // The name alone makes no pair.
+  const fs::path wide = lens("VID_20261127_101010_00_002.insv", "64:32:0:0");
+  fs::copy_file(wide, folder / "VID_20261127_101010_10_002.insv");
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)read_video(wide, {}); }),
+                       "VID_20261127_101010_10_002.insv: is not the second lens of "));
+}
+
+TEST_F(Video, FoldersOfWebPAreReadAsThoseOfPng) {
+  fs::create_directory(folder / "web");
+  (void)make("web/w%d.webp", "-c:v libwebp -lossless 1 -f image2");
+  EXPECT_TRUE(is_foreign_picture(folder / "web"));
+  const Dataset web = read_foreign_pictures(folder / "web", {});
+  ASSERT_EQ(web.entries.size(), count);
+  EXPECT_EQ(web.entries[9].file, "w10.webp");  // numbers from 1 on
+  for (const int i : {9, 0, 19}) {
+    EXPECT_EQ(read_picture(web.entries[static_cast<std::size_t>(i)]), noise(i)) << i;
+  }
+  EXPECT_EQ(read_picture(read_foreign_pictures(folder / "web" / "w3.webp", {}).entries.at(0)),
+            noise(2));
+  // Beside others they are left out and named.
+  fs::copy_file(folder / "n0.png", folder / "web" / "a.png");
+  EXPECT_FALSE(is_foreign_picture(folder / "web"));
+  const Dataset mixed = open_input(folder / "web", {.source = PictureSource{}});
+  EXPECT_EQ(mixed.entries.size(), 1U);
+  ASSERT_FALSE(mixed.warnings.empty());
+  EXPECT_TRUE(contains(mixed.warnings[0],
+                       "left out, WebP, HEIC or AVIF (convert them to PNG or JPEG) (20): w1.webp"))
+      << mixed.warnings[0];
+}
+
+TEST_F(Video, ChaptersAreOneVideo) {
+  const fs::path chapters = folder / "chapters";
+  fs::create_directory(chapters);
+  const std::string codec = "-c:v ffv1 -pix_fmt bgr0 -f matroska ";
+  // In order 0 .. 8, 9 .. 14, 15 .. 19, and a preview.
+  (void)make("chapters/GX010007.MP4", "-vf trim=end_frame=9 " + codec);
+  (void)make("chapters/GX020007.MP4",
+             "-vf trim=start_frame=9:end_frame=15,setpts=PTS-STARTPTS " + codec);
+  (void)make("chapters/GX010012.MP4", "-vf trim=start_frame=15,setpts=PTS-STARTPTS " + codec);
+  (void)make("chapters/GL010007.LRV", "-vf trim=end_frame=3 " + codec);
+  std::ofstream(chapters / "._GX010007.MP4") << "companion";
+  EXPECT_TRUE(is_video(chapters));
+  const Dataset joined = read_video(chapters, {});
+  ASSERT_EQ(joined.entries.size(), count);
+  for (int i = 0; i < count; ++i) {
+    const auto& entry = joined.entries[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(*entry.stamp_s, 0.1 * i, 2e-3);
+    EXPECT_EQ(read_picture(entry), noise(i)) << i;
+  }
+  EXPECT_EQ(joined.entries[9].file, "GX020007.MP4@0.000000");
+  ASSERT_EQ(joined.warnings.size(), 1U);
+  EXPECT_TRUE(contains(joined.warnings[0], "GX010007.MP4, GX020007.MP4, GX010012.MP4"));
+  const Dataset some = read_video(chapters, {}, {.every_s = 0.5});
+  ASSERT_EQ(some.entries.size(), 4U);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(read_picture(some.entries[static_cast<std::size_t>(i)]), noise(5 * i)) << i;
+  }
+  const Dataset listed = read_videos({chapters / "GX020007.MP4", chapters / "GX010012.MP4"}, {});
+  ASSERT_EQ(listed.entries.size(), 11U);
+  EXPECT_EQ(read_picture(listed.entries[10]), noise(19));
+  const fs::path other = make("small.mkv", "-vf scale=32:16 -c:v ffv1 -pix_fmt bgr0");
+  const std::string error = message_of<FileError>([&] {
+    (void)read_videos({chapters / "GX010007.MP4", other}, {});
+  });
+  EXPECT_TRUE(contains(error, "small.mkv") && contains(error, "32 x 16")) << error;
 }
 
 }  // namespace

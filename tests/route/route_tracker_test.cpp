@@ -62,6 +62,40 @@ TEST_F(RouteTracking, SaysThatAnotherPlaceIsNotOnThisRoute) {
   EXPECT_FALSE(tracker.pose().has_value());
 }
 
+// Errors of the fit exceed what the noise of the lines explains, most of all between the lines of
+// the route.
+TEST_F(RouteTracking, TheStatedCovarianceHolds) {
+  constexpr double square_95 = 5.991;  // chi squared, two degrees of freedom
+  const RouteTracker tracker(route);
+  Random random(7);
+  int found = 0;
+  int within = 0;
+  int within_noise = 0;
+  const auto is_within = [](const RouteFix& fix, const Pose2& truth) {
+    const auto& c = fix.covariance;
+    const double x_m = fix.pose.x_m - truth.x_m;
+    const double y_m = fix.pose.y_m - truth.y_m;
+    return c[4] * x_m * x_m - 2.0 * c[1] * x_m * y_m + c[0] * y_m * y_m <=
+           square_95 * (c[0] * c[4] - c[1] * c[1]);
+  };
+  for (int trial = 0; trial < 150; ++trial) {
+    const Pose2 truth = path[5 + random.index(path.size() - 10)] *
+                        Pose2{random.uniform(0.0, 0.1), random.uniform(-0.5, 0.5), 0.2};
+    const auto line = room.line(truth);
+    const auto fix = tracker.search(line);
+    if (!fix) continue;
+    ++found;
+    within += is_within(*fix, truth) ? 1 : 0;
+    const auto by_noise = tracker.lines().fit(line, fix->pose);
+    ASSERT_TRUE(by_noise.has_value());
+    within_noise += is_within(*by_noise, truth) ? 1 : 0;
+  }
+  std::printf("%d of %d within the ellipse, %d by the noise alone\n", within, found, within_noise);
+  EXPECT_GE(found, 130);
+  EXPECT_GE(within, 0.9 * found);
+  EXPECT_LT(within_noise, within);
+}
+
 TEST_F(RouteTracking, FollowsADriveAndTellsWayAndSide) {
   RouteTracker tracker(route);
   Pose2 robot = beside(4, 0.2, 0.3);

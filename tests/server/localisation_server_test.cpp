@@ -13,6 +13,7 @@
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav_server/place_json.hpp"
+#include "panonav_server/upload_page.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/viewer_peer.hpp"
@@ -113,6 +114,55 @@ TEST_F(LocalisationServerTest, TellsWhatThereIs) {
   }
   EXPECT_EQ(status_of(get(server, "/v1/memories/hall/localise")), 405);
   EXPECT_EQ(status_of(get(server, "/v1/memories", "", "DELETE")), 405);
+}
+
+TEST(UploadPage, EscapesNamesAndTellsTheAnswerInWords) {
+  const std::vector<PageMemory> memories{{"a", 3}, {"b", 5}};
+  const json answer{{"memory", "b"},
+                    {"known", true},
+                    {"known_probability", 0.874},
+                    {"matches",
+                     {{{"file", "<b>\"&' /%\xc3\xa9"}, {"dissimilarity", 5}, {"heading_rad", -0.5}},
+                      {{"file", "next"}, {"dissimilarity", 9}, {"heading_rad", nullptr}}}},
+                    {"position", {{"x_m", 1.5}, {"y_m", -2.0}, {"radius_m", nullptr}}},
+                    {"heading_rad", nullptr}};
+  const std::string page = make_upload_page(memories, "b", answer.dump());
+  for (const auto* part :
+       {"<h2>Known place</h2>", "<dd>87 %</dd>", "x 1.50 m, y -2.00 m</dd>",
+        "29 degrees to the right", "/v1/memories/b/views/%3Cb%3E%22%26%27%20%2F%25%C3%A9/picture\"",
+        "Most similar view: &lt;b&gt;&quot;&amp;&#39; /%\xc3\xa9</figcaption>",
+        "similar views: next", "<option value=\"b\" selected>b, 5 views</option>",
+        "accept=\"image/*\" capture"}) {
+    EXPECT_TRUE(contains(page, part));
+  }
+  EXPECT_EQ(page.find("<script"), std::string::npos);
+  EXPECT_EQ(page.find("http"), std::string::npos) << "no resource of another server";
+  EXPECT_TRUE(
+      contains(make_upload_page(memories, "a", "{\"error\": \"<i>\"}"), "<p>&lt;i&gt;</p>"));
+  EXPECT_TRUE(contains(make_upload_page(memories, "a", "Busy.\n"), "<p>Busy."));
+}
+
+TEST(UploadPage, ReadsFormsAndRefusesEverythingElse) {
+  const std::string kind = "multipart/form-data; boundary=xyz";
+  const auto part = [](const std::string& head, const std::string& content) {
+    return "--xyz\r\nContent-Disposition: form-data; " + head + "\r\n\r\n" + content + "\r\n";
+  };
+  const std::string whole = part("name=\"memory\"", "hall") +
+                            part("name=\"image\"; filename=\"\"", "") +
+                            part("name=\"image\"; filename=\"a; name=b\"", "a\r\n--xy\r\nb") +
+                            part("name=\"image\"", "second") + "--xyz--\r\n";
+  const auto form = read_upload_form(kind, whole);
+  ASSERT_TRUE(form);
+  EXPECT_EQ(form->memory, "hall");
+  EXPECT_EQ(form->picture, "a\r\n--xy\r\nb") << "the first that is not empty";
+  for (std::size_t length = 0; length + 4 < whole.size(); ++length) {
+    EXPECT_FALSE(read_upload_form(kind, std::string_view(whole).substr(0, length))) << length;
+  }
+  EXPECT_FALSE(read_upload_form("multipart/form-data", whole));
+  EXPECT_FALSE(read_upload_form("multipart/form-data; boundary=", whole));
+  EXPECT_FALSE(read_upload_form("multipart/form-data; boundary=other", whole));
+  EXPECT_FALSE(read_upload_form("text/plain; boundary=xyz", whole));
+  EXPECT_FALSE(read_upload_form("multipart/form-data; boundary=" + std::string(71, 'x'), whole));
 }
 
 TEST_F(LocalisationServerTest, RefusesWhatIsNoPictureAndGoesOn) {

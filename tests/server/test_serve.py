@@ -4,7 +4,9 @@ as strangers attack it: prints how many of 200 authorised requests were answered
 
 Usage: test_serve.py PANONAV
 """
+import base64
 import contextlib
+import html.parser
 import http.client
 import json
 import multiprocessing
@@ -99,6 +101,104 @@ def serve_under_attack(place: urllib.parse.SplitResult, picture: bytes, token: s
         attacker.join()
 
 
+class Page(html.parser.HTMLParser):
+    """The form, the texts and what a browser would load of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.fields: dict[str, str | None] = {}
+        self.files = 0
+        self.loaded: list[str] = []
+        self.form: dict[str, str | None] = {}
+        self.tags: set[str] = set()
+        self.text = ""
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        values = dict(attributes)
+        self.tags.add(tag)
+        if tag == "form":
+            self.form = values
+        if tag == "input" and values["type"] == "file":
+            self.files += 1
+            assert "image/*" in values["accept"] and values["name"] == "image", values
+        elif tag == "input" or (tag == "option" and ("selected" in values or "memory" not in self.fields)):
+            self.fields["memory"] = values["value"]
+        if address := values.get("src") or (values.get("href") if tag == "link" else None):
+            self.loaded.append(address)
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def use_the_page(place: urllib.parse.SplitResult, pictures: dict[str, bytes], expected: dict[str, dict]) -> None:
+    """A browser opens the bare address, sends the form, and loads what the answer shows; all without scripts."""
+    client = http.client.HTTPConnection(place.hostname, place.port, timeout=120)
+
+    def ask(method: str, path: str, body: bytes = b"", **headers: str) -> tuple[http.client.HTTPResponse, bytes]:
+        client.request(method, path, body, {name.replace("_", "-"): value for name, value in headers.items()})
+        response = client.getresponse()
+        return response, response.read()
+
+    browser = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"
+    response, text = ask("GET", "/", Accept=browser)
+    assert response.status == 200 and response.headers["Content-Type"] == "text/html; charset=utf-8"
+    policy = response.headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy and "unsafe" not in policy and "script" not in policy, policy
+    page = Page(text.decode())
+    assert "script" not in page.tags and "style" not in page.tags and b"http" not in text, text
+    assert page.form["method"] == "post" and page.form["enctype"] == "multipart/form-data" and page.files == 2
+    for address in page.loaded:
+        assert ask("GET", address)[0].status == 200, address
+    for accept in ({}, {"Accept": "*/*"}):  # programs get the list as before
+        assert json.loads(ask("GET", "/", **accept)[1])["memories"][0]["name"] == "office"
+
+    def send(files: list[bytes], memory: str | None = page.fields["memory"], **headers: str) -> tuple[int, Page]:
+        parts = [b'Content-Disposition: form-data; name="memory"\r\n\r\n' + str(memory).encode()]
+        parts += [b'Content-Disposition: form-data; name="image"; filename="a;b.png"\r\nContent-Type: image/png\r\n\r\n' + one
+                  for one in files]
+        body = b"".join(b"--+x+\r\n" + part + b"\r\n" for part in parts) + b"--+x+--\r\n"
+        headers = {"Content-Type": 'multipart/form-data; boundary="+x+"', "Accept": browser,
+                   "Origin": place.geturl(), **headers}
+        response, text = ask("POST", str(page.form["action"]), body, **headers)
+        assert response.headers["Content-Type"] == "text/html; charset=utf-8", response.headers
+        return response.status, Page(text.decode())
+
+    for view, picture in pictures.items():
+        for files in ([picture, b""], [b"", picture]):  # chosen, or photographed
+            status, answer = send(files)
+            assert status == 200 and ("Known place" in answer.text) == expected[view]["known"], answer.text
+            best = expected[view]["matches"][0]["file"]
+            assert best in answer.text and "Probability" in answer.text, answer.text
+            if position := expected[view]["position"]:
+                assert f"x {position['x_m']:.2f} m".replace("-0.00", "0.00") in answer.text, answer.text
+            shown = [address for address in answer.loaded if "/views/" in address]
+            response, thumbnail = ask("GET", shown[0])
+            assert response.status == 200 and thumbnail.startswith(b"\x89PNG"), shown
+            assert answer.fields["memory"] == "office" and answer.files == 2, "the form can be used again"
+    good = next(iter(pictures.values()))
+    for status, words, answer in (
+            (422, "no image was chosen", send([b"", b""])), (422, "the image", send([b"no image"])),
+            (404, "no memory <b>", send([good], "<b>")), (422, "the image", send([good[:200]]))):
+        assert answer[0] == status and "No answer" in answer[1].text and words in answer[1].text, answer[1].text
+        assert "b" not in answer[1].tags, "names are escaped"
+    for body, kind in ((b"x", "text/plain"), (b"--x", "multipart/form-data; boundary=x"), (b"", "multipart/form-data"),
+                       (b"--x\r\nContent-Disposition: form-data; name=\"image\"", "multipart/form-data; boundary=x")):
+        response, text = ask("POST", "/", body, Content_Type=kind)
+        assert response.status == 400 and b"is not the form" in text, text
+    response, _ = ask("POST", "/", b"", Origin="http://other.example", Content_Type="multipart/form-data; boundary=x")
+    assert response.status == 403
+    client.close()
+    if curl := shutil.which("curl"):  # whose forms nobody here wrote
+        with tempfile.NamedTemporaryFile(suffix=".png") as file:
+            file.write(good)
+            file.flush()
+            got = subprocess.run([curl, "--silent", "--fail", "--max-time", "120", "-F", "memory=office",
+                                  "-F", f"image=@{file.name}", place.geturl() + "/"], check=True, capture_output=True)
+            assert b"Most similar view" in got.stdout, got.stdout
+
+
 def main() -> int:
     panonav = sys.argv[1]
 
@@ -115,7 +215,7 @@ def main() -> int:
         folder = pathlib.Path(name)
         recording, memory = folder / "run", folder / "office.panonav"
         run("simulate", "office", str(recording), "--random", "36", "--quiet")
-        run("memorise", str(recording), str(memory), "--quiet")
+        run("memorise", str(memory), str(recording), "--quiet")
         expected = {}
         for line in run("localise", str(memory), str(recording), "--json").splitlines():
             answer = json.loads(line)
@@ -147,6 +247,8 @@ def main() -> int:
                                       f"{place.geturl()}/v1/memories/office/localise"],
                                      check=True, capture_output=True)
                 assert json.loads(got.stdout) == expected[view]
+            client.close()
+            use_the_page(place, {view: (recording / view).read_bytes() for view in list(expected)[:3]}, expected)
             client.request("GET", "/metrics")
             lines = client.getresponse().read().decode().splitlines()
             sample = re.compile(r'[a-z_]+(\{[a-z_]+="[^"\\]*"(,[a-z_]+="[^"\\]*")*\})? [0-9.e+-]+')
@@ -186,7 +288,18 @@ def main() -> int:
             for headers, status in (({}, 401), ({"Authorization": "Bearer a-token-of-some-length"}, 200)):
                 client = http.client.HTTPConnection(place.hostname, place.port, timeout=120)
                 client.request("GET", "/v1/memories/hall", headers=headers)
-                assert client.getresponse().status == status
+                response = client.getresponse()
+                assert response.status == status
+                assert ("Basic" in response.headers.get("WWW-Authenticate", "")) == (status == 401)
+                client.close()
+            for password, origin, status in (("a-token-of-some-length", None, 200), ("another-token", None, 401),
+                                             ("a-token-of-some-length", place.geturl(), 200),
+                                             ("a-token-of-some-length", "http://other.example", 401)):
+                sent = base64.b64encode(f"anybody:{password}".encode()).decode()  # as browsers send a password
+                headers = {"Authorization": f"Basic {sent}", "Accept": "text/html", **({"Origin": origin} if origin else {})}
+                client = http.client.HTTPConnection(place.hostname, place.port, timeout=120)
+                client.request("GET", "/", headers=headers)
+                assert client.getresponse().status == status, (password, origin)
                 client.close()
             picture = (recording / next(iter(expected))).read_bytes()
             serve_under_attack(place, picture, "a-token-of-some-length")

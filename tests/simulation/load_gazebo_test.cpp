@@ -66,8 +66,9 @@ TEST_F(GazeboWorld, PosesScalesAndUnitsAreComposed) {
   EXPECT_EQ(scene.name, "tiny");
   // 100 x 50 x 25 cm, twice as long, raised by 0.5 m, turned by 90 degrees at (2, 1).
   expect_box(extent_of(scene, "crate_turned"), {1.5, 1.0, 0.5}, {2.0, 3.0, 0.75});
-  // Modelled with y up, 1 x 0.5 x 0.25 m; the large glass ball is left out.
-  expect_box(extent_of(scene, "stand"), {-3.0, -0.25, 1.0}, {-2.0, 0.0, 1.5});
+  // 1 x 0.5 x 0.25 m, written with <up_axis>Y_UP</up_axis>, which Gazebo ignores; the large glass
+  // ball is left out.
+  expect_box(extent_of(scene, "stand"), {-3.0, 0.0, 1.0}, {-2.0, 0.5, 1.25});
   expect_box(extent_of(scene, "red_wall"), {-4.0, 3.9, 0.0}, {4.0, 4.1, 2.0});
   expect_box(extent_of(scene, "ground"), {-50.0, -50.0, 0.0}, {50.0, 50.0, 0.0});
   // The plate lies first, then stands: rolled by 90 degrees, its y side points up.
@@ -275,6 +276,48 @@ TEST_F(GazeboWorld, WarningsAreCountedNotRepeated) {
   EXPECT_TRUE(contains(scene.warnings[1], "(2 times)"));
 }
 
+TEST_F(GazeboWorld, MeshesKeepTheirAxesAsInGazebo) {
+  // A tetrahedron 1.6 m high along z, in each format.
+  const auto collada = [](const std::string& up_axis, const std::string& unit) {
+    return "<COLLADA version='1.4.1'><asset><unit meter='" + unit + "'/><up_axis>" + up_axis +
+           "</up_axis></asset><library_geometries><geometry id='g'><mesh><source id='s'>"
+           "<float_array id='a' count='12'>0 0 0 1 0 0 0 1 0 0 0 1.6</float_array>"
+           "<technique_common><accessor source='#a' count='4' stride='3'/></technique_common>"
+           "</source><vertices id='v'><input semantic='POSITION' source='#s'/></vertices>"
+           "<triangles count='2'><input semantic='VERTEX' source='#v' offset='0'/>"
+           "<p>0 1 3 0 1 2</p></triangles></mesh></geometry></library_geometries>"
+           "<library_visual_scenes><visual_scene id='w'><node><instance_geometry url='#g'/></node>"
+           "</visual_scene></library_visual_scenes><scene><instance_visual_scene url='#w'/></scene>"
+           "</COLLADA>";
+  };
+  folder_.write("x.dae", collada("X_UP", "1"));
+  folder_.write("y.dae", collada("Y_UP", "1"));
+  folder_.write("z.dae", collada("Z_UP", "1"));
+  folder_.write("y_cm.dae", collada("Y_UP", "0.01"));
+  folder_.write("part.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1.6\nf 1 2 4\nf 1 2 3\n");
+  // The corners (0, 0, 0), (1, 1, 0), (0, 1, 1.6) as three times three floats.
+  folder_.write("part.gltf", R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+      "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+      "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3",
+      "min":[0,0,0],"max":[1,1,1.6]}],"bufferViews":[{"buffer":0,"byteLength":36}],
+      "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)"
+                             "AAAAAAAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD/NzMw/\"}]}");
+  for (const auto& [file, scale] :
+       {std::pair("x.dae", 1.0), std::pair("y.dae", 1.0), std::pair("z.dae", 1.0),
+        std::pair("y_cm.dae", 0.01), std::pair("part.obj", 1.0), std::pair("part.gltf", 1.0)}) {
+    SCOPED_TRACE(file);
+    const auto world = folder_.write(
+        "axes.world", std::string("<sdf version='1.6'><model name='m'><link name='l'><visual "
+                                  "name='v'><geometry><mesh><uri>") +
+                          file + "</uri></mesh></geometry></visual></link></model></sdf>");
+    const auto [low, high] = extent_of(load_gazebo(world, options()), "m");
+    EXPECT_NEAR(low.z_m, 0.0, 1e-6);
+    EXPECT_NEAR(high.z_m, 1.6 * scale, 1e-6);
+    EXPECT_NEAR(high.x_m, scale, 1e-6);
+    EXPECT_NEAR(high.y_m, scale, 1e-6);
+  }
+}
+
 TEST_F(GazeboWorld, LettersOfOtherCaseAreFound) {
   const auto world = folder_.write("case.world", R"(<sdf version="1.6"><world name="w">
     <include><uri>model://CRATE</uri></include>
@@ -346,6 +389,23 @@ TEST_F(GazeboWorld, PosesMayBeRelativeToFrames) {
   expect_at(
       "<model name='m'><origin pose='1 2 3 0 0 0'/><link name='l'><visual name='v'><geometry><box "
       "size='0.2 0.2 0.2'/></geometry></visual></link></model>");
+}
+
+TEST_F(GazeboWorld, ModelsAreFoundByTheNameOfThePackage) {
+  fs::create_directories(folder_ / "pack/worlds");
+  fs::create_directories(folder_ / "pack/models/cube");
+  folder_.write("pack/models/cube/model.sdf",
+                "<sdf version='1.6'><model name='cube'><link name='l'><visual name='v'><geometry>"
+                "<box><size>1 1 1</size></box></geometry></visual></link></model></sdf>");
+  for (const std::string uri : {"model://pack/models/cube", "package://pack/models/cube",
+                                "model://cube", "file://../models/cube"}) {
+    SCOPED_TRACE(uri);
+    // A pose without angles is a position.
+    const auto world = folder_.write("pack/worlds/w.world",
+                                     "<sdf version='1.6'><world name='w'><include><uri>" + uri +
+                                         "</uri><pose>1 2 3</pose></include></world></sdf>");
+    expect_box(extent_of(load_gazebo(world, options()), "cube"), {0.5, 1.5, 2.5}, {1.5, 2.5, 3.5});
+  }
 }
 
 TEST_F(GazeboWorld, AModelThatIncludesItselfIsLeftOut) {

@@ -158,6 +158,91 @@ TEST_F(MeshFile, ColladaNumbersMayHaveBlanksBeforeThem) {
   EXPECT_NEAR(area(scene), 8.0, 1e-5);
 }
 
+TEST_F(MeshFile, WhatIsNotShownMayBeFaulty) {
+  const std::string triangles =
+      "<triangles count='2'><input semantic='VERTEX' source='#v' offset='0'/><p>0 1 2 0 2 "
+      "3</p></triangles>";
+  const std::string good = collada(triangles);
+  const auto replace = [&](std::string_view old, const std::string& by) {
+    std::string text = good;
+    const auto at = text.find(old);
+    EXPECT_NE(at, std::string::npos) << old;
+    return text.replace(at, old.size(), by);
+  };
+  const std::string camera =
+      "<library_cameras><camera id='c' name='View'><optics/></camera></library_cameras>";
+  const std::string camera_node = "<node id='View' name='View'><instance_camera url='#c'/></node>";
+  struct Fault {
+    const char* kind;
+    std::string text;
+  };
+  for (const Fault& fault : {
+           Fault{"nothing", good},
+           {"two cameras of one name",
+            replace("<node id=\"n\">", camera_node + camera_node + "<node id='n'>")
+                .replace(good.find("<library_effects"), 0, camera)},
+           {"unknown light", replace("</node>", "<instance_light url='#no'/></node>")},
+           {"animation of nothing",
+            replace("<library_effects>",
+                    "<library_animations><animation><channel source='#no' target='no/x'/>"
+                    "</animation></library_animations><library_effects>")},
+           {"missing image",
+            replace("<color>1 0 0 1</color>", "<texture texture='lost' texcoord='UV'/>")},
+           {"normals that do not exist",
+            replace("<p>0 1 2 0 2 3</p>",
+                    "<input semantic='NORMAL' source='#no' offset='1'/><p>0 9 1 9 2 9 0 9 2 9 3 "
+                    "9</p>")},
+           {"texture coordinates that do not exist",
+            replace(
+                "<p>0 1 2 0 2 3</p>",
+                "<input semantic='TEXCOORD' source='#no' offset='1' set='0'/><p>0 9 1 9 2 9 0 9 "
+                "2 9 3 9</p>")},
+           {"wrong numbers of triangles and values",
+            replace("count='2'", "count='7'").replace(good.find("count=\"33\""), 10, "count='90'")},
+           {"a triangle of vertices that do not exist",
+            replace("<p>0 1 2 0 2 3</p>", "<p>0 1 2 0 2 3 0 1 77</p>")},
+           {"a vertex that is no number",
+            replace("0.5 3.8 0</float_array>", "1.#QNAN 3.8 0</float_array>")},
+           {"lines beside the triangles",
+            replace("<triangles", "<lines count='9'><p>0 1 2 3 4 5</p></lines><triangles")},
+           {"skin",
+            replace("<instance_geometry url=\"#g\"/>",
+                    "<instance_controller url='#k'><skeleton>#no</skeleton></instance_controller>")
+                .replace(good.find("<library_visual_scenes"), 0,
+                         "<library_controllers><controller id='k'><skin source='#g'><joints/>"
+                         "<vertex_weights count='99'/></skin></controller></library_controllers>")},
+       }) {
+    SCOPED_TRACE(fault.kind);
+    const Scene scene = load_mesh(folder_.write("faulty.dae", fault.text));
+    EXPECT_NO_THROW(validate(scene));
+    EXPECT_NEAR(area(scene), 16.0, 1e-5);
+    expect_extent(scene, {0.0, 0.0, 0.0}, {4.0, 4.0, 0.0});
+  }
+}
+
+TEST_F(MeshFile, AllPrimitivesOfColladaAreRead) {
+  const std::string vertices = "<input semantic='VERTEX' source='#v' offset='0'/>";
+  for (const std::string primitives :
+       {"<triangles>" + vertices + "<p>0 1 2 0 2 3</p></triangles>",
+        "<polylist>" + vertices + "<vcount>4</vcount><p>0 1 2 3</p></polylist>",
+        "<polygons>" + vertices + "<p>0 1 2 3</p></polygons>",
+        "<trifans>" + vertices + "<p>0 1 2 3</p></trifans>",
+        "<tristrips>" + vertices + "<p>1 2 0 3</p></tristrips>"}) {
+    SCOPED_TRACE(primitives);
+    const Scene scene = load_mesh(folder_.write("part.dae", collada(primitives)));
+    EXPECT_NEAR(area(scene), 16.0, 1e-5);
+    // All corners counter-clockwise seen from above.
+    for (const Mesh& mesh : scene.meshes) {
+      for (const auto& t : mesh.triangles) {
+        const Vector3& a = mesh.vertices[t[0]];
+        const Vector3& b = mesh.vertices[t[1]];
+        const Vector3& c = mesh.vertices[t[2]];
+        EXPECT_GT((b.x_m - a.x_m) * (c.y_m - a.y_m) - (c.x_m - a.x_m) * (b.y_m - a.y_m), 0.0);
+      }
+    }
+  }
+}
+
 TEST_F(MeshFile, BrokenFilesGiveOneClearLine) {
   const std::string good = [] {
     std::ifstream stream(meshes / "crate_z_up_cm.dae");

@@ -35,9 +35,14 @@ TEST_F(MemoryFileContent, HeadersComeBack) {
   for (const CameraModel& model :
        {CameraModel(HyperboloidalModel{}), CameraModel(UnifiedModel{0.9, 200.0}),
         CameraModel(UnifiedModel{0.9, 200.0, UnifiedModel::Axis::up}),
+        CameraModel(FisheyeModel{20.0, 0.01, 0.0, 0.0, 0.0, 1.7, UnifiedModel::Axis::up}),
         CameraModel(EquiangularModel{-0.9, 0.4})}) {
     headers.push_back(mirror_header());
     headers.back().source.camera->model = model;
+    if (std::holds_alternative<UnifiedModel>(model)) {
+      headers.back().source.camera->affine = {1.01, 0.0, -0.002};
+      headers.back().source.camera->distortion = {0.01, 0.0, 1e-3, 0.0, 0.0};
+    }
     headers.back().source.mask.reset();
   }
   headers.push_back(mirror_header());

@@ -76,9 +76,23 @@ TEST_F(ReportPages, TablesHaveAsManyCellsAsTheirHeader) {
   ReportPage page("t", "l");
   page.add_table({"a", "b"}, {{"1", "2"}, {"3", "4"}});
   EXPECT_TRUE(contains(write(page),
-                       "<tr><th>a</th><th>b</th></tr>\n<tr><td>1</td><td>2</td></tr>\n"
-                       "<tr><td>3</td><td>4</td></tr>\n"));
+                       "<tr><th>a</th><th>b</th></tr>\n"
+                       "<tr><td class=\"short\" data-name=\"a\">1</td>"
+                       "<td class=\"short\" data-name=\"b\">2</td></tr>\n"
+                       "<tr><td class=\"short\" data-name=\"a\">3</td>"
+                       "<td class=\"short\" data-name=\"b\">4</td></tr>\n"));
   EXPECT_THROW(page.add_table({"a", "b"}, {{"1", "2"}, {"3"}}), ContractError);
+}
+
+TEST_F(ReportPages, TablesHaveNoColumnThatIsEmptyInAllRows) {
+  ReportPage page("t", "l");
+  page.add_table({"a", "b", "c", "d"}, {{"", "2", "", "4"}, {"", "", "", "5"}});
+  const std::string text = write(page);
+  EXPECT_TRUE(contains(text, "<tr><th>b</th><th>d</th></tr>\n"));
+  EXPECT_TRUE(contains(text, "data-name=\"b\"></td><td class=\"short\" data-name=\"d\">5</td>"));
+  ReportPage bare("t", "l");
+  bare.add_table({"a", "b"}, {});
+  EXPECT_TRUE(contains(write(bare), "<tr><th>a</th><th>b</th></tr>\n"));
 }
 
 TEST_F(ReportPages, PicturesOfTheFolderAreEmbeddedByteForByte) {

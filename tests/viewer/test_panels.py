@@ -22,7 +22,7 @@ WEB = HERE.parent.parent / "src" / "panonav_viewer" / "web"
 REFERENCES = HERE / "panels"
 CELL_PX = 8
 TOLERANCE = 8  # of 255
-SIZES = {"pn-map": (480, 360), "pn-timeline": (480, 120), "pn-pictures": (496, 800)}
+SIZES = {"pn-map canvas": (480, 360), "pn-timeline": (480, 120), "pn-pictures": (496, 800)}
 PANELS = {"map": "pn-map canvas", "timeline": "pn-timeline canvas", "panorama": "#panorama-figure canvas",
           "best": "#best-figure canvas", "difference": "#difference-figure canvas"}
 # The mean colours of a canvas over the page's ground, as [columns, rows, PNG of a pixel a cell].
@@ -118,7 +118,7 @@ def page(run):
     imports = {"panonav/" + file.stem: "data:text/javascript;charset=utf-8," + urllib.parse.quote(file.read_text())
                for file in WEB.glob("*.js")}
     style = (WEB / "viewer.css").read_text() + "pn-run, .shown { display: block !important; height: auto !important; }" + "".join(
-        f"{name} {{ width: {width}px !important; height: {height}px !important; }}"
+        f"{name} {{ width: {width}px !important; height: {height}px !important; flex: none !important; }}"
         for name, (width, height) in SIZES.items())
     script = "CanvasRenderingContext2D.prototype.fillText = () => {};"
     text = (WEB / "index.html").read_text().replace("<style>", f"<script>{script}</script><style>", 1)

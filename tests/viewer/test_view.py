@@ -24,7 +24,7 @@ def record(folder):
                    check=True, capture_output=True)
     subprocess.run([PANONAV, "simulate", "hall", folder / "drive", "--kind", "panorama", "--seed", "3", "--path",
                     "walk", "--spacing-m", "0.06", "--poses", "60"], check=True, capture_output=True)
-    subprocess.run([PANONAV, "memorise", folder / "grid", folder / "hall.panonav"], check=True, capture_output=True)
+    subprocess.run([PANONAV, "memorise", folder / "hall.panonav", folder / "grid"], check=True, capture_output=True)
 
 
 def every_panel_draws(browser):
@@ -224,13 +224,13 @@ def watch_verbs(folder):
     drive, memory = folder / "short", folder / "hall.panonav"
     panonav("simulate", "hall", drive, "--kind", "panorama", "--path", "walk", "--spacing-m", "0.1", "--poses", "12",
             "--rows", "40", "--columns", "256", "--rays-per-axis", "1")
-    panonav("memorise", drive, memory)
-    panonav("route", "record", drive, memory)
+    panonav("memorise", memory, drive)
+    panonav("route", "record", memory, drive)
     verbs = {
         "localise": ([memory, drive], {"pose", "turn", "probability", "compared"}, {"references", "names", "regions"}),
         "track": ([memory, drive, "--record", folder / "track.mcap"],
                   {"pose", "particles", "modes", "compared", "turn", "probability"}, {"references", "names", "regions"}),
-        "map": ([drive, folder / "map.panonav"], {"pose"}, {"references", "names", "edges"}),
+        "map": ([folder / "map.panonav", drive], {"pose"}, {"references", "names", "edges"}),
         "route follow": ([memory, drive], {"pose", "covariance"}, {"plan"}),
         "navigate": ([memory, "--goal", "view_00011.png", "--scene", "hall"], {"pose", "probability"},
                      {"references", "plan", "directions", "goal", "walls", "regions"}),

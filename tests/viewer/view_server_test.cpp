@@ -38,6 +38,26 @@ TEST(ViewServer, GivesNothingToWhoDoesNotKnowTheToken) {
   EXPECT_NE(ViewServer().url().substr(url.size() - 33), url.substr(url.size() - 33));
 }
 
+TEST(ViewServer, SaysAtItsBareAddressWhereTheCompleteOneIs) {
+  ViewServer server({.title = "the secret hall"});
+  const std::string url = server.url();
+  const std::string host = Peer(url).host();
+  const auto answer = [&](const std::string& path, const std::string& named) {
+    Peer peer(url);
+    peer.say("GET " + path + " HTTP/1.1\r\nHost: " + named + "\r\nConnection: close\r\n\r\n");
+    return peer.hear_all();
+  };
+  for (const std::string& path : {std::string("/"), Peer(url).root().substr(0, 20)}) {
+    const std::string text = answer(path, host);
+    EXPECT_EQ(status_of(text), 404);
+    EXPECT_NE(text.find("\r\nContent-Type: text/html"), std::string::npos) << text;
+    EXPECT_NE(text.find("<b>Open http://</b>"), std::string::npos);
+    EXPECT_EQ(text.find("the secret hall"), std::string::npos);
+    EXPECT_EQ(text.find("<script"), std::string::npos);
+  }
+  EXPECT_EQ(answer("/", "example.com").find("Open http"), std::string::npos);
+}
+
 TEST(ViewServer, ServesThePageAndItsRunAlone) {
   ViewServer server;
   server.add(moment_at(1.0));

@@ -165,6 +165,12 @@ void Arguments::option(const std::string& flag, const std::string& words,
   add(flag, words, help, [&value](auto typed) { value = {typed[0], typed[1]}; });
 }
 
+void Arguments::option(const std::string& flag, const std::string& words,
+                       std::optional<std::vector<std::string>>& value, const std::string& help) {
+  add(flag, words, help,
+      [&value](auto typed) { value.emplace(std::begin(typed), std::end(typed)); });
+}
+
 void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
   auto& info = add(flag, "INT", help, [&value, low, name = long_flag(flag)](auto words) {
     value = parse_whole_number(name, words.front(), low);
@@ -249,6 +255,12 @@ void Arguments::declare_outputs(std::initializer_list<std::string_view> names) {
   }
 }
 
+std::string_view Arguments::interruption_text() const {
+  if (!interruption_text_.empty() && (!writes_ || writes_())) return interruption_text_;
+  const bool has_output = std::ranges::any_of(implementation_->values, &NamedValue::is_output);
+  return has_output ? "No output was written. To start over, run the same command again." : "";
+}
+
 std::string Arguments::explain_unknown_flag(const std::string& typed) const {
   std::vector<std::string_view> names;
   for (const auto& info : infos()) {
@@ -266,6 +278,7 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb,
     });
   };
   std::vector<std::string> positional_words;
+  std::vector<std::string> option_words;
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     if (word == "--") {
@@ -282,6 +295,7 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb,
     const std::string name = word.substr(0, is_long ? word.find('=') : 2);
     const auto found = find(name);
     if (found == infos.end()) throw UsageError(explain_unknown_flag(is_long ? name : word));
+    const std::size_t first = i;
     std::vector<std::string> values;
     if (name.size() < word.size()) values.push_back(word.substr(name.size() + (is_long ? 1 : 0)));
     const auto value_count = static_cast<std::size_t>(
@@ -293,6 +307,8 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb,
       }
       values.push_back(words[++i]);
     }
+    option_words.insert(option_words.end(), words.begin() + static_cast<std::ptrdiff_t>(first),
+                        words.begin() + static_cast<std::ptrdiff_t>(i) + 1);
     const auto number = static_cast<std::size_t>(found - infos.begin());
     const bool is_first = implementation_->typed.insert(found->name).second;
     if (!is_first && value_count > 0) throw UsageError(found->name + " is given twice");
@@ -300,7 +316,8 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb,
     const auto plain = implementation_->plain.find(found->name);
     if (plain != implementation_->plain.end()) plain->second = values.front();
   }
-  read_positionals(positional_words, verb, allow_missing);
+  require_memory_in_its_place(positional_words, option_words, verb);
+  read_positionals(positional_words, allow_missing);
   for (std::size_t i = 0; i < infos.size() && !allow_missing; ++i) {
     if (infos[i].required && !infos[i].positional() &&
         !implementation_->typed.contains(infos[i].name)) {
@@ -309,16 +326,20 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb,
   }
 }
 
-void Arguments::read_positionals(std::span<const std::string> words, std::string_view verb,
-                                 bool allow_missing) {
-  const auto& infos = implementation_->infos;
+std::vector<std::size_t> Arguments::find_positionals() const {
   std::vector<std::size_t> positionals;
-  for (std::size_t i = 0; i < infos.size(); ++i) {
-    if (infos[i].positional()) positionals.push_back(i);
+  for (std::size_t i = 0; i < infos().size(); ++i) {
+    if (infos()[i].positional()) positionals.push_back(i);
   }
-  // Reports arguments in the wrong order: MEMORY is not a memory file, but another positional is.
+  return positionals;
+}
+
+void Arguments::require_memory_in_its_place(std::span<const std::string> words,
+                                            std::span<const std::string> option_words,
+                                            std::string_view verb) const {
+  const auto positionals = find_positionals();
   for (std::size_t i = 0; i < std::min(positionals.size(), words.size()); ++i) {
-    if (infos[positionals[i]].name != "MEMORY" || infos[positionals[i]].repeated ||
+    if (infos()[positionals[i]].name != "MEMORY" || infos()[positionals[i]].repeated ||
         words[i].ends_with(".panonav") || is_server_address(words[i])) {
       continue;
     }
@@ -329,13 +350,18 @@ void Arguments::read_positionals(std::span<const std::string> words, std::string
     std::swap(swapped[i], swapped[memory_index]);
     std::string command = "panonav " + std::string(verb);
     for (const auto& word : swapped) command.append(" ").append(quote_for_shell(word));
+    for (const auto& word : option_words) command.append(" ").append(quote_for_shell(word));
     throw UsageError("MEMORY is '" + words[i] + "' and " +
-                     infos[positionals[std::min(memory_index, positionals.size() - 1)]].name +
+                     infos()[positionals[std::min(memory_index, positionals.size() - 1)]].name +
                      " is '" + *other + "': the arguments are in the wrong order (did you mean '" +
                      command + "'?)");
   }
+}
+
+void Arguments::read_positionals(std::span<const std::string> words, bool allow_missing) {
+  const auto& infos = implementation_->infos;
   std::size_t next = 0;
-  for (const std::size_t i : positionals) {
+  for (const std::size_t i : find_positionals()) {
     if (next == words.size()) {
       if (infos[i].required && !allow_missing) throw UsageError(infos[i].name + " is required");
       continue;
@@ -349,13 +375,13 @@ void Arguments::read_positionals(std::span<const std::string> words, std::string
   }
 }
 
-void Arguments::resolve(const std::optional<std::string>& config,
-                        const std::function<std::vector<std::string>()>& sections_of_all_verbs) {
+EarlierOutputs Arguments::resolve(const std::optional<std::string>& config,
+                                  const std::function<std::vector<std::string>()>& all_sections) {
   std::optional<OptionFile> file;
   if (config) {
     file.emplace(*config);
     const auto own = sections();
-    const auto others = sections_of_all_verbs();
+    const auto others = all_sections();
     const std::vector<std::string_view> own_views(own.begin(), own.end());
     const std::vector<std::string_view> other_views(others.begin(), others.end());
     file->require_sections(own_views, other_views);
@@ -382,7 +408,7 @@ void Arguments::resolve(const std::optional<std::string>& config,
   for (const auto& [options, used, why] : implementation_->refusals) {
     if (!used()) reject_options(options, why);
   }
-  require_separate_outputs(implementation_->values);
+  return require_separate_outputs(implementation_->values);
 }
 
 void Arguments::reject_options_unless(std::vector<std::string> options, std::function<bool()> used,
@@ -466,9 +492,7 @@ std::string Arguments::config_template(std::string_view verb) const {
               " = " + quote_for_toml(plain->second.value_or(info.default_value)) + "\n";
     }
   }
-  if (implementation_->sections.empty()) {
-    text += "# A file cannot set options of this verb.\n";
-  }
+  if (implementation_->sections.empty()) text += "# A file cannot set options of this verb.\n";
   text.pop_back();  // whoever prints it ends the line
   return text;
 }

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/outputs.hpp"
 #include "cli/session.hpp"
 #include "cli/verb.hpp"
 #include "panonav/core/options.hpp"
@@ -88,6 +89,10 @@ class Arguments {
   /// BASE".
   void option(const std::string& flag, const std::string& words,
               std::optional<std::pair<std::string, std::string>>& value, const std::string& help);
+  /// Declares an option that takes as many words as `words` names in help texts, such as "VIEW VIEW
+  /// LENGTH".
+  void option(const std::string& flag, const std::string& words,
+              std::optional<std::vector<std::string>>& value, const std::string& help);
   /// Declares an option that takes an integer of at least `low`.
   void option(const std::string& flag, int& value, int low, const std::string& help);
   void option(const std::string& flag, std::optional<int>& value, int low, const std::string& help);
@@ -116,6 +121,15 @@ class Arguments {
   /// one that another argument names (outputs.hpp). Throws logic_error if no argument has such a
   /// name.
   void declare_outputs(std::initializer_list<std::string_view> names);
+
+  /// Sets what Ctrl-C prints if `writes` returns true after `resolve` (empty: always): which
+  /// results are kept and how to continue. Default: a text for verbs with outputs.
+  void explain_interruption(std::string_view text, std::function<bool()> writes = {}) {
+    interruption_text_ = text;
+    writes_ = std::move(writes);
+  }
+  /// Returns that text, empty if this call of the verb writes nothing. Valid after `resolve`.
+  [[nodiscard]] std::string_view interruption_text() const;
 
   /// Makes `--help` show these flags, or only `--help-all`. Throws logic_error if a flag was not
   /// declared before.
@@ -158,9 +172,11 @@ class Arguments {
   /// `allow_missing` not for missing required arguments.
   void read(std::span<const std::string> words, std::string_view verb, bool allow_missing);
   /// Fills the option structs from the config file, then from the flags, and checks them. Called
-  /// after `read`. The file may also have sections that only other verbs use.
-  void resolve(const std::optional<std::string>& config,
-               const std::function<std::vector<std::string>()>& sections_of_all_verbs);
+  /// after `read`. The file may also have sections that only other verbs use. Returns the outputs
+  /// that exist already.
+  [[nodiscard]] EarlierOutputs resolve(
+      const std::optional<std::string>& config,
+      const std::function<std::vector<std::string>()>& all_sections);
   [[nodiscard]] std::vector<std::string> sections() const;
 
   [[nodiscard]] const std::vector<ArgumentInfo>& infos() const;
@@ -179,11 +195,19 @@ class Arguments {
                      const std::string& message_end) const;
   void set_in_short_help(std::initializer_list<std::string_view> flags, bool is_in_short_help);
   [[nodiscard]] std::string explain_unknown_flag(const std::string& typed) const;
-  void read_positionals(std::span<const std::string> words, std::string_view verb,
-                        bool allow_missing);
+  /// Returns the indices of all positionals.
+  [[nodiscard]] std::vector<std::size_t> find_positionals() const;
+  /// Throws UsageError with the corrected command if MEMORY is not a memory file, but another
+  /// positional is.
+  void require_memory_in_its_place(std::span<const std::string> words,
+                                   std::span<const std::string> option_words,
+                                   std::string_view verb) const;
+  void read_positionals(std::span<const std::string> words, bool allow_missing);
 
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
+  std::string_view interruption_text_;
+  std::function<bool()> writes_;  ///< whether the text applies; empty: always
 };
 
 /// A verb with its arguments filled in, ready to run.
@@ -191,6 +215,7 @@ struct ParsedCommand {
   std::string_view verb;
   SessionOptions session;
   Run run;
+  std::string_view interruption_text = {};  ///< printed at Ctrl-C; empty: nothing
 };
 
 /// Parses the command line. For flags such as --help it returns a command that prints the text.

@@ -169,6 +169,25 @@ std::string find_summary(std::string_view word, std::span<const Description> ver
   return std::string(found == verbs.end() ? "Verbs of two words" : found->verb.summary);
 }
 
+/// Returns the commands that propose the first words of the verbs, group by group.
+std::string make_zsh_verb_proposals(std::span<const Description> verbs) {
+  std::string script;
+  for (const auto& [group, title] : verb_groups()) {
+    std::vector<Description> members;
+    for (const auto& description : verbs) {
+      if (description.verb.group == group) members.push_back(description);
+    }
+    if (members.empty()) continue;
+    script += "    verbs=(\n";
+    for (const auto& word : list_first_words(members)) {
+      script += "      '" + word + ":" + quote_for_zsh(find_summary(word, members), "") + "'\n";
+    }
+    std::string tag(title.substr(0, title.find(' ')));
+    script += "    )\n    _describe -t verbs-" + tag + " '" + std::string(title) + "' verbs\n";
+  }
+  return script;
+}
+
 std::string make_zsh_script(std::span<const Description> verbs) {
   std::string script =
       "#compdef panonav\n"
@@ -176,11 +195,8 @@ std::string make_zsh_script(std::span<const Description> verbs) {
       "_panonav() {\n"
       "  local verb=$words[2]\n"
       "  local -a verbs\n"
-      "  if (( CURRENT == 2 )); then\n    verbs=(\n";
-  for (const auto& word : list_first_words(verbs)) {
-    script += "      '" + word + ":" + quote_for_zsh(find_summary(word, verbs), "") + "'\n";
-  }
-  script += "    )\n    _describe verb verbs\n    return\n  fi\n";
+      "  if (( CURRENT == 2 )); then\n" +
+      make_zsh_verb_proposals(verbs) + "    return\n  fi\n";
   for (const auto& [first, seconds] : list_second_words(verbs)) {
     script += "  if [[ $verb == " + first +
               " ]]; then\n"

@@ -38,6 +38,19 @@ std::vector<Description> describe(std::span<const Verb> verbs) {
   return descriptions;
 }
 
+std::span<const GroupTitle> verb_groups() {
+  static constexpr std::array<GroupTitle, 7> groups{{
+      {VerbGroup::first_steps, "First steps"},
+      {VerbGroup::memory, "Memory"},
+      {VerbGroup::localisation, "Localisation and tracking"},
+      {VerbGroup::maps_and_routes, "Maps and routes"},
+      {VerbGroup::several_robots, "Several robots"},
+      {VerbGroup::tools, "Tools"},
+      {VerbGroup::experiments, "Experiments"},
+  }};
+  return groups;
+}
+
 std::span<const ExitMeaning> exit_meanings() {
   static constexpr std::array<ExitMeaning, 4> meanings{{
       {ExitCode::done, "done"},
@@ -148,10 +161,17 @@ std::string overview(std::span<const Verb> verbs) {
                          "images of places in a memory. It compares new images with this memory to "
                          "find the robot's position and heading.",
                          0, 0) +
-                     "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
-  for (const auto& verb : verbs) text += format_row(std::string(verb.name), verb.summary, 17);
+                     "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n";
+  for (const auto& [group, title] : verb_groups()) {
+    std::string rows;
+    for (const auto& verb : verbs) {
+      if (verb.group == group) rows += format_row(std::string(verb.name), verb.summary, 16);
+    }
+    if (!rows.empty()) text.append("\n").append(title).append(":\n").append(rows);
+  }
   text += "\n";
   text += wrap_text(
+      "If a verb has a memory and an input, the memory comes first: panonav localise MEMORY INPUT. "
       "panonav help VERB explains a verb. panonav VERB --help-all lists all its options. panonav "
       "--version prints the version.",
       0, 0);

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
@@ -38,9 +39,19 @@ template <class Pose>
   return pose ? pose_json(*pose) : ordered_json();
 }
 
-/// Returns the document as one line of text. Bytes that are not valid UTF-8 become the replacement
-/// character U+FFFD.
-[[nodiscard]] inline std::string json_line(const ordered_json& document) {
+/// Replaces texts of a document that are not valid UTF-8, such as paths, by their escapes.
+inline void escape_texts(ordered_json& document) {
+  if (const auto* text = document.get_ptr<const std::string*>(); text != nullptr) {
+    if (!is_utf8(*text)) document = escape_name(*text);
+  } else if (document.is_structured()) {
+    for (auto& part : document) escape_texts(part);
+  }
+}
+
+/// Returns the document as one line of text. In values that are not valid UTF-8, escapes stand for
+/// the bytes (`escape_name`).
+[[nodiscard]] inline std::string json_line(ordered_json document) {
+  escape_texts(document);
   return document.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 

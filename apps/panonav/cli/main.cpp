@@ -10,6 +10,7 @@
 #include "cli/arguments.hpp"
 #include "cli/option_values.hpp"
 #include "cli/session.hpp"
+#include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
@@ -52,7 +53,9 @@ ExitCode run(std::string_view& verb, std::span<const std::string> words) {
   const LeftOutWarnings warnings(session, verb);
   session.detail("panonav " PANONAV_VERSION " " + std::string(command.verb) + " on " +
                  std::to_string(session.executor().threads()) + " threads");
+  panonav::command::InterruptionNotice notice(command.verb, command.interruption_text);
   const ExitCode code = command.run(session);
+  notice.cancel();
   session.detail("done");
   session.finish_output();
   return code;

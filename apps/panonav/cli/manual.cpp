@@ -123,8 +123,13 @@ std::string manual_overview(std::span<const Description> verbs) {
       "\\fBpanonav\\fR \\fIVERB\\fR [OPTIONS] ARGUMENTS\n.SH DESCRIPTION\nPanonav stores "
       "omnidirectional images of places in a memory. It compares new images with this memory to "
       "find the position and heading of a robot.\nEach verb has its own manual page.\n.SH VERBS\n";
-  for (const auto& [verb, arguments] : verbs)
-    text += format_entry(verb.name, std::string(verb.summary) + ".");
+  for (const auto& [group, title] : verb_groups()) {
+    std::string entries;
+    for (const auto& [verb, arguments] : verbs) {
+      if (verb.group == group) entries += format_entry(verb.name, std::string(verb.summary) + ".");
+    }
+    if (!entries.empty()) text.append(".SS \"").append(title).append("\"\n").append(entries);
+  }
   text += ".SH OPTIONS\n";
   for (const auto& argument : verbs.front().arguments) {
     if (argument.of_every_verb)

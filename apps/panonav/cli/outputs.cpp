@@ -96,9 +96,17 @@ bool refers_to_file(const std::string& value, const FileId& id, bool is_page) {
   return false;
 }
 
+/// Returns when the regular file was last written; nullopt if there is none.
+std::optional<fs::file_time_type> find_write_time(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return std::nullopt;
+  const auto written = fs::last_write_time(path, error);
+  return error ? std::nullopt : std::optional(written);
+}
+
 }  // namespace
 
-void require_separate_outputs(std::span<const NamedValue> values) {
+EarlierOutputs require_separate_outputs(std::span<const NamedValue> values) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!values[i].is_output) continue;
     fs::path path = values[i].value;
@@ -123,6 +131,26 @@ void require_separate_outputs(std::span<const NamedValue> values) {
       }
     }
   }
+  EarlierOutputs earlier;
+  for (const NamedValue& one : values) {
+    if (one.is_output) earlier.add(one.value);
+  }
+  return earlier;
+}
+
+void EarlierOutputs::add(const fs::path& output) {
+  for (const fs::path& file : {output, output / "index.html", output / "gallery.html"}) {
+    if (const auto written = find_write_time(file)) files_.push_back({file.string(), *written});
+  }
+}
+
+std::vector<std::string> EarlierOutputs::list_replaced() const {
+  std::vector<std::string> replaced;
+  for (const auto& [path, written] : files_) {
+    const auto now = find_write_time(path);
+    if (now && *now != written) replaced.push_back(path);
+  }
+  return replaced;
 }
 
 }  // namespace panonav::command

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace panonav::command {
 
@@ -12,10 +14,26 @@ struct NamedValue {
   bool is_output = false;  ///< the verb writes it
 };
 
+/// The outputs of a verb that exist before it runs: files, and the pages in folders.
+class EarlierOutputs {
+ public:
+  void add(const std::filesystem::path& output);
+  /// Returns those that have been written since `add`. Cost: one stat call per output.
+  [[nodiscard]] std::vector<std::string> list_replaced() const;
+
+ private:
+  struct File {
+    std::string path;
+    std::filesystem::file_time_type written;
+  };
+  std::vector<File> files_;
+};
+
 /// Throws UsageError if an output would overwrite an input: a file that another argument names
 /// (same device and inode, also through links), a file in a named folder, a file that a named TOML
-/// file mentions, or a log of a memory file. Also throws if two outputs are the same file. Cost:
-/// one stat call per file of the named folders, only if an output exists already.
-void require_separate_outputs(std::span<const NamedValue> values);
+/// file mentions, or a log of a memory file. Also throws if two outputs are the same file. Returns
+/// the outputs that exist. Cost: one stat call per file of the named folders, only if an output
+/// exists already.
+[[nodiscard]] EarlierOutputs require_separate_outputs(std::span<const NamedValue> values);
 
 }  // namespace panonav::command

@@ -173,7 +173,7 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   if (common.session.quiet && common.session.verbose) {
     throw UsageError("--quiet and --verbose cannot be combined");
   }
-  declared->arguments.resolve(common.config, [&] {
+  const EarlierOutputs outputs = declared->arguments.resolve(common.config, [&] {
     // Allows the sections of all verbs, as one file may serve several verbs.
     std::vector<std::string> sections;
     for (const auto& other : verbs) {
@@ -185,9 +185,15 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   if (is_template_requested) {
     return make_print_command(verb.name, declared->arguments.config_template(verb.name));
   }
-  return {verb.name, common.session, [declared](Session& session) {
-            return declared->run(session);  // keeps the arguments alive
-          }};
+  return {verb.name, common.session,
+          [declared, outputs](Session& session) {  // keeps the arguments alive
+            const ExitCode code = declared->run(session);
+            for (const std::string& path : outputs.list_replaced()) {
+              session.note(path + ": replaced the file that was there");
+            }
+            return code;
+          },
+          declared->arguments.interruption_text()};
 }
 
 }  // namespace panonav::command

@@ -13,6 +13,7 @@
 #include "cli/option_values.hpp"
 #include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav_server/place_json.hpp"
 
 namespace panonav::command {
 
@@ -73,6 +74,15 @@ void Session::print(std::string_view text) {
   erase_bar();
   const std::string line = mask_passwords(text);
   std::cout << (options_.json ? line : escape_control_characters(line)) << '\n';
+}
+
+std::string Session::format_length(double length, int digits) const {
+  return format_fixed(length, digits) + " " + to_string(length_unit_);
+}
+
+std::string Session::json_line(ordered_json document) const {
+  server::rename_lengths(document, length_unit_);
+  return command::json_line(document);
 }
 
 void Session::note(std::string_view line) {

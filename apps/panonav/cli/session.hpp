@@ -7,9 +7,11 @@
 #include <string>
 #include <string_view>
 
+#include "cli/json.hpp"
 #include "cli/verb.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 
 namespace panonav::command {
 
@@ -44,6 +46,15 @@ class Session {
   /// Prints a command for the user to type next, quoted for a shell, on standard output. Prints
   /// nothing with --quiet or --json.
   void suggest(std::initializer_list<std::string_view> command, std::string_view lead = "Next:");
+  /// Sets the unit in which the memory of this verb has its lengths; metres by default.
+  void set_length_unit(LengthUnit unit) noexcept { length_unit_ = unit; }
+  [[nodiscard]] LengthUnit length_unit() const noexcept { return length_unit_; }
+  /// Returns a length with its unit, such as "0.21 m" or "0.21 view steps".
+  [[nodiscard]] std::string format_length(double length, int digits) const;
+  /// Returns the document as one line. If lengths are in view steps, keys that end in "_m" end in
+  /// "_steps" instead.
+  [[nodiscard]] std::string json_line(ordered_json document) const;
+
   /// Flushes standard output.
   void flush();
   /// Flushes standard output. Throws FileError if it could not be written, for example to a full
@@ -69,6 +80,7 @@ class Session {
   std::mutex mutex_;  // guards output, as any thread may print warnings
   bool bar_drawn_ = false;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  LengthUnit length_unit_ = LengthUnit::metres;
   Executor executor_;
 };
 

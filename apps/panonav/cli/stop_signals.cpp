@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <ctime>
+#include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -39,7 +40,32 @@ void on_signal(int number) {
   }
 }
 
+std::string interruption_line;  // complete before the handler that prints it is set
+
+void on_interruption(int number) {
+  (void)!write(STDERR_FILENO, interruption_line.data(), interruption_line.size());
+  signal(number, SIG_DFL);
+  raise(number);
+}
+
 }  // namespace
+
+InterruptionNotice::InterruptionNotice(std::string_view verb, std::string_view text) {
+  if (text.empty()) return;
+  const bool is_terminal = isatty(STDERR_FILENO) != 0;
+  interruption_line = is_terminal ? "\r\033[K" : "";  // replaces the progress bar and "^C"
+  interruption_line.append("panonav ").append(verb).append(": interrupted. ").append(text) += '\n';
+  for (const int number : {SIGINT, SIGTERM}) {
+    if (signal(number, on_interruption) == SIG_IGN) signal(number, SIG_IGN);
+  }
+}
+
+void InterruptionNotice::cancel() noexcept {
+  for (const int number : {SIGINT, SIGTERM}) {
+    const auto handler = signal(number, SIG_DFL);
+    if (handler != on_interruption) signal(number, handler);
+  }
+}
 
 StopSignals::StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
   if (pipe2(pipe_.data(), O_CLOEXEC) != 0) throw Error("no pipe can be made");

@@ -17,6 +17,14 @@ struct Description {
 [[nodiscard]] Description describe(const Verb& verb);
 [[nodiscard]] std::vector<Description> describe(std::span<const Verb> verbs);
 
+/// A group of verbs and its title, such as "Memory".
+struct GroupTitle {
+  VerbGroup group;
+  std::string_view title;
+};
+/// Returns the groups in the order of the help.
+[[nodiscard]] std::span<const GroupTitle> verb_groups();
+
 /// An exit code and its meaning, for the overview and the manual.
 struct ExitMeaning {
   ExitCode code;

@@ -24,11 +24,23 @@ enum class ExitCode : int {
 /// with which it was declared outlive the call.
 using Run = std::function<ExitCode(Session&)>;
 
+/// The groups of verbs in help, manual page and completion, in this order.
+enum class VerbGroup {
+  first_steps,
+  memory,
+  localisation,
+  maps_and_routes,
+  several_robots,
+  tools,
+  experiments,
+};
+
 /// One verb of the command line. Help, manual page and shell completion are made from this and from
 /// the arguments that the verb declares (cli/texts.hpp).
 struct Verb {
-  std::string_view name;     ///< one word, or two with a blank between: "route record"
-  std::string_view summary;  ///< one plain line
+  std::string_view name;  ///< one word, or two with a blank between: "route record"
+  VerbGroup group;
+  std::string_view summary;  ///< one plain line of at most 64 characters
   std::string_view details;  ///< what a user must know besides the options; lines are joined
   std::string_view example;  ///< complete command lines, the most useful ones first
   Run (*declare)(Arguments&);

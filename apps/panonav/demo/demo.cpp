@@ -75,7 +75,8 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
                format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) + " pixels.")});
   page.add_text(
       "The robot then unwraps each image into a panorama of 80 rows. For each row it stores only "
-      "the first 15 components of the Fourier transform. A stored view therefore takes 2.4 kB. The "
+      "the first 15 components of the Fourier transform. This signature takes 2.4 kB. With "
+      "local features and a thumbnail, the view takes about 19 kB in the memory file. The "
       "magnitudes of the components do not change when the robot rotates, so they identify the "
       "place at any heading. The phases give the heading.");
   page.add_views({{std::move(cylinder),
@@ -302,11 +303,8 @@ std::string format_delay(const std::optional<std::size_t>& images) {
   return (images ? "after " : "") + format_image_count(images);
 }
 
-std::string format_part_of(std::size_t part, std::size_t all) {
-  return std::to_string(part) + " of " + std::to_string(all);
-}
-
-void print(const DemoResults& done, Session& session) {
+void print(const DemoResults& done, const fs::path& out, Session& session) {
+  if (session.json()) return session.print(json_line(to_json(done, out)));
   session.print("panonav demo: " + std::to_string(done.views) + " views of an office stored, " +
                 std::to_string(done.query_count) + " images localised, " +
                 format_fixed(done.seconds, 0) + " s");
@@ -344,6 +342,7 @@ void print(const DemoResults& done, Session& session) {
       "; mission with a kidnapped robot: " + std::string(to_string(navigation.kidnapped.end)) +
       "; mission with a new obstacle on the path: " +
       (navigation.screened ? std::string(to_string(navigation.screened->end)) : "none"));
+  print_report_path(out, session);
 }
 
 MemoryFile memorise_run(const Dataset& run, const fs::path& path, Executor& executor) {
@@ -356,6 +355,32 @@ MemoryFile memorise_run(const Dataset& run, const fs::path& path, Executor& exec
     memoriser.finish(executor);
   }
   return MemoryFile::open(path, Access::read_write);
+}
+
+/// Returns the size of the memory file per view, such as "19 kB".
+std::string format_bytes_per_view(const MemoryFile& file) {
+  const auto info = file.info();
+  return format_fixed(1e-3 * static_cast<double>(info.file_bytes) / static_cast<double>(info.views),
+                      0) +
+         " kB";
+}
+
+/// Localises images of the office and of another room, and adds the answers to the page.
+std::vector<LocalisedView> demonstrate_localisation(const DemoOptions& options,
+                                                    const DemoRecordings& recordings,
+                                                    const VisualMemory& memory,
+                                                    const ViewEncoder& encoder, DemoResults& done,
+                                                    Session& session, viewer::ReportPage& page) {
+  const Localiser localiser(memory);
+  auto queries = localise_all(localiser, encoder, recordings.query_run, session.executor());
+  const auto elsewhere =
+      localise_all(localiser, encoder, recordings.elsewhere_run, session.executor());
+  done.query_count = queries.size();
+  done.in_office = summarise_outcome(queries, memory);
+  done.in_other_room = summarise_outcome(elsewhere, memory);
+  add_answers_part(memory, viewer::scene_layers(recordings.office_scene), queries, done.in_office,
+                   done.in_other_room, options.spacing_m(), page);
+  return queries;
 }
 
 ExitCode demonstrate(const DemoOptions& options, Session& session) {
@@ -375,12 +400,7 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
   if (!recordings) {
     return session.no_answer("panonav demo: no mirror was found in the simulated images");
   }
-  viewer::ReportPage page(
-      "panonav: image-based memory for robot navigation",
-      "A robot with one camera stores images of places as views. It compares new images with these "
-      "views. In this way it finds its position, makes maps, drives back to a place, repeats "
-      "routes and drives to goals. All data on this page were simulated on this computer, so the "
-      "true positions are known. Click an animation to pause it.");
+  viewer::ReportPage page = make_demo_page();
   DemoStory story{.mirror = add_camera_part(*recordings, session, page)};
 
   next_part("store views and localise");
@@ -389,19 +409,14 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
   const auto encoder =
       std::make_shared<const ViewEncoder>(file.header(), recordings->memory_run.source);
   const VisualMemory memory = file.load();
-  const Localiser localiser(memory);
-  const auto queries = localise_all(localiser, *encoder, recordings->query_run, session.executor());
-  const auto elsewhere =
-      localise_all(localiser, *encoder, recordings->elsewhere_run, session.executor());
-  DemoResults done{.views = memory.size(), .query_count = queries.size()};
-  done.in_office = summarise_outcome(queries, memory);
-  done.in_other_room = summarise_outcome(elsewhere, memory);
-  const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings->office_scene);
-  add_answers_part(memory, scene, queries, done.in_office, done.in_other_room, options.spacing_m(),
-                   page);
+  DemoResults done{.views = memory.size()};
+  const auto queries =
+      demonstrate_localisation(options, *recordings, memory, *encoder, done, session, page);
+  story.view_size = format_bytes_per_view(file);
   story.position_error = format_median(done.in_office.errors_m, 100.0, 1, "cm");
   next_part("adjustable accuracy");
-  story.areas = add_levels_part(memory, scene, choose_view(queries), options.spacing_m(), page);
+  story.areas = add_levels_part(memory, viewer::scene_layers(recordings->office_scene),
+                                choose_view(queries), options.spacing_m(), page);
   next_part("track the robot");
   const MemoryFile corridor =
       memorise_run(recordings->corridor_run, out / "corridor.panonav", session.executor());
@@ -419,21 +434,13 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
   done.navigation = demonstrate_navigation(options, *recordings, file, memory, done.maps.arranged,
                                            encoder, session, page);
   add_commands(options, *recordings, done.navigation, page);
-  story.found_again = format_image_count(done.track.until_found_again);
-  story.convergence = std::move(done.track.convergence);
-  story.arrived = format_part_of(done.navigation.arrived, done.navigation.runs.size());
-  story.missions = std::move(done.navigation.all);
+  add_results(story, done.track, done.navigation);
   add_story(std::move(story), page);
   page.write(out, "index.html", "panonav demo");
   progress.clear();
 
   done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (session.json()) {
-    session.print(json_line(to_json(done, out)));
-  } else {
-    print(done, session);
-    print_report_path(out, session);
-  }
+  print(done, out, session);
   return ExitCode::done;
 }
 
@@ -448,6 +455,8 @@ Run declare_demo(Arguments& arguments) {
   arguments.flag(
       "--quick", values->quick,
       "Run a short demonstration with fewer and smaller images and fewer drives to goals");
+  arguments.explain_interruption(
+      "The page was not written. To start over, run the same command again.");
   return [values, out, seed](Session& session) {
     values->out = *out;
     values->seed = seed->value_or(1);
@@ -458,11 +467,14 @@ Run declare_demo(Arguments& arguments) {
 }  // namespace
 
 Verb demo_verb() {
-  return {"demo", "Run all functions in a simulated office and write a page with the results",
+  return {"demo",
+          VerbGroup::first_steps,
+          "Run all functions in a simulated office and write a page",
           "A simulated robot stores views, finds its position, makes maps, drives home, repeats a "
           "route and drives to goals. This takes about a minute on two cores. Files of an earlier "
           "demo in the folder are replaced. A folder that contains other files is refused.",
-          "  panonav demo\n  panonav demo --seed 5 -o other_office", declare_demo};
+          "  panonav demo\n  panonav demo --seed 5 -o other_office",
+          declare_demo};
 }
 
 }  // namespace panonav::command

@@ -162,6 +162,22 @@ viewer::MapAnimation draw_run(const std::string& title, const simulation::Missio
   return map;
 }
 
+/// Adds walls, views, the direction field and the goal to the first moment of a mission.
+void add_plan_of_place(recordings::RunMoment& moment, const simulation::MissionPlace& place,
+                       const simulation::RememberedPlace& remembered, const FieldOptions& field,
+                       ViewId goal) {
+  moment.walls = viewer::scene_outlines(place.scene);
+  const auto guides = direction_field(remembered.graph, goal, field);
+  for (std::size_t node = 0; node < guides.size(); ++node) {
+    const Pose2& at = remembered.truth[node];
+    moment.references.push_back(at.position());
+    if (!guides[node].direction_rad) continue;
+    moment.directions.push_back(
+        {at.x_m, at.y_m, wrap_angle(at.heading_rad + *guides[node].direction_rad)});
+  }
+  moment.goal = remembered.truth[*remembered.graph.node_of(goal)];
+}
+
 /// Plays a mission with the robot's view and decision at each step.
 viewer::RunPage replay_run(const simulation::MissionPlace& place,
                            const simulation::RememberedPlace& remembered,
@@ -208,18 +224,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
         planned = true;
       }
     }
-    if (i == 0) {
-      moment.walls = viewer::scene_outlines(place.scene);
-      const auto guides = direction_field(remembered.graph, goal, options.field);
-      for (std::size_t node = 0; node < guides.size(); ++node) {
-        const Pose2& at = remembered.truth[node];
-        moment.references.push_back(at.position());
-        if (!guides[node].direction_rad) continue;
-        moment.directions.push_back(
-            {at.x_m, at.y_m, wrap_angle(at.heading_rad + *guides[node].direction_rad)});
-      }
-      moment.goal = remembered.truth[*remembered.graph.node_of(goal)];
-    }
+    if (i == 0) add_plan_of_place(moment, place, remembered, options.field, goal);
     page.add(moment);
   }
   return page;
@@ -238,6 +243,26 @@ std::string format_log(const std::string& title, const std::string& goal,
                      format_fixed(100.0 * run.end_distance_m, 0) + " cm from it\n";
   for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
   return text + "\n";
+}
+
+/// Formats the log of all missions, of which `missions` are those of `navigation.runs` and the one
+/// with the kidnapped robot.
+std::string format_logs(const DemoNavigation& navigation, const VisualMemory& memory,
+                        const std::vector<simulation::Mission>& missions,
+                        const std::optional<ScreenedMission>& screened) {
+  std::string log;
+  const auto add_log = [&](const std::string& title, const simulation::Mission& mission,
+                           const simulation::MissionRun& run) {
+    log += format_log(title, memory.info(mission.goal).name, run, navigation.within_m);
+  };
+  for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
+    add_log("Mission " + std::to_string(i + 1), missions[i], navigation.runs[i]);
+  }
+  add_log("Mission with a kidnapped robot", missions.back(), navigation.kidnapped);
+  if (screened) {
+    add_log("Mission with a screen across the path", screened->mission, *navigation.screened);
+  }
+  return log;
 }
 
 /// Describes the result of a mission in a sentence.
@@ -310,6 +335,22 @@ void add_part(const DemoNavigation& navigation, MissionPlots plots, viewer::Repo
   page.add_link("mission.log", "Log of all decisions of the robots");
 }
 
+/// Fills the measures of `navigation.runs`.
+void count_arrivals(DemoNavigation& navigation) {
+  for (const simulation::MissionRun& run : navigation.runs) {
+    navigation.steps.push_back(static_cast<double>(run.decisions.size()));
+    if (!run.has_arrived(navigation.within_m)) continue;
+    ++navigation.arrived;
+    if (run.shortest_m > 0.0) navigation.detours.push_back(run.travelled_m / run.shortest_m);
+  }
+}
+
+/// Returns the value of --start of panonav navigate.
+std::string format_start(const Pose2& start) {
+  return format_fixed(start.x_m, 3) + "," + format_fixed(start.y_m, 3) + "," +
+         format_fixed(degrees(start.heading_rad), 1);
+}
+
 }  // namespace
 
 DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoRecordings& recordings,
@@ -335,12 +376,7 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
       simulation::run_missions(place, remembered, missions, settings, noise, executor);
   navigation.kidnapped = std::move(navigation.runs.back());
   navigation.runs.pop_back();
-  for (const simulation::MissionRun& run : navigation.runs) {
-    navigation.steps.push_back(static_cast<double>(run.decisions.size()));
-    if (!run.has_arrived(navigation.within_m)) continue;
-    ++navigation.arrived;
-    if (run.shortest_m > 0.0) navigation.detours.push_back(run.travelled_m / run.shortest_m);
-  }
+  count_arrivals(navigation);
   const auto draw_mission = [&](const std::string& title, const simulation::MissionPlace& where,
                                 const simulation::Mission& mission,
                                 const simulation::MissionRun& run) {
@@ -353,31 +389,21 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
                      .kidnapped = draw_mission("Mission with a kidnapped robot", place,
                                                missions.back(), navigation.kidnapped)};
   navigation.all = plots.all;
-  std::string log;
-  const auto add_log = [&](const std::string& title, const simulation::Mission& mission,
-                           const simulation::MissionRun& run) {
-    log += format_log(title, memory.info(mission.goal).name, run, navigation.within_m);
-  };
-  for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
-    add_log("Mission " + std::to_string(i + 1), missions[i], navigation.runs[i]);
-  }
-  add_log("Mission with a kidnapped robot", missions.back(), navigation.kidnapped);
   navigation.first_mission = {"--goal", memory.info(first.goal).name, "--start",
-                              format_fixed(first.start.x_m, 3) + "," +
-                                  format_fixed(first.start.y_m, 3) + "," +
-                                  format_fixed(degrees(first.start.heading_rad), 1)};
+                              format_start(first.start)};
   constexpr int candidates = 30;
-  if (const auto screened = find_screened_mission(
-          place, remembered, sample_random_missions(screen_stream, candidates, false), recordings,
-          encoder, executor)) {
+  const auto screened = find_screened_mission(
+      place, remembered, sample_random_missions(screen_stream, candidates, false), recordings,
+      encoder, executor);
+  if (screened) {
     navigation.screened = simulation::run_missions(screened->place, remembered, {screened->mission},
                                                    settings, noise, executor)
                               .front();
     plots.screened = draw_mission("Mission with a screen across the path", screened->place,
                                   screened->mission, *navigation.screened);
-    add_log("Mission with a screen across the path", screened->mission, *navigation.screened);
   }
-  write_file(options.out / "mission.log", std::string_view(log));
+  write_file(options.out / "mission.log",
+             std::string_view(format_logs(navigation, memory, missions, screened)));
   add_part(navigation, std::move(plots), page);
   return navigation;
 }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/signature/dissimilarity.hpp"
@@ -59,11 +60,9 @@ AreaAnimation draw_areas(const VisualMemory& memory, const std::vector<viewer::M
                                  .colour = viewer::PlotColour::vermilion,
                                  .crosses = {query.truth.position()}};
     animation.areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
-    animation.map.frames.push_back(
-        {.title = std::to_string(level.components) +
-                  (level.components == 1 ? " component: " : " components: ") +
-                  format_fixed(animation.areas_m2.back(), 2) + " m²",
-         .layers = {area, robot}});
+    animation.map.frames.push_back({.title = format_count(level.components, "component") + ": " +
+                                             format_fixed(animation.areas_m2.back(), 2) + " m²",
+                                    .layers = {area, robot}});
   }
   return animation;
 }

@@ -4,14 +4,33 @@
 
 namespace panonav::command {
 
+std::string format_part_of(std::size_t part, std::size_t all) {
+  return std::to_string(part) + " of " + std::to_string(all);
+}
+
+viewer::ReportPage make_demo_page() {
+  return {"panonav: image-based memory for robot navigation",
+          "A robot with one camera stores images of places as views. It compares new images with "
+          "these views. In this way it finds its position, makes maps, drives back to a place, "
+          "repeats routes and drives to goals. All data on this page were simulated on this "
+          "computer, so the true positions are known. Click an animation to pause it."};
+}
+
+void add_results(DemoStory& story, DemoTrack& track, DemoNavigation& navigation) {
+  story.found_again = format_image_count(track.until_found_again);
+  story.convergence = std::move(track.convergence);
+  story.arrived = format_part_of(navigation.arrived, navigation.runs.size());
+  story.missions = std::move(navigation.all);
+}
+
 void add_story(DemoStory story, viewer::ReportPage& page) {
   page.add_story(
       {{.title = "Omnidirectional camera",
         .shown = std::move(story.mirror),
-        .value = "2.4 kB",
-        .meaning =
-            "per stored view. With one stored view of a place, the robot recognises this place at "
-            "any heading. The robot needs no laser scanner, no GPU and no training.",
+        .value = std::move(story.view_size),
+        .meaning = "per stored view in the memory file; its signature takes 2.4 kB. With one "
+                   "stored view of a place, the robot recognises this place at any heading. It "
+                   "needs no laser scanner, no GPU and no training.",
         .part = 1},
        {.title = "Localisation",
         .shown = viewer::ReportPlot{std::move(story.areas), ""},
@@ -33,7 +52,7 @@ void add_story(DemoStory story, viewer::ReportPage& page) {
                    "Crosses: goals. Blue: driven paths.",
         .part = 8}},
       "Your own images",
-      {"panonav memorise photos place.panonav --kind equirectangular --elevation-deg -30 40",
+      {"panonav memorise place.panonav photos --kind equirectangular --elevation-deg -30 40",
        "panonav localise place.panonav now.jpg"});
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
@@ -54,6 +55,8 @@ std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, 
     case LocalisationState::localised:
       return number +
              (is_correct(image, within_m) ? "localised" : "wrong position, not yet noticed");
+    case LocalisationState::position_known:
+      return number + "position known, heading not";
     case LocalisationState::ambiguous:
       return number + "several places are possible";
     case LocalisationState::lost:
@@ -128,7 +131,7 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
 }  // namespace
 
 std::string format_image_count(const std::optional<std::size_t>& images) {
-  return images ? std::to_string(*images) + (*images == 1 ? " image" : " images") : "never";
+  return images ? format_count(*images, "image") : "never";
 }
 
 DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings& recordings,
@@ -149,7 +152,7 @@ DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings&
         {.particles_per_image = particles_per_image,
          .thumbnail_file = &file,
          .shown_references = &shown_references},
-        session.executor(), [&](TrackedImage&& image) {
+        session, [&](TrackedImage&& image) {
           if (image.index == 0)
             image.moment->walls = viewer::scene_outlines(recordings.corridor_scene);
           add(replay_page, image);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
@@ -97,6 +98,7 @@ viewer::MapAnimation LatticeSteps::make_animation(const Lattice& lattice,
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (places[i]) ++sizes[components[i]];
     }
+    if (sizes.empty()) return;  // there is nothing to draw before the first views are joined
     const auto largest =
         std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; });
     viewer::MapLayer spring_layer{.label = "springs", .colour = viewer::PlotColour::light_grey};
@@ -131,7 +133,7 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
                           const LatticeSteps& steps) {
   viewer::ReportPage page(
       "Arrangement of the views",
-      "The " + std::to_string(lattice.nodes.size()) + " views of " + name +
+      "The " + format_count(lattice.nodes.size(), "view") + " of " + name +
           " were given in no order. panonav estimated the distance and direction between similar "
           "views, and computed the positions of all views from these estimates.");
   const auto& components = lattice.components;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav_viewer/plot.hpp"
@@ -152,12 +153,12 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
       "Distances from which a robot finds home",
       "A home vector is the computed direction from a current view to a home view. This page uses "
       "every view of a recording as a home, and every view of " +
-          std::to_string(places.views.size()) +
-          " places as the current view. It measures the error of the home vectors, and where a "
+          format_count(places.views.size(), "place") +
+          " as the current view. It measures the error of the home vectors, and where a "
           "robot ends that follows them from place to place.");
   page.add_figures(
       {{format_fixed(result.component, 3),
-        "average homeward component, " + std::to_string(result.pairs) + " pairs"},
+        "average homeward component, " + format_count(result.pairs, "pair")},
        {format_fixed(degrees(result.orientation_error_rad), 1) + " degrees",
         "error of the heading"},
        {format_fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),

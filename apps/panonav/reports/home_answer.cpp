@@ -26,10 +26,11 @@ std::string describe_rotation(double heading_rad) {
 }
 
 std::string explain_no_direction(const HomingResult& result) {
-  if (!result.known) return "the views are not more similar than random views";
+  if (!result.evidence) return "the views are not more similar than views of two buildings";
   // Correlation from which on each view explains more than half of the other's variance; chosen.
   constexpr double min_home_correlation = std::numbers::sqrt2 / 2.0;
-  if (result.vector.correlation >= min_home_correlation) return "the robot is already at home";
+  if (result.evidence->vector.correlation >= min_home_correlation)
+    return "the robot is already at home";
   return "the views are too different";
 }
 

@@ -30,8 +30,8 @@ std::string make_caption(const HomeAnswer& answer) {
   if (!result.direction_rad)
     return answer.file + ": no direction home, " + explain_no_direction(result);
   return answer.file + ": home is " + describe_direction(*result.direction_rad) + ", about " +
-         format_fixed(result.distance_r, 2) + " R away; " +
-         describe_rotation(result.vector.heading_rad);
+         format_fixed(result.distance_r(), 2) + " R away (R: distance of the surroundings); " +
+         describe_rotation(-result.turn_rad());
 }
 
 /// Returns a length for arrows of 0.8 times the spacing of the views, in metres; 1 if it is
@@ -72,10 +72,9 @@ std::optional<viewer::MapPlot> draw_field(const Goal& goal,
 std::vector<viewer::ReportView> make_report_views(const std::optional<Panorama>& home,
                                                   const Panorama& current,
                                                   const HomeAnswer& answer) {
-  const HomeVector& found = answer.result.vector;
   std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};
   if (answer.result.direction_rad) {
-    const double towards = found.direction_rad();
+    const double towards = *answer.result.direction_rad;
     marks.push_back(
         {.azimuth_rad = towards, .colour = viewer::PlotColour::vermilion, .is_dashed_line = true});
     marks.push_back({.azimuth_rad = wrap_angle(towards + std::numbers::pi),
@@ -84,7 +83,7 @@ std::vector<viewer::ReportView> make_report_views(const std::optional<Panorama>&
   }
   std::vector<viewer::ReportView> views;
   if (home) {  // rotates the view to the current heading
-    const double columns = -found.heading_rad / (2.0 * std::numbers::pi) * home->columns();
+    const double columns = answer.result.turn_rad() / (2.0 * std::numbers::pi) * home->columns();
     views.push_back({rotate_columns(*home, static_cast<int>(std::lround(columns))), marks,
                      "View at home, rotated to the current heading"});
   }
@@ -102,16 +101,16 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                               ", with the current image. It computed the direction home without a "
                               "map and without knowing the robot's heading.");
   const HomingResult& first = answers.front().result;
-  if (answers.size() == 1 && !first.known) {
+  if (answers.size() == 1 && !first.known()) {
     page.add_figures({{"no answer", explain_no_direction(first)}});
   } else if (answers.size() == 1) {
     page.add_figures({{first.direction_rad ? describe_direction(*first.direction_rad) : "none",
                        "direction home"},
-                      {format_fixed(first.distance_r, 2) + " R",
+                      {format_fixed(first.distance_r(), 2) + " R",
                        "distance; R is the typical distance of the objects around"},
-                      {format_fixed(degrees(first.turn_rad), 0) + " degrees",
+                      {format_fixed(degrees(first.turn_rad()), 0) + " degrees",
                        "rotation of the robot since then, left positive"},
-                      {format_fixed(first.probability, 2),
+                      {format_fixed(first.probability(), 2),
                        "probability that the direction is right within 45 degrees"}});
   }
   page.begin_section(goal.panorama ? "Both views" : "Current image");
@@ -133,13 +132,14 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
   for (const HomeAnswer& answer : answers) {
     const HomingResult& result = answer.result;
     const auto if_known = [&](double value, int digits) {
-      return result.known ? format_fixed(value, digits) : std::string("no answer");
+      return result.known() ? format_fixed(value, digits) : std::string("no answer");
     };
     rows.push_back({answer.file,
                     result.direction_rad ? describe_direction(*result.direction_rad) : "none",
-                    if_known(result.distance_r, 3), if_known(degrees(result.turn_rad), 1),
-                    format_fixed(result.vector.correlation, 3),
-                    format_fixed(result.vector.residual, 3), format_fixed(result.probability, 3)});
+                    if_known(result.distance_r(), 3), if_known(degrees(result.turn_rad()), 1),
+                    if_known(result.known() ? result.evidence->vector.correlation : 0.0, 3),
+                    if_known(result.known() ? result.evidence->vector.residual : 0.0, 3),
+                    if_known(result.probability(), 3)});
   }
   page.add_table({"view", "direction home", "distance [R]", "rotation [degrees]", "correlation",
                   "residual", "probability"},

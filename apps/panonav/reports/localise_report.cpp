@@ -5,12 +5,14 @@
 #include <cmath>
 #include <utility>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_recordings/run_recorder.hpp"
 #include "panonav_viewer/report_page.hpp"
+#include "runs/localised_query.hpp"
 #include "runs/run_record.hpp"
 
 namespace panonav::command {
@@ -20,8 +22,9 @@ namespace {
 constexpr std::size_t max_shown = 200;
 constexpr std::size_t max_rows = 500;
 
-std::string format_position(const PositionEstimate& position) {
-  return "x " + format_fixed(position.x_m, 2) + " m, y " + format_fixed(position.y_m, 2) + " m";
+std::string format_position(const PositionEstimate& position, LengthUnit unit) {
+  return "x " + format_fixed(position.x_m, 2) + " " + to_string(unit) + ", y " +
+         format_fixed(position.y_m, 2) + " " + to_string(unit);
 }
 
 std::string format_degrees(double angle_rad) {
@@ -38,30 +41,38 @@ std::string describe_answer(const LocalisedQuery& query) {
   if (!query.error.empty()) return "cannot be read";
   const Place& place = query.place;
   if (!place.known || place.matches.empty()) return "unknown place";
-  return "near " + place.matches.front().name;
+  std::string answer = "near the stored view " + place.matches.front().name;
+  for (const AlternativePlace& other : place.alternatives) answer += " or " + other.match.name;
+  return answer;
 }
 
 /// Makes the moment of an image for the page.
 recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t number,
                                   Panorama&& panorama, const MemoryFile& file) {
+  const LengthUnit unit = read_length_unit(file);
   recordings::RunMoment moment{.stamp_s = static_cast<double>(number),
                                .panorama = std::move(panorama)};
   moment.truth = query.pose;
   const auto& matches = query.place.matches;
   set_localisation(moment, query.place);
   moment.values = {{"image", query.file}, {"answer", describe_answer(query)}};
+  if (!matches.empty()) moment.values.emplace_back("best_match", matches.front().name);
   if (const auto& position = query.place.position) {
-    moment.values.emplace_back("position", format_position(*position));
-    if (position->radius_m) {
-      moment.values.emplace_back("95 % within", format_fixed(*position->radius_m, 2) + " m");
-    }
+    moment.values.emplace_back("position", format_position(*position, unit));
+    const std::string bound = format_bound(*position, unit);
+    if (!bound.empty()) moment.values.emplace_back("in 95 % of cases", bound);
   }
   if (const auto& heading = query.place.heading_rad) {
     moment.values.emplace_back("heading", format_degrees(*heading));
   }
   if (matches.empty()) return moment;
-  moment.values.emplace_back("probability that the place is known",
-                             format_fixed(query.place.known_probability, 2));
+  moment.values.emplace_back("probability of this place", format_fixed(query.place.probability, 2));
+  for (const AlternativePlace& other : query.place.alternatives) {
+    moment.values.emplace_back(
+        "or " + other.match.name,
+        "probability " + format_fixed(other.probability, 2) +
+            (other.position ? ", " + format_position(*other.position, unit) : ""));
+  }
   for (std::size_t i = 0; i < std::min<std::size_t>(3, matches.size()); ++i) {
     constexpr std::array names{"best match", "second", "third"};
     moment.values.emplace_back(
@@ -72,7 +83,8 @@ recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t numbe
   return moment;
 }
 
-void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& queries) {
+void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& queries,
+               LengthUnit unit) {
   page.begin_section("All answers");
   if (queries.size() > max_rows) {
     page.add_text("The first " + std::to_string(max_rows) + " of " +
@@ -92,8 +104,8 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
       return match < matches.size() ? std::to_string(matches[match].dissimilarity) : "";
     };
     rows.push_back({query.file, describe_answer(query),
-                    query.error.empty() ? format_fixed(query.place.known_probability, 2) : "",
-                    position ? format_position(*position) : "",
+                    query.error.empty() ? format_fixed(query.place.probability, 2) : "",
+                    position ? format_position(*position, unit) : "",
                     heading ? format_degrees(*heading) : "", error ? format_fixed(*error, 2) : "",
                     difference(0), difference(1), dissimilarity(0), dissimilarity(1)});
   }
@@ -149,14 +161,19 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
       "probability below one half is reported as unknown.");
   const std::size_t shown = std::min(max_shown, readable.size());
   page.begin_section("Image by image");
+  const bool has_map = !recordings::reference_positions(recogniser.memory()).empty();
   page.add_text(
       "The upper row is the image; the forward direction is in the middle. The lower row is the "
-      "most similar view of the memory, rotated to the same heading. Grey dots on the map are the "
-      "views of the memory. The large dot is the answer; its circle contains the true position in "
-      "95 % of cases. The ring is the position that the data set gives.");
+      "most similar view of the memory, rotated to the same heading.");
+  page.add_text(has_map
+                    ? "Grey dots on the map are the views of the memory. The large dot is the "
+                      "answer; its ellipse contains the true position in 95 % of cases, across "
+                      "a route it is as wide as the map. The ring is the position that the data "
+                      "set gives."
+                    : "The memory contains no positions, so this page has no map.");
   if (shown < readable.size()) {
     page.add_text("The page shows " + std::to_string(shown) + " of " +
-                  std::to_string(readable.size()) + " images at equal intervals.");
+                  format_count(readable.size(), "image") + " at equal intervals.");
   }
   viewer::RunPage run("", shown);
   run.set_unordered();
@@ -165,15 +182,16 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
     const std::size_t i = readable[n * (readable.size() - 1) / std::max<std::size_t>(1, shown - 1)];
     recordings::RunMoment moment = make_moment(queries[i], n, panorama(i), file);
     thumbnails = thumbnails && (queries[i].place.matches.empty() || !moment.best_match.empty());
-    if (n == 0) moment.references = recordings::reference_positions(recogniser.memory());
+    if (n == 0) {
+      moment.references = recordings::reference_positions(recogniser.memory());
+      const LengthUnit unit = read_length_unit(file);
+      if (unit != LengthUnit::metres) moment.length_unit = to_string(unit);
+    }
     run.add(moment);
   }
   if (!thumbnails) page.add_text("For some images, the memory has no thumbnail of the best match.");
-  if (recordings::reference_positions(recogniser.memory()).empty()) {
-    page.add_text("The memory contains no positions, so this page has no map.");
-  }
   if (shown > 0) page.add_run(run);
-  add_table(page, queries);
+  add_table(page, queries, read_length_unit(file));
   page.write(folder, "index.html", "panonav localise");
 }
 

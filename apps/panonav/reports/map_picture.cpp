@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
@@ -78,7 +79,7 @@ std::optional<RecordedMapComparison> compare_with_ground_truth(const Dataset& re
 
 viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
   const ComponentNodes nodes = collect_nodes(recording, run);
-  viewer::MapPlot plot{.title = "map", .layers = {}};
+  viewer::MapPlot plot{.title = "Map", .layers = {}};
   std::vector<Point2> map = nodes.map;
   if (is_comparable(nodes.map, nodes.truth)) {
     map = apply_alignment(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
@@ -92,7 +93,7 @@ viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
            .lines = {apply_alignment(nodes.odometry, align(nodes.odometry, nodes.truth))}});
     }
   }
-  viewer::MapLayer closures{.label = "closures", .colour = viewer::PlotColour::green};
+  viewer::MapLayer closures{.label = "loop closures", .colour = viewer::PlotColour::green};
   for (const TopologicalMap::Edge& edge : run.map.edges) {
     const auto a = nodes.index_of_view.find(edge.a);
     const auto b = nodes.index_of_view.find(edge.b);
@@ -117,8 +118,8 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
                       const Dataset& recording, const Mapper::Result& run,
                       const viewer::RunPage& replay_page) {
   viewer::ReportPage page("Map of " + name,
-                          "A robot took " + std::to_string(recording.entries.size()) +
-                              " images on its path. panonav computed each step of the robot from "
+                          "A robot took " + format_count(recording.entries.size(), "image") +
+                              " on its path. panonav computed each step of the robot from "
                               "two consecutive images. Where the robot passed a place again, "
                               "panonav used this to correct the map (loop closure).");
   const auto closures =

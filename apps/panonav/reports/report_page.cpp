@@ -37,9 +37,10 @@ bool is_replaceable(const std::filesystem::path& folder, const std::string& page
 
 void declare_report(Arguments& arguments, std::optional<std::string>& report,
                     std::string_view content) {
-  arguments.option("--report FOLDER", report,
-                   "Write into this folder " + std::string(content) +
-                       "; the folder must be new or empty, or contain an earlier report");
+  arguments.option(
+      "--report FOLDER", report,
+      "Write into this folder " + std::string(content) +
+          "; the folder must be new or empty, or contain an earlier report, which is replaced");
   arguments.declare_outputs({"--report"});
 }
 

@@ -33,19 +33,20 @@ viewer::MapLayer draw_path_layer(std::span<const Pose2> path) {
 }
 
 /// Draws the lines of the route at equal steps along the path, from the bottom to the top.
-viewer::PicturePlot draw_panorama(const RoutePanorama& route) {
+viewer::PicturePlot draw_panorama(const RoutePanorama& route, LengthUnit unit) {
   constexpr int max_rows = 400;
   const double length_m = route.length_m();
   const int rows = std::clamp(static_cast<int>(route.size()), 1, max_rows);
   const auto columns = static_cast<std::size_t>(route.columns());
-  viewer::PicturePlot plot{.title = "The route panorama: each row is the horizon at one place",
-                           .x_label = "azimuth from straight ahead [degrees], left positive",
-                           .y_label = "distance along the route [m]",
-                           .x_range = {180.0, -180.0},
-                           .y_range = {0.0, std::max(length_m, 1e-3)},
-                           .columns = route.columns(),
-                           .rows = rows,
-                           .x_tick = 45.0};
+  viewer::PicturePlot plot{
+      .title = "The route panorama: each row is the horizon at one place",
+      .x_label = "azimuth from straight ahead [degrees], left positive",
+      .y_label = "distance along the route [" + std::string(to_string(unit)) + "]",
+      .x_range = {180.0, -180.0},
+      .y_range = {0.0, std::max(length_m, 1e-3)},
+      .columns = route.columns(),
+      .rows = rows,
+      .x_tick = 45.0};
   plot.values.resize(columns * static_cast<std::size_t>(rows));
   double travelled_m = 0.0;
   std::size_t line = 0;
@@ -114,7 +115,8 @@ viewer::PicturePlot draw_lines(const RouteLines& route, const std::vector<Follow
   return plot;
 }
 
-viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedImage>& images) {
+viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedImage>& images,
+                          LengthUnit unit) {
   viewer::MapLayer truth{.label = "ground truth", .colour = viewer::PlotColour::black};
   viewer::MapLayer fixes{.label = "computed positions", .colour = viewer::PlotColour::blue};
   viewer::MapLayer changed{.label = "changed scene", .colour = viewer::PlotColour::orange};
@@ -131,7 +133,8 @@ viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedIma
   }
   if (true_path.size() > 1) truth.lines.push_back(std::move(true_path));
   return {.title = "Map",
-          .layers = {draw_path_layer(route.poses()), truth, changed, fixes, off_route}};
+          .layers = {draw_path_layer(route.poses()), truth, changed, fixes, off_route},
+          .unit = to_string(unit)};
 }
 
 viewer::LinePlot draw_errors(const std::vector<FollowedImage>& images) {
@@ -190,7 +193,8 @@ void add_median_figure(std::vector<std::pair<std::string, std::string>>& figures
 }  // namespace
 
 void write_record_report(const std::filesystem::path& folder, const std::string& name,
-                         const RoutePanorama& route, double bytes_per_km) {
+                         const RouteRecorder::Recorded& recorded, LengthUnit unit) {
+  const RoutePanorama& route = recorded.route;
   viewer::MapLayer path = draw_path_layer(route.poses());
   viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
   start.squares.push_back(route.poses().front().position());
@@ -199,18 +203,24 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
                           "pixels: the horizon around the robot at the height of its camera. It "
                           "needs no other data to drive the route again.");
   page.add_figures(
-      {{format_fixed(route.length_m(), 1) + " m", "long"},
+      {{format_fixed(route.length_m(), 1) + " " + to_string(unit), "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
-       {format_fixed(1e-6 * bytes_per_km, 2) + " MB", "per kilometre in the memory"}});
+       unit == LengthUnit::metres
+           ? std::pair{format_fixed(1e-6 * recorded.bytes_per_km(), 2) + std::string(" MB"),
+                       std::string("per kilometre in the memory")}
+           : std::pair{
+                 format_fixed(1e-3 * static_cast<double>(recorded.bytes), 0) + std::string(" kB"),
+                 std::string("in the memory")}});
   page.begin_section("The route panorama");
   page.add_text(
       "Each row is the horizon at one place. The start is at the bottom, the end is at the top, "
       "and the forward direction is in the middle. When the robot passes an object, the object "
       "moves from the middle to one side. Distant objects move more slowly than near objects.");
-  page.add_plots({{draw_panorama(route), "Omnidirectional route panorama"}});
+  page.add_plots({{draw_panorama(route, unit), "Omnidirectional route panorama"}});
   page.begin_section("Route");
   page.add_plots(
-      {{viewer::MapPlot{.title = "Map", .layers = {path, start}}, "Positions of the lines"}});
+      {{viewer::MapPlot{.title = "Map", .layers = {path, start}, .unit = to_string(unit)},
+        "Positions of the lines"}});
   page.write(folder, "index.html", "panonav route record");
 }
 
@@ -221,6 +231,11 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(summary.on_route) + " of " + std::to_string(summary.images),
        "images on the route"}};
+  for (const auto& [count, origin] : {std::pair{summary.predicted, RouteFix::Origin::prediction},
+                                      {summary.recovered, RouteFix::Origin::recovery},
+                                      {summary.searched, RouteFix::Origin::search}}) {
+    if (count > 0) figures.emplace_back(std::to_string(count), format_origin(origin));
+  }
   add_median_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
   add_median_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
   add_median_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees",
@@ -230,7 +245,8 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
       "A robot drives the route again, or drives beside it. panonav searches for the pose at which "
       "the stored lines predict the robot's current image.");
   page.add_figures(figures);
-  replay_page.set_route(draw_panorama(route.panorama), make_marks(images));
+  page.add_text("How a position was computed: " + std::string(origin_explanation) + ".");
+  replay_page.set_route(draw_panorama(route.panorama, route.unit), make_marks(images));
   page.begin_section("The run, image by image");
   page.add_text(
       "The map shows the stored route and the robot's position. The route panorama is below. Each "
@@ -239,7 +255,7 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
       "directions in which the scene has changed.");
   page.add_run(replay_page);
   page.begin_section("Route");
-  page.add_plots({{draw_path(route.lines, images),
+  page.add_plots({{draw_path(route.lines, images, route.unit),
                    "Stored route, computed positions, and the true path if it is known"}});
   if (!chosen.empty()) {
     page.begin_section("Seen and predicted lines");
@@ -264,7 +280,8 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
         "directions. The scene has changed there.");
     std::vector<std::vector<std::string>> rows;
     for (const auto& [from_m, to_m] : stretches) {
-      rows.push_back({format_fixed(from_m, 2) + " m", format_fixed(to_m, 2) + " m"});
+      rows.push_back({format_fixed(from_m, 2) + " " + to_string(route.unit),
+                      format_fixed(to_m, 2) + " " + to_string(route.unit)});
     }
     page.add_table({"from", "to"}, rows);
   }

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav_viewer/page.hpp"
 #include "runs/followed_run.hpp"
@@ -12,13 +14,14 @@ namespace panonav::command {
 
 /// Writes a page with the route panorama [Y03 figures 3b and 5] and the path. Throws FileError.
 void write_record_report(const std::filesystem::path& folder, const std::string& name,
-                         const RoutePanorama& route, double bytes_per_km);
+                         const RouteRecorder::Recorded& recorded, LengthUnit unit);
 
 /// A route that a run followed, for the page of the run.
 struct FollowedRoute {
   std::string name;
   const RoutePanorama& panorama;
   const RouteLines& lines;
+  LengthUnit unit = LengthUnit::metres;  ///< of the poses
 };
 
 /// Writes a page with a replay of the run above the route panorama, a map with fixes and true path,

@@ -47,7 +47,7 @@ viewer::MapLayer draw_estimated_path(const std::vector<TrackedImage>& images,
                                      const TrackBackground& background) {
   std::vector<std::optional<Point2>> positions(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
-    if (is_localised(images[i])) positions[i] = images[i].estimate.pose->position();
+    if (is_position_known(images[i])) positions[i] = images[i].estimate.position;
   }
   return {.label = "estimated path",
           .colour = viewer::PlotColour::blue,
@@ -71,11 +71,11 @@ viewer::MapPlot draw_track(const VisualMemory& memory, const std::vector<Tracked
     kidnapped.squares.push_back(images[*background.kidnapped_after + 1].truth->position());
   }
   for (const TrackedImage& image : images) {
-    const auto& pose = image.estimate.pose;
-    if (is_localised(image)) {
-      localised.dots.push_back(pose->position());
-    } else if (image.estimate.state == LocalisationState::ambiguous && pose) {
-      ambiguous.circles.push_back(pose->position());
+    const auto& position = image.estimate.position;
+    if (is_position_known(image)) {
+      localised.dots.push_back(*position);
+    } else if (image.estimate.state == LocalisationState::ambiguous && position) {
+      ambiguous.circles.push_back(*position);
     } else if (image.truth) {
       lost.crosses.push_back(image.truth->position());
     }

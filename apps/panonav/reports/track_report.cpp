@@ -7,6 +7,7 @@
 
 #include "cli/session.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav_viewer/plot.hpp"
@@ -17,7 +18,8 @@ namespace panonav::command {
 
 namespace {
 
-viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spacing_m) {
+viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spacing_m,
+                             const std::string& unit) {
   viewer::Series localised{.label = "error, localised", .style = viewer::SeriesStyle::points};
   viewer::Series ambiguous{.label = "error, ambiguous", .style = viewer::SeriesStyle::points};
   viewer::Series spread{.label = "spread of particles", .style = viewer::SeriesStyle::lines};
@@ -30,7 +32,7 @@ viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spa
     if (image.estimate.state == LocalisationState::lost) {
       lost.add(x, image.estimate.spread_m);
     } else if (const auto error = position_error_m(image)) {
-      viewer::Series& series = is_localised(image) ? localised : ambiguous;
+      viewer::Series& series = is_position_known(image) ? localised : ambiguous;
       series.add(x, *error);
     }
   }
@@ -38,15 +40,17 @@ viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spa
   spacing.y = {spacing_m, spacing_m};
   return viewer::LinePlot{.title = "Errors and uncertainty",
                           .x_label = "image",
-                          .y_label = "metres",
+                          .y_label = unit == "m" ? "metres" : unit,
                           .series = {localised, ambiguous, spread, lost, spacing},
                           .log_y = true};
 }
 
 viewer::LinePlot draw_particles(const std::vector<TrackedImage>& images) {
   viewer::Series all{.label = "particles", .style = viewer::SeriesStyle::lines};
-  viewer::Series injected{.label = "injected", .style = viewer::SeriesStyle::points};
-  viewer::Series effective{.label = "effective number", .style = viewer::SeriesStyle::lines};
+  viewer::Series injected{.label = "new, at random positions",
+                          .style = viewer::SeriesStyle::points};
+  viewer::Series effective{.label = "effective number, by their weights",
+                           .style = viewer::SeriesStyle::lines};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const MonteCarloEstimate& estimate = images[i].estimate;
     const auto add = [&](viewer::Series& series, double value) {
@@ -63,6 +67,20 @@ viewer::LinePlot draw_particles(const std::vector<TrackedImage>& images) {
                           .log_y = true};
 }
 
+std::string explain_state(LocalisationState state) {
+  switch (state) {
+    case LocalisationState::localised:
+      return "localised: position and heading known";
+    case LocalisationState::position_known:
+      return "position known, heading not";
+    case LocalisationState::ambiguous:
+      return "ambiguous: several places or a large area possible";
+    case LocalisationState::lost:
+      return "lost: no place of the memory fits";
+  }
+  return {};
+}
+
 /// Returns a table row for each run of consecutive images with the same state.
 std::vector<std::vector<std::string>> make_stretch_rows(const std::vector<TrackedImage>& images) {
   std::vector<std::vector<std::string>> rows;
@@ -75,10 +93,9 @@ std::vector<std::vector<std::string>> make_stretch_rows(const std::vector<Tracke
     }
     const std::string from = std::to_string(begin + 1);
     rows.push_back(
-        {end == begin + 1 ? from : from + " to " + std::to_string(end),
-         std::string(to_string(state)),
-         errors.empty() ? "-" : format_fixed(median(errors), 3) + " m",
-         errors.empty() ? "-" : format_fixed(*std::ranges::max_element(errors), 3) + " m"});
+        {end == begin + 1 ? from : from + " to " + std::to_string(end), explain_state(state),
+         errors.empty() ? "" : format_fixed(median(errors), 3) + " m",
+         errors.empty() ? "" : format_fixed(*std::ranges::max_element(errors), 3) + " m"});
     begin = end;
   }
   return rows;
@@ -97,8 +114,12 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
                                                               std::size_t total) {
   std::vector<std::pair<std::string, std::string>> figures{
       {format_share(summary.localised, total), "of the images localised"},
-      {summary.first_localised ? std::to_string(*summary.first_localised) : "never",
-       summary.first_localised ? "images until the robot was first localised" : "localised"}};
+      {summary.first_localised ? "image " + std::to_string(*summary.first_localised) : "never",
+       summary.first_localised ? "was the first at which the robot was localised" : "localised"}};
+  if (summary.position_known > 0) {
+    figures.emplace_back(format_share(summary.position_known, total),
+                         "of the images with a known position, but no heading");
+  }
   if (!summary.errors_m.empty()) {
     figures.emplace_back(format_length(median(summary.errors_m)), "median error while localised");
     figures.emplace_back(format_length(quantile(summary.errors_m, 0.95)),
@@ -121,38 +142,50 @@ std::size_t count_shown_particles(std::size_t images) {
                     max_particles);
 }
 
-void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
-                        double spacing_m, const std::vector<TrackedImage>& images,
-                        const TrackSummary& summary, const viewer::RunPage& replay_page) {
+void write_track_report(const std::filesystem::path& folder, const Tracker& tracker,
+                        const std::vector<TrackedImage>& images, const TrackSummary& summary,
+                        const viewer::RunPage& replay_page) {
+  const VisualMemory& memory = tracker.memory();
+  const double spacing_m = tracker.localiser().model().spacing_m;
+  const bool is_metric = tracker.length_unit() == LengthUnit::metres;
   const bool truth_known =
       std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
   viewer::ReportPage page(
       "Tracked run",
-      "A robot moved. It had odometry with errors and a memory of " +
-          std::to_string(memory.size()) + " views, and took " + std::to_string(images.size()) +
-          " images. Particles show its possible positions after each image. They are far apart "
+      std::string("A robot moved. ") +
+          (tracker.visual_odometry() == nullptr
+               ? "It had odometry with errors"
+               : "Its motion was computed from its images; it had") +
+          (tracker.visual_odometry() == nullptr ? " and a memory of " : " a memory of ") +
+          format_count(memory.size(), "view") + ", and took " +
+          format_count(images.size(), "image") +
+          ". Particles show its possible positions after each image. They are far apart "
           "while the position is unknown, and close together when it is known.");
   page.add_figures(main_figures(summary, images.size()));
   page.begin_section("The run, image by image");
   page.add_text(
       "Each small dot is a particle: a possible position of the robot. Grey dots are the stored "
       "views, " +
-      format_fixed(100.0 * spacing_m, 0) +
-      " cm apart. The large dot is the estimate: the mean of the group of particles with the "
+      (is_metric ? format_fixed(100.0 * spacing_m, 0) + " cm"
+                 : format_fixed(spacing_m, 1) + " view steps") +
+      " apart. The large dot is the estimate: the mean of the group of particles with the "
       "highest probability. There is no large dot while the robot is lost." +
       std::string(truth_known ? " The ring is the true position." : ""));
   page.add_run(replay_page);
   page.begin_section("The whole run");
+  viewer::MapPlot whole_run = draw_track(memory, images, {});
+  whole_run.unit = to_string(tracker.length_unit());
   page.add_plots(
-      {{draw_track(memory, images, {}),
+      {{std::move(whole_run),
         truth_known ? "True and estimated path. Crosses: true positions while the robot was lost"
                     : "The estimated path, with gaps where the robot was not localised"},
-       {draw_errors(images, spacing_m),
+       {draw_errors(images, spacing_m, to_string(tracker.length_unit())),
         truth_known ? "Error of each estimate, and distance of the particles from their mean, on a "
                       "logarithmic scale"
                     : "Distance of the particles from their mean, on a logarithmic scale"}});
-  page.begin_section("States");
-  page.add_table({"images", "state", "median error", "largest error"}, make_stretch_rows(images));
+  page.begin_section("What was known about the position");
+  page.add_table({"images", "the robot was", "median error", "largest error"},
+                 make_stretch_rows(images));
   page.begin_section("Particles");
   page.add_text(
       "The tracker uses more particles while many positions are possible, and fewer when the "

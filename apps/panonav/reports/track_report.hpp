@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "panonav/memory/visual_memory.hpp"
+#include "panonav/pipeline/tracker.hpp"
 #include "panonav_viewer/page.hpp"
 #include "runs/tracked_run.hpp"
 
@@ -16,8 +16,8 @@ namespace panonav::command {
 
 /// Writes a page that replays the run with its particles, as in [M03] figures 7 to 9, and plots of
 /// the whole run. `images` must not be empty. Throws FileError.
-void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
-                        double spacing_m, const std::vector<TrackedImage>& images,
-                        const TrackSummary& summary, const viewer::RunPage& replay_page);
+void write_track_report(const std::filesystem::path& folder, const Tracker& tracker,
+                        const std::vector<TrackedImage>& images, const TrackSummary& summary,
+                        const viewer::RunPage& replay_page);
 
 }  // namespace panonav::command

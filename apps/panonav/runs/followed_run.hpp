@@ -4,10 +4,11 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "panonav/core/executor.hpp"
+#include "cli/session.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/route_follower.hpp"
@@ -35,9 +36,10 @@ struct FollowedImage {
 /// Follows every N-th image of a run along a route. Lines are computed on all threads, the follower
 /// runs in order; results do not depend on the number of threads. `truth` has the true poses of all
 /// entries or is empty. `panorama_reader` unwraps images for the record; null: nothing is recorded.
-/// `report` is called after each image, in order. Throws FileError on an image that cannot be read.
+/// `report` is called after each image, in order. An image that cannot be read is skipped
+/// (`SkippedImages`).
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int every_nth, const PanoramaReader* panorama_reader, Executor& executor,
+            int every_nth, const PanoramaReader* panorama_reader, Session& session,
             const std::function<void(FollowedImage&&)>& report);
 
 struct FollowSummary {
@@ -60,6 +62,13 @@ struct FollowSummary {
 [[nodiscard]] std::vector<std::pair<double, double>> find_changed_sections(
     const std::vector<FollowedImage>& images);
 
+/// Returns the name in JSON: "prediction", "recovery" or "search".
 [[nodiscard]] std::string_view to_string(RouteFix::Origin origin);
+/// Returns the word for people: "predicted", "recovered" or "found".
+[[nodiscard]] std::string_view format_origin(RouteFix::Origin origin);
+/// Explains the three words in one sentence.
+inline constexpr std::string_view origin_explanation =
+    "predicted: at the pose that the odometry predicts; recovered: by a search around that pose; "
+    "found: by a search along the whole route";
 
 }  // namespace panonav::command

@@ -11,6 +11,7 @@
 
 #include "cli/stop_signals.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 
@@ -87,7 +88,7 @@ class SkipNotes {
     if (now < next_) return;
     next_ = now + std::chrono::seconds(1);
     session_.note(
-        "skipped: " + (unreported_ > 1 ? std::to_string(unreported_) + " images, the last: " : "") +
+        "skipped: " + (unreported_ > 1 ? format_count(unreported_, "image") + ", the last: " : "") +
         to_readable_line(why));
     unreported_ = 0;
   }
@@ -146,10 +147,11 @@ std::unique_ptr<recordings::LiveObservations> open_live(
   if (live.camera_width.has_value() != live.camera_height.has_value()) {
     throw UsageError("--camera-width and --camera-height must be used together");
   }
-  const auto stated = make_picture_source(pictures);
+  const auto stated = make_picture_source(pictures, session);
   if (!stated && !remembered) {
     throw UsageError("set --kind to the type of the images of " + input);
   }
+  if (!remembered) note_default_band(*stated, session);
   recordings::LiveOptions options;
   options.note = [&session](const std::string& line) { session.note(line); };
   if (live.camera_width) options.size = ImageSize{*live.camera_width, *live.camera_height};
@@ -165,14 +167,15 @@ void reject_live_options(const Arguments& arguments, const std::string& input, b
 
 std::string describe_events(const LiveCounts& counts, std::size_t moments_left_out) {
   std::string text;
-  const auto add = [&text](std::uint64_t count, const std::string& what) {
-    if (count > 0) text += ", " + std::to_string(count) + " " + what;
+  const auto add = [&text](std::uint64_t count, std::string_view noun, std::string_view what) {
+    if (count > 0) text.append(", ").append(format_count(count, noun)).append(what);
   };
-  add(counts.skipped + counts.source.damaged, "could not be read");
-  add(counts.source.dropped, "were skipped because they came too fast");
-  add(counts.source.interruptions, "interruptions of the source");
-  add(counts.dropped_line_count, "lines were not printed because the reader was too slow");
-  add(moments_left_out, "moments were not recorded because the disk was too slow");
+  const std::uint64_t unread = counts.skipped + counts.source.damaged;
+  if (unread > 0) text += ", " + std::to_string(unread) + " could not be read";
+  add(counts.source.dropped, "image", " skipped because of too fast a rate");
+  add(counts.source.interruptions, "interruption", " of the source");
+  add(counts.dropped_line_count, "line", " not printed because the reader was too slow");
+  add(moments_left_out, "moment", " not recorded because the disk was too slow");
   if (!counts.delays_ms.empty()) {
     text += "; from arrival to answer " + format_fixed(quantile(counts.delays_ms, 0.5), 1) +
             " ms median (decoding " + format_fixed(quantile(counts.decoding_ms, 0.5), 1) + "), " +

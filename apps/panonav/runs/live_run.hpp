@@ -45,8 +45,9 @@ struct LiveCounts {
   recordings::LivePictures::Counts source;
 };
 
-/// Describes skipped, dropped and delayed images: ", 3 could not be read, 2 were skipped because
-/// they came too fast". `moments_left_out` is the number of moments missing in the record.
+/// Describes skipped, dropped and delayed images: ", 3 could not be read, 1 image
+/// skipped because of too fast a rate". `moments_left_out` is the number of moments missing in the
+/// record.
 [[nodiscard]] std::string describe_events(const LiveCounts& counts, std::size_t moments_left_out);
 
 /// Processes observations until the source ends, a signal (SIGINT, SIGTERM) arrives, or the

@@ -10,8 +10,10 @@
 #include "cli/json.hpp"
 #include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/io/gpano.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/pipeline/live_memory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -47,7 +49,11 @@ class RunRouteRecorder {
     const PlaceRecogniser* const recogniser = memory.recogniser();
     if (recogniser == nullptr) return;
     if (!recorder_) {
-      recorder_.emplace(MemoryFile::open(memory_, Access::read_write), source_, options_);
+      auto file = MemoryFile::open(memory_, Access::read_write);
+      if (poses_ == RoutePoses::images && read_length_unit(file) == LengthUnit::view_steps) {
+        options_.assumed_unit_m = read_assumed_unit_m(file);
+      }
+      recorder_.emplace(std::move(file), source_, options_);
     }
     if (poses_ == RoutePoses::images) {
       if (!odometry_) odometry_.emplace(visual_odometry(recogniser->memory()));
@@ -72,13 +78,18 @@ class RunRouteRecorder {
   std::size_t lines_ = 0;
 };
 
+/// Chooses poses that half of the images have, as `find_drive_poses` does.
 RoutePoses choose_route_poses(const Dataset& recording) {
-  const auto all = [&](const auto& has) { return std::ranges::all_of(recording.entries, has); };
-  if (all([](const DatasetEntry& e) { return e.pose && e.pose->heading_rad; })) {
-    return RoutePoses::known;
-  }
-  return all([](const DatasetEntry& e) { return e.odometry.has_value(); }) ? RoutePoses::odometry
-                                                                           : RoutePoses::images;
+  const auto& entries = recording.entries;
+  const auto known = 10 * std::ranges::count_if(entries, [](const DatasetEntry& e) {
+                       return e.pose && e.pose->heading_rad;
+                     });
+  const auto moved = 10 * std::ranges::count_if(entries, [](const DatasetEntry& e) {
+                       return e.odometry.has_value();
+                     });
+  const auto half = static_cast<std::ptrdiff_t>(5 * entries.size());
+  if (known >= half && 10 * known >= 9 * moved) return RoutePoses::known;
+  return moved >= half ? RoutePoses::odometry : RoutePoses::images;
 }
 
 /// Throws UsageError if an existing route would be continued with motion from images: each run has
@@ -101,8 +112,8 @@ ordered_json to_json(const RouteFollower::Step& step) {
 
 std::string format_line(const RouteFollower::Step& step, Session& session) {
   if (!step.fix) return session.red("not on the route");
-  return session.green("on the route") + ", along " + format_fixed(step.fix->along_m, 2) +
-         " m  lateral " + format_fixed(step.fix->lateral_m, 2) + " m";
+  return session.green("on the route") + ", along " + session.format_length(step.fix->along_m, 2) +
+         "  lateral " + session.format_length(step.fix->lateral_m, 2);
 }
 
 /// Makes the moments of a run for its record.
@@ -131,7 +142,7 @@ class RunMoments {
         recogniser != shown_recogniser_) {
       recorded_view_count_ = memory_.views();
       shown_recogniser_ = recogniser;
-      shown_.emplace(recogniser->memory());
+      shown_.emplace(recogniser->memory(), read_length_unit(*file_));
       shown_->add_to(moment);
     }
     if (moment.panorama) {
@@ -233,7 +244,7 @@ class LocalisedRun {
     const LiveCounts& counts = loop.finish();
     if (arguments_.report && arguments_.add) write_report();
     if (has_report_) print_report_path(*arguments_.report, session_);
-    session_.note(std::to_string(counts.pictures) + " images, " + std::to_string(known_count_) +
+    session_.note(format_count(counts.pictures, "image") + ", " + std::to_string(known_count_) +
                   " of places of " + arguments_.memory + changes +
                   describe_events(counts, record.left_out()) +
                   (live_ ? ", unwrapping " +
@@ -242,6 +253,9 @@ class LocalisedRun {
                                             1) +
                                " ms"
                          : ""));
+    if (!why_unchanged_.empty()) {
+      session_.note("no view of " + arguments_.memory + " was updated: " + why_unchanged_);
+    }
     if (has_changed_) session_.suggest({"panonav", "undo", arguments_.memory}, "To revert this:");
     return (arguments_.add ? counts.pictures : known_count_) > 0 ? ExitCode::done
                                                                  : ExitCode::no_answer;
@@ -270,7 +284,7 @@ class LocalisedRun {
         recording_->entries, [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
     const PlaceRecogniser* const recogniser = memory_->recogniser();
     if (!arguments_.update || has_odometry || recogniser == nullptr) return;
-    session_.note("motion is computed from the images, because some have no odometry: " +
+    session_.note("motion to images without odometry is computed from the images: " +
                   add_visual_odometry(*recording_, recogniser->memory(), recogniser->encoder(),
                                       session_.executor()));
   }
@@ -294,7 +308,8 @@ class LocalisedRun {
     const LocalisedQuery unreadable{file, 0.0, {}, {}, error.what()};
     if (arguments_.out) table_ += csv_row(unreadable);
     if (arguments_.report) queries_.push_back(unreadable);
-    return session_.json() ? json_line(command::to_json(unreadable, arguments_.areas)) : "";
+    return session_.json() ? session_.json_line(command::to_json(unreadable, arguments_.areas))
+                           : "";
   }
 
   /// Localises the observation and returns the line to print.
@@ -319,7 +334,7 @@ class LocalisedRun {
     json["stamp_s"] = to_json_or_null(observation.stamp_s);
     if (arguments_.add) json["added"] = answer_.is_new;
     if (step) json["route"] = to_json(*step);
-    return json_line(json);
+    return session_.json_line(std::move(json));
   }
 
   /// Stores pending changes and returns their summary. Called before all lines are printed, as a
@@ -327,14 +342,16 @@ class LocalisedRun {
   std::string finish() {
     std::string text;
     const auto changes = memory_->finish("update from " + mask_credentials(input()));
-    if (arguments_.add) text += ", " + std::to_string(memory_->added()) + " views added";
+    if (arguments_.add) text += ", " + format_count(memory_->added(), "view") + " added";
     if (changes) {
       has_changed_ = changes->certain > 0;
       text += "; " + summarise(*changes) + "; " + std::to_string(changes->certain) + " of " +
-              std::to_string(changes->observations) + " places certain";
+              format_count(changes->observations, "place") + " certain";
+      why_unchanged_ = explain_uncertainty(*changes);
     }
-    if (route_) text += ", " + std::to_string(route_->finish()) + " lines of the route";
-    if (arguments_.out) write_file(*arguments_.out, std::string_view(table_));
+    if (route_) text += ", " + format_count(route_->finish(), "line") + " of the route";
+    if (arguments_.out)
+      write_file(*arguments_.out, make_csv_header(session_.length_unit()) + table_);
     return text;
   }
 
@@ -368,13 +385,14 @@ class LocalisedRun {
   LiveMemory::Answer answer_;  // to the current image
   LocalisedQuery query_;       // the same answer for lines and tables
   std::vector<LocalisedQuery> queries_;
-  std::string table_{csv_header};
+  std::string table_;
   std::size_t known_count_ = 0;
   std::size_t next_image_ = 0;     // index of the next image of the recording
   std::size_t skipped_count_ = 0;  // unanswered images of the recording
   std::exception_ptr first_failure_;
   bool has_report_ = false;
   bool has_changed_ = false;
+  std::string why_unchanged_;  // by an update
   std::chrono::duration<double, std::milli> unwrapping_{};
 };
 
@@ -392,10 +410,18 @@ void require_components(const Arguments& declared, const LocaliseArguments& argu
 
 Dataset open_queries(const LocaliseArguments& arguments,
                      const std::optional<PictureSource>& remembered, Session& session) {
+  PictureArguments pictures = arguments.pictures;
+  pictures.check = PictureArguments::Check::none;
   const auto open = [&](const std::string& input) {
-    return open_recording(input, arguments.pictures, remembered, session);
+    return open_recording(input, pictures, remembered, session);
   };
-  if (arguments.inputs.size() == 1) return open(arguments.inputs.front());
+  const auto reader = find_dataset_reader(arguments.inputs.front());
+  if (reader && reader->name == "video") {
+    pictures.further_videos.assign(arguments.inputs.begin() + 1, arguments.inputs.end());
+  }
+  if (arguments.inputs.size() == 1 || !pictures.further_videos.empty()) {
+    return open(arguments.inputs.front());
+  }
   const PartArguments& part = arguments.pictures.part;
   if (part.from_s || part.to_s || part.every) {
     throw UsageError(
@@ -414,10 +440,12 @@ Dataset open_queries(const LocaliseArguments& arguments,
   queries->entries.clear();
   for (const std::string& input : arguments.inputs) {
     DatasetEntry entry;
-    entry.file = input;
+    entry.file = escape_name(input);
     entry.path = input;
     queries->entries.push_back(std::move(entry));
   }
+  if (!pictures.ignore_gpano) apply_gpano(*queries);
+  note_unusable(*queries, session);
   return std::move(*queries);
 }
 
@@ -439,6 +467,10 @@ ExitCode localise_in_order(const Arguments& declared, const LocaliseArguments& a
   if (arguments.inputs.size() > 1 && (arguments.add || arguments.update || arguments.route)) {
     throw UsageError(
         "--add, --update and --route can be used with one recording, not with several images");
+  }
+  if (memory_exists(arguments.memory)) {
+    session.set_length_unit(
+        read_length_unit(MemoryFile::open(arguments.memory, Access::read_only)));
   }
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
   return LocalisedRun(declared, arguments, session).run();

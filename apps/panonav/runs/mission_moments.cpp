@@ -8,7 +8,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/navigation/direction_field.hpp"
-#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/relative_pose/pair_evidence.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::command {
@@ -74,13 +74,14 @@ std::vector<Pose2> MissionMoments::make_planned_path(ViewId from) const {
   return path;
 }
 
-/// Returns the home vector from the robot's view to the goal's view.
-recordings::RunHoming MissionMoments::homing() const {
+/// Returns the home vector from the robot's view to the goal's view; nullopt if it is unknown.
+std::optional<recordings::RunHoming> MissionMoments::homing() const {
   const ViewId goal = robot_.goal();
   const VisualMemory views = robot_.memory().load({&goal, 1});
-  const HomeVector home = home_vector(homing_view(views.signature(goal)),
-                                      homing_view(robot_.encoder().signature(*panorama_)));
-  return {home.direction_rad(), home.confidence};
+  const auto home = compute_pair_evidence(homing_view(views.signature(goal)),
+                                          homing_view(robot_.encoder().signature(*panorama_)));
+  if (!home || !home->vector.has_direction()) return std::nullopt;
+  return recordings::RunHoming{home->vector.direction_rad(), home->probability};
 }
 
 /// Adds the views with their areas, the direction to the goal at each view, and the goal.

@@ -30,7 +30,7 @@ class MissionMoments {
 
  private:
   [[nodiscard]] std::vector<Pose2> make_planned_path(ViewId from) const;
-  [[nodiscard]] recordings::RunHoming homing() const;
+  [[nodiscard]] std::optional<recordings::RunHoming> homing() const;
   void add_direction_field(recordings::RunMoment& moment) const;
 
   const RobotNavigator& robot_;

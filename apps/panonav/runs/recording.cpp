@@ -10,6 +10,9 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/media_kind.hpp"
+#include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/live_pictures.hpp"
 #include "panonav_recordings/recording.hpp"
@@ -49,8 +52,13 @@ std::optional<ElevationBand> parse_elevation_band(const PictureArguments& pictur
   return ElevationBand{radians(low), radians(high)};
 }
 
+bool states_layout(const PictureArguments& pictures) {
+  return pictures.kind || pictures.camera || pictures.columns || pictures.forward_column ||
+         pictures.elevation_deg;
+}
+
 PictureSource make_mirror_source(const PictureArguments& pictures,
-                                 const std::optional<ElevationBand>& band) {
+                                 const std::optional<ElevationBand>& band, Session& session) {
   if (!pictures.camera) {
     throw UsageError(
         "--camera is missing: images of a mirror need a camera file (panonav calibrate)");
@@ -62,6 +70,12 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
   }
   PictureSource source{.kind = PictureKind::mirror};
   auto camera = read_camera(*pictures.camera);
+  if (!camera.format.empty()) {
+    session.note(*pictures.camera + ": " + camera.format +
+                 " calibration; the camera is taken for a lens that looks up, with its right side "
+                 "in front (otherwise: panonav calibrate " +
+                 quote_for_shell(*pictures.camera) + " -o camera.toml --mount down, or mirror)");
+  }
   source.camera = std::move(camera.camera);
   source.mask = std::move(camera.mask);
   source.layout.kept_elevations = band;
@@ -70,11 +84,19 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
 
 }  // namespace
 
+void declare_gpano(Arguments& arguments, bool& ignore_gpano) {
+  arguments.flag("--ignore-gpano", ignore_gpano,
+                 "Do not level 360 degree images by the pitch and roll in their GPano data, and "
+                 "ignore which part of the sphere these say that they show");
+  arguments.hide_from_help({"--ignore-gpano"});
+}
+
 void declare_picture_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
                    "Type of the images; not needed if a dataset.toml gives it");
   arguments.option("--camera FILE", pictures.camera,
-                   "Calibration file of the camera, made by panonav calibrate");
+                   "Calibration file of the camera: made by panonav calibrate, or of a lens that "
+                   "looks up by OCamCalib, Kalibr, OpenCV, ROS or stella_vslam");
   arguments.choice("--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
                    "Direction in which the view turns from the left to the right edge of the "
                    "image, seen from above; default clockwise");
@@ -83,20 +105,21 @@ void declare_picture_layout(Arguments& arguments, PictureArguments& pictures) {
       "Column that shows the forward direction, as a fraction of the image width; default 0.5");
   arguments.option("--elevation-deg", pictures.elevation_deg,
                    "Elevations of the lower and upper edge of a panorama; for other images: of the "
-                   "part of the image that is used");
+                   "part of the image that is used; default for equirectangular: -30 40");
   arguments.hide_from_help({"--columns-run", "--forward-column"});
+  declare_gpano(arguments, pictures.ignore_gpano);
 }
 
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
   arguments.option("--image-topic NAME", topics.image,
-                   "Topic of the images in a recording (MCAP, rosbag2, ROS 1 bag); needed if there "
-                   "are several such topics");
+                   "Topic of the images in a recording (MCAP, rosbag2, ROS 1 bag); by default, a "
+                   "line names the one that is used of several");
   arguments.option(
       "--odometry-topic NAME", topics.odometry,
       "Topic of the odometry (nav_msgs/Odometry); needed if there are several such topics");
   arguments.option("--odometry-frames", "ODOM BASE", topics.odometry_frames,
                    "Read the odometry from the transforms (TF) between these two frames; if there "
-                   "is no odometry topic, the default is odom base_link");
+                   "is no odometry topic, the default is odom base_link, or odom base_footprint");
   arguments.option(
       "--imu-topic NAME", topics.imu,
       "Topic of the inertial sensor (roll and pitch); needed if there are several such topics");
@@ -165,15 +188,14 @@ Dataset::Selection to_selection(const PartArguments& part) {
   return selection;
 }
 
-std::optional<PictureSource> make_picture_source(const PictureArguments& pictures) {
-  const bool nothing = !pictures.kind && !pictures.camera && !pictures.columns &&
-                       !pictures.forward_column && !pictures.elevation_deg;
-  if (nothing) return std::nullopt;
+std::optional<PictureSource> make_picture_source(const PictureArguments& pictures,
+                                                 Session& session) {
+  if (!states_layout(pictures)) return std::nullopt;
   const std::string kind = pictures.kind.value_or(pictures.camera ? "mirror" : "");
   if (kind.empty()) throw UsageError("--kind is missing: panorama, equirectangular or mirror");
 
   const std::optional<ElevationBand> band = parse_elevation_band(pictures);
-  if (kind == "mirror") return make_mirror_source(pictures, band);
+  if (kind == "mirror") return make_mirror_source(pictures, band, session);
   if (pictures.camera) throw UsageError("--camera can only be used with --kind mirror");
   PictureSource source;
   if (pictures.columns == "counter-clockwise") {
@@ -196,19 +218,98 @@ std::optional<PictureSource> make_picture_source(const PictureArguments& picture
   return source;
 }
 
+namespace {
+
+/// True if the first picture is a file that cannot be read or does not fit the layout, so that an
+/// error will be the only line.
+bool is_refused_later(const Dataset& opened) {
+  const DatasetEntry& first = opened.entries.front();
+  if (first.store) return false;
+  try {
+    require_picture_size(opened.source, read_image_size(first.path));
+    return false;
+  } catch (const Error&) {
+    return true;
+  }
+}
+
+}  // namespace
+
+void note_unusable(const Dataset& recording, Session& session) {
+  const auto& unusable = recording.unusable;
+  if (unusable.empty()) return;
+  constexpr std::size_t max_named = 3;
+  std::string text = std::to_string(unusable.size()) + " of " +
+                     format_count(unusable.size() + recording.entries.size(), "image") +
+                     " cannot be used and are skipped: ";
+  for (std::size_t i = 0; i < std::min(max_named, unusable.size()); ++i) {
+    text += (i > 0 ? "; " : "") + to_readable_line(unusable[i].describe());
+  }
+  if (unusable.size() > max_named) {
+    text += "; and " + std::to_string(unusable.size() - max_named) + " more";
+  }
+  session.note(text);
+}
+
+namespace {
+
+/// True if the error is about a picture file that cannot be decoded. Other errors, such as a size
+/// that does not fit a memory, would be those of all images.
+bool is_about_damaged_picture(std::string_view message) {
+  for (auto at = message.find(": "); at != message.npos; at = message.find(": ", at + 1)) {
+    const fs::path file(message.substr(0, at));
+    if (identify_media_file(file) != MediaKind::picture) continue;
+    try {
+      static_cast<void>(check_image(file));
+    } catch (const FileError&) {
+      return true;
+    }
+    return false;
+  }
+  return false;
+}
+
+}  // namespace
+
+void SkippedImages::add(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const FileError& error) {
+    if (!is_about_damaged_picture(error.what()) || ++skipped_count_ == image_count_) throw;
+    session_.note("skipped: " + to_readable_line(error.what()));
+  }
+}
+
+void note_default_band(const PictureSource& source, Session& session) {
+  if (source.kind != PictureKind::equirectangular || source.layout.kept_elevations) return;
+  const auto& [bottom_rad, top_rad] = default_equirectangular_band;
+  session.note("Of the 360 degree images, the elevations from " +
+               format_number(degrees(bottom_rad)) + " to " + format_number(degrees(top_rad)) +
+               " degrees are used; to use another part: --elevation-deg LOW HIGH");
+}
+
 Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, Session& session) {
-  const InputOptions options{.source = make_picture_source(pictures),
-                             .default_source = remembered,
-                             .topics = pictures.topics,
-                             .selection = to_selection(pictures.part),
-                             .recursive = pictures.recursive};
+  const InputOptions options{
+      .source = make_picture_source(pictures, session),
+      .default_source = remembered,
+      .topics = pictures.topics,
+      .selection = to_selection(pictures.part),
+      .recursive = pictures.recursive,
+      .further_videos = {pictures.further_videos.begin(), pictures.further_videos.end()},
+      .ignore_gpano = pictures.ignore_gpano};
   if (recordings::is_live(input) && input != "-") {
     throw UsageError(input + " is a live source; allowed with localise, memorise and track");
   }
   try {
     Dataset opened = open_input(input, options);
     for (const std::string& warning : opened.warnings) session.note(replace_option_names(warning));
+    if (pictures.check != PictureArguments::Check::none && can_have_table(input)) {
+      leave_out_unusable_pictures(opened, session.executor(),
+                                  pictures.check == PictureArguments::Check::heads);
+    }
+    note_unusable(opened, session);
+    if (!remembered && !is_refused_later(opened)) note_default_band(opened.source, session);
     return opened;
   } catch (const OptionError& error) {
     throw UsageError(replace_option_names(error.what()));
@@ -247,29 +348,44 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset open_run(const std::string& input, const InputOptions::Topics& topics,
-                 const PartArguments& part, const MemoryFile& memory, Session& session) {
+Dataset open_run(const std::string& input, const RunArguments& run, const MemoryFile& memory,
+                 Session& session) {
   PictureArguments pictures;
-  pictures.topics = topics;
-  pictures.part = part;
+  pictures.topics = run.topics;
+  pictures.part = run.part;
+  pictures.ignore_gpano = run.ignore_gpano;
+  pictures.check = PictureArguments::Check::heads;
+  pictures.further_videos = run.further_videos;
   return open_recording(input, pictures, memory, session);
 }
 
-void require_later_stamp(const std::string& dataset, const std::string& file, double stamp_s,
-                         double previous_s) {
-  if (stamp_s > previous_s) return;
-  throw FileError(dataset, "stamp_s of " + file + " is " + to_text(stamp_s) +
-                               "; allowed for --tum: > " + to_text(previous_s) +
-                               ", the stamp before it");
+void append_pose(std::vector<StampedPose>& trajectory, const StampedPose& pose,
+                 const std::string& dataset, const std::string& file) {
+  if (!trajectory.empty()) {
+    const double previous_s = trajectory.back().stamp_s;
+    if (pose.stamp_s == previous_s) return;
+    if (pose.stamp_s < previous_s) {
+      throw FileError(dataset, "stamp_s of " + file + " is " + to_text(pose.stamp_s) +
+                                   "; allowed for --tum: " + to_text(previous_s) +
+                                   ", the stamp before it, or more");
+    }
+  }
+  trajectory.push_back(pose);
 }
 
 std::vector<double> trajectory_stamps(const Dataset& run, const std::string& verb,
                                       const std::string& dataset, const std::string& tum,
                                       Session& session) {
   std::vector<double> seconds;
+  std::vector<StampedPose> trajectory;
   for (std::size_t i = 0; i < run.entries.size(); ++i) {
     seconds.push_back(run.entries[i].stamp_s.value_or(static_cast<double>(i)));
-    if (i > 0) require_later_stamp(dataset, run.entries[i].file, seconds[i], seconds[i - 1]);
+    append_pose(trajectory, {seconds[i], {}}, dataset, run.entries[i].file);
+  }
+  if (trajectory.size() < seconds.size()) {
+    session.note("panonav " + verb + ": " + std::to_string(seconds.size() - trajectory.size()) +
+                 " of " + format_count(seconds.size(), "image") +
+                 " have the stamp of the image before; " + tum + " gets one of each stamp");
   }
   if (!run.entries.front().stamp_s) {
     session.note("panonav " + verb + ": " + dataset + " has no column 'stamp_s'; the seconds in " +
@@ -300,7 +416,7 @@ Dataset read_dataset_with_columns(const std::string& folder, const PictureArgume
                                   const std::optional<PictureSource>& remembered,
                                   const std::string& columns, const std::string& values,
                                   Session& session) {
-  if (can_have_table(folder) && !has_dataset_file(folder) && !make_picture_source(pictures)) {
+  if (can_have_table(folder) && !has_dataset_file(folder) && !states_layout(pictures)) {
     throw FileError(folder, "has no dataset.toml, so the positions of its images are unknown" +
                                 explain_columns(folder, columns, values));
   }

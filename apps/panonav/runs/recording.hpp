@@ -1,5 +1,6 @@
 #pragma once
 
+#include <exception>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/dataset_readers.hpp"
+#include "panonav/motion/trajectory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -29,12 +31,31 @@ struct PictureArguments {
   std::optional<std::string> columns;
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
-  bool recursive = false;       ///< also reads images in the subfolders of a folder
+  bool recursive = false;     ///< also reads images in the subfolders of a folder
+  bool ignore_gpano = false;  ///< does not level images by their GPano data
+  /// How unusable images of a folder are found before the verb begins.
+  enum class Check {
+    pixels,  ///< all are decoded
+    heads,   ///< the verb skips images whose pixels are damaged as it reads them (`SkippedImages`)
+    none     ///< the verb skips and lists all of them as it reads them
+  };
+  Check check = Check::pixels;
   InputOptions::Topics topics;  ///< for a recording with topics
   PartArguments part;
+  std::vector<std::string> further_videos;  ///< that continue the input, a video
 };
 
-/// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
+/// The arguments for the recording of a run, whose layout the memory gives.
+struct RunArguments {
+  InputOptions::Topics topics;
+  PartArguments part;
+  bool ignore_gpano = false;
+  std::vector<std::string> further_videos;  ///< as in `PictureArguments`
+};
+
+/// Adds --ignore-gpano.
+void declare_gpano(Arguments& arguments, bool& ignore_gpano);
+/// Adds --kind, --camera, --columns-run, --forward-column, --elevation-deg and --ignore-gpano.
 void declare_picture_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics);
@@ -48,17 +69,43 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 /// True if the input is not a folder, recording, video or live source.
 [[nodiscard]] bool is_one_picture(const std::string& input);
 
-/// Returns the image layout that the flags describe; nullopt if none of them is set. Throws
-/// UsageError on flags that exclude each other, FileError on an invalid camera file.
-[[nodiscard]] std::optional<PictureSource> make_picture_source(const PictureArguments& pictures);
+/// Returns the image layout that the flags describe; nullopt if none of them is set. Prints a note
+/// on a calibration of another program. Throws UsageError on flags that exclude each other,
+/// FileError on an invalid camera file.
+[[nodiscard]] std::optional<PictureSource> make_picture_source(const PictureArguments& pictures,
+                                                               Session& session);
+
+/// Prints how many images of a recording are skipped, and why the first ones are; nothing if none
+/// is.
+void note_unusable(const Dataset& recording, Session& session);
+
+/// Images of a run that are skipped because they cannot be read.
+class SkippedImages {
+ public:
+  /// `image_count`: number of images that the run reads.
+  SkippedImages(std::size_t image_count, Session& session)
+      : image_count_(image_count), session_(session) {}
+  /// Prints why an image is skipped. Rethrows errors that do not concern an image, and the error of
+  /// the last image if all were skipped.
+  void add(const std::exception_ptr& failure);
+
+ private:
+  std::size_t image_count_;
+  std::size_t skipped_count_ = 0;
+  Session& session_;
+};
+
+/// Prints a note if the images are equirectangular and no elevation band is stated for them.
+void note_default_band(const PictureSource& source, Session& session);
 
 /// Converts the arguments to a selection of images. Throws UsageError on values out of range.
 [[nodiscard]] Dataset::Selection to_selection(const PartArguments& part);
 
 /// Opens the input with `open_input` and the options of the flags, and prints its warnings.
 /// `remembered` is the image layout of the memory, used for images without a description of their
-/// own. Standard input is read to its end. Throws UsageError on flags that do not apply to the
-/// input and on other live sources; FileError.
+/// own; without it, prints a note on a default elevation band. Images of a folder or data set that
+/// cannot be used are left out, and a note names the first. Standard input is read to its end.
+/// Throws UsageError on flags that do not apply to the input and on other live sources; FileError.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
@@ -71,17 +118,17 @@ void require_stored_band(const PictureArguments& pictures, const MemoryFile& mem
 
 /// Opens the recording of a run: a data set, folder or recording. Images without a description have
 /// the layout of the memory's images.
-[[nodiscard]] Dataset open_run(const std::string& input, const InputOptions::Topics& topics,
-                               const PartArguments& part, const MemoryFile& memory,
-                               Session& session);
+[[nodiscard]] Dataset open_run(const std::string& input, const RunArguments& run,
+                               const MemoryFile& memory, Session& session);
 
-/// Throws FileError unless the stamp is later than `previous_s`, the stamp of the image before, as
-/// the TUM format requires.
-void require_later_stamp(const std::string& dataset, const std::string& file, double stamp_s,
-                         double previous_s);
+/// Adds a pose to a trajectory for a file. Leaves it out if it has the stamp of the last one.
+/// Throws FileError on an earlier stamp, which the TUM format does not allow; `file`: the image.
+void append_pose(std::vector<StampedPose>& trajectory, const StampedPose& pose,
+                 const std::string& dataset, const std::string& file);
 
 /// Returns the stamp of each entry in seconds for a trajectory file. Entries without stamps get
-/// their index, and the session prints a note. Throws FileError if stamps do not increase.
+/// their index; the session prints a note on these, and on stamps that repeat. Throws FileError if
+/// stamps decrease.
 [[nodiscard]] std::vector<double> trajectory_stamps(const Dataset& run, const std::string& verb,
                                                     const std::string& dataset,
                                                     const std::string& tum, Session& session);

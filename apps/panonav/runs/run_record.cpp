@@ -52,6 +52,12 @@ RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::s
                      bool live, Session& session, const ViewerOptions& viewer_options)
     : session_(session), live_(live) {
   if (arguments.file) {
+    if (session.length_unit() != LengthUnit::metres) {
+      throw UsageError(
+          "--record writes positions in metres, and those of the memory are in view steps; leave "
+          "it "
+          "out, or first run panonav scale");
+    }
     recorder_.emplace(*arguments.file, recordings::RunRecorderOptions{.wait = !live});
   }
   if (arguments.view) {

@@ -7,7 +7,7 @@
 
 namespace panonav::command {
 
-ShownReferences::ShownReferences(const VisualMemory& memory) {
+ShownReferences::ShownReferences(const VisualMemory& memory, LengthUnit unit) : unit_(unit) {
   for (const ViewId view : memory.views()) {
     const ReferenceInfo& info = memory.info(view);
     if (!info.pose) continue;
@@ -19,6 +19,7 @@ ShownReferences::ShownReferences(const VisualMemory& memory) {
 
 void ShownReferences::add_to(recordings::RunMoment& moment) const {
   moment.references = positions_;
+  if (unit_ != LengthUnit::metres) moment.length_unit = to_string(unit_);
   moment.reference_views = views_;
   moment.regions = voronoi_regions(positions_);
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav_recordings/run_recorder.hpp"
 
 namespace panonav::command {
@@ -15,7 +16,7 @@ namespace panonav::command {
 /// The views of a memory with known positions, prepared for the display of a run.
 class ShownReferences {
  public:
-  explicit ShownReferences(const VisualMemory& memory);
+  explicit ShownReferences(const VisualMemory& memory, LengthUnit unit = LengthUnit::metres);
 
   /// Adds positions, names and Voronoi cells of all views to the moment. Needed for the first
   /// moment and whenever the views have changed.
@@ -26,6 +27,7 @@ class ShownReferences {
                const PackedSignature& view) const;
 
  private:
+  LengthUnit unit_;
   std::vector<Point2> positions_;
   std::vector<recordings::RunReference> views_;
   std::unordered_map<ViewId, std::size_t> position_index_;

@@ -14,10 +14,14 @@ void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions&
   reject_ineffective_options(arguments, values);
   const auto& simulation = values.simulation;
   arguments.reject_options_unless(
-      {"--rows", "--columns", "--elevation-low-deg", "--elevation-high-deg"},
+      {"--rows", "--elevation-low-deg", "--elevation-high-deg"},
       [&simulation] { return simulation.kind == 1; }, "without --kind panorama");
   arguments.reject_options_unless(
-      {"--vignetting"}, [&simulation] { return simulation.kind != 1; }, "with --kind panorama");
+      {"--columns"}, [&simulation] { return simulation.kind == 1 || simulation.kind == 3; },
+      "without --kind panorama or equirectangular");
+  arguments.reject_options_unless(
+      {"--vignetting"}, [&simulation] { return simulation.kind == 0 || simulation.kind == 2; },
+      "with --kind panorama or equirectangular");
   arguments.reject_options_unless(
       {"--lens-seed", "--lens-distance-m"}, [&simulation] { return simulation.kind == 2; },
       "without --kind dual-fisheye");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -15,9 +16,13 @@ bool is_localised(const TrackedImage& image) {
   return image.estimate.state == LocalisationState::localised && image.estimate.pose;
 }
 
+bool is_position_known(const TrackedImage& image) {
+  return is_localised(image) || image.estimate.state == LocalisationState::position_known;
+}
+
 std::optional<double> position_error_m(const TrackedImage& image) {
-  if (!image.truth || !image.estimate.pose) return std::nullopt;
-  return distance(image.estimate.pose->position(), image.truth->position());
+  if (!image.truth || !image.estimate.position) return std::nullopt;
+  return distance(*image.estimate.position, image.truth->position());
 }
 
 std::optional<double> heading_error_rad(const TrackedImage& image) {
@@ -25,11 +30,20 @@ std::optional<double> heading_error_rad(const TrackedImage& image) {
   return std::abs(angle_difference(image.estimate.pose->heading_rad, *image.truth->heading_rad));
 }
 
+std::string format_state(LocalisationState state) {
+  if (state == LocalisationState::position_known) return "position known, heading not";
+  return std::string(to_string(state));
+}
+
 void add(TrackSummary& summary, const TrackedImage& image) {
-  const std::size_t before = summary.localised + summary.ambiguous + summary.lost;
+  const std::size_t before =
+      summary.localised + summary.position_known + summary.ambiguous + summary.lost;
   switch (image.estimate.state) {
     case LocalisationState::localised:
       ++summary.localised;
+      break;
+    case LocalisationState::position_known:
+      ++summary.position_known;
       break;
     case LocalisationState::ambiguous:
       ++summary.ambiguous;
@@ -38,10 +52,27 @@ void add(TrackSummary& summary, const TrackedImage& image) {
       ++summary.lost;
       break;
   }
+  if (!is_position_known(image)) return;
+  if (const auto error = position_error_m(image)) summary.errors_m.push_back(*error);
   if (!is_localised(image)) return;
   if (!summary.first_localised) summary.first_localised = before + 1;
-  if (const auto error = position_error_m(image)) summary.errors_m.push_back(*error);
   if (const auto error = heading_error_rad(image)) summary.heading_errors_rad.push_back(*error);
+}
+
+std::string explain_never_localised(const TrackSummary& summary, const std::string& memory) {
+  if (summary.localised + summary.position_known > 0) return {};
+  const std::size_t total = summary.ambiguous + summary.lost;
+  if (total == 0) return "there was no image";
+  if (2 * summary.lost >= total) {
+    return std::to_string(summary.lost) + " of " + format_count(total, "image") +
+           " fit no place of " + memory +
+           "; check that the memory is of this place, and that the images are of the same camera, "
+           "at the same height and upright";
+  }
+  return std::to_string(summary.ambiguous) + " of " + format_count(total, "image") +
+         " fit several places of " + memory +
+         " or a large area; use a longer run, or state where it starts (--start-x-m, --start-y-m, "
+         "--start-heading-deg)";
 }
 
 TrackSummary summarise_track(const std::vector<TrackedImage>& images) {
@@ -94,44 +125,116 @@ void add(viewer::RunPage& page, const TrackedImage& image) {
   page.add(moment);
 }
 
-void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
-           const std::function<void(TrackedImage&&)>& report) {
+namespace {
+
+/// A view that the filter observes, and what belongs to the steps since the view before.
+struct EncodedImage {
+  /// A motion step: the view of its image; nullopt where odometry gives the motion.
+  struct Step {
+    std::optional<FourierSignature> view;
+    std::exception_ptr failure;  ///< of an image that cannot be read
+  };
+  std::vector<Step> steps;  ///< of the images since then and of this one
+  PackedSignature view;
+  std::optional<recordings::RunMoment> moment;
+};
+
+/// Returns the index of the first entry after the image that was observed before `index`.
+std::size_t find_first_step(std::size_t index, std::size_t every) {
+  return index - std::min(index, every - 1);
+}
+
+/// Encodes the image itself; its step is the last of `image.steps`.
+void encode_observed(const std::vector<DatasetEntry>& entries, std::size_t index,
+                     const Tracker& tracker, const TrackSettings& settings, EncodedImage& image) {
+  const ViewEncoder& encoder = tracker.encoder();
+  StageClock clock;
+  const Observation observation = read_observation(entries[index]);
+  clock.stage("reading");
+  std::optional<FourierSignature> signature;
+  if (settings.thumbnail_file == nullptr) {
+    signature = encoder.signature(observation);
+  } else {
+    recordings::RunMoment& moment =
+        image.moment.emplace(recordings::make_moment(observation, index));
+    clock.restart();
+    moment.panorama = encoder.panorama(observation);
+    clock.stage("unwarping");
+    signature = encoder.signature(*moment.panorama);
+    clock.stage("signature");
+    clock.add_to(moment);
+    if (index == 0 && settings.shown_references != nullptr)
+      settings.shown_references->add_to(moment);
+  }
+  image.view = pack(*signature, encoder.header().full_scale);
+  if (tracker.needs_view(entries, index)) image.steps.back().view = std::move(*signature);
+}
+
+EncodedImage encode(const std::vector<DatasetEntry>& entries, std::size_t index,
+                    const Tracker& tracker, const TrackSettings& settings) {
+  const ViewEncoder& encoder = tracker.encoder();
+  EncodedImage image;
+  const auto every = static_cast<std::size_t>(settings.every);
+  for (std::size_t i = find_first_step(index, every); i < index; ++i) {
+    auto& step = image.steps.emplace_back();
+    if (!tracker.needs_view(entries, i)) continue;
+    try {
+      step.view = encoder.signature(read_observation(entries[i]));
+    } catch (const FileError&) {
+      step.failure = std::current_exception();
+    }
+  }
+  auto& step = image.steps.emplace_back();
+  try {
+    encode_observed(entries, index, tracker, settings, image);
+  } catch (const FileError&) {
+    step.failure = std::current_exception();
+  }
+  return image;
+}
+
+/// Moves the particles by all steps up to the image. Steps without odometry whose images cannot be
+/// read are part of the next step.
+void move(Tracker& tracker, const Dataset& run, std::size_t index, EncodedImage& image,
+          SkippedImages& skipped) {
+  const std::size_t first = index + 1 - image.steps.size();
+  for (std::size_t i = 0; i < image.steps.size(); ++i) {
+    const auto& [view, failure] = image.steps[i];
+    if (failure) skipped.add(failure);
+    const auto& odometry = run.entries[first + i].odometry;
+    if (failure && (!odometry || tracker.length_unit() != LengthUnit::metres)) continue;
+    tracker.move(odometry, view ? &*view : nullptr);
+  }
+  if (!image.moment || image.steps.back().failure) return;
+  image.moment->odometry = tracker.odometry();
+  const bool is_by_images = !has_odometry(run) || tracker.length_unit() != LengthUnit::metres;
+  if (is_by_images) image.moment->odometry = tracker.visual_odometry()->pose();
+}
+
+}  // namespace
+
+void track(Tracker& tracker, const Dataset& recorded, const TrackSettings& settings,
+           Session& session, const std::function<void(TrackedImage&&)>& report) {
+  Dataset run = recorded;
+  tracker.bridge_pauses(run, session.executor());
   const auto& entries = run.entries;
+  SkippedImages skipped(entries.size(), session);
   const auto every = static_cast<std::size_t>(settings.every);
   const std::size_t image_count = (entries.size() + every - 1) / every;
   constexpr std::size_t batch_size = 32;
   for (std::size_t begin = 0; begin < image_count; begin += batch_size) {
-    const std::size_t count = std::min(batch_size, image_count - begin);
-    std::vector<std::optional<PackedSignature>> signatures(count);
-    std::vector<std::optional<recordings::RunMoment>> moments(count);
-    parallel_for(executor, count, [&](std::size_t i) {
-      const std::size_t index = (begin + i) * every;
-      StageClock clock;
-      Observation observation = read_observation(entries[index]);
-      clock.stage("reading");
-      if (settings.thumbnail_file == nullptr) {
-        signatures[i] = tracker.encoder().packed(observation);
-        return;
-      }
-      recordings::RunMoment& moment =
-          moments[i].emplace(recordings::make_moment(observation, index));
-      clock.restart();
-      moment.panorama = tracker.encoder().panorama(observation);
-      clock.stage("unwarping");
-      signatures[i] = tracker.encoder().packed(*moment.panorama);
-      clock.stage("signature");
-      clock.add_to(moment);
-      if (index == 0 && settings.shown_references != nullptr)
-        settings.shown_references->add_to(moment);
+    std::vector<EncodedImage> images(std::min(batch_size, image_count - begin));
+    parallel_for(session.executor(), images.size(), [&](std::size_t i) {
+      images[i] = encode(entries, (begin + i) * every, tracker, settings);
     });
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < images.size(); ++i) {
       const std::size_t index = (begin + i) * every;
       const bool has_viewer_input = settings.has_viewer_input && settings.has_viewer_input();
-      for (std::size_t e = index - std::min(index, every - 1); e <= index; ++e) {
-        tracker.move_to(*entries[e].odometry);
-      }
+      move(tracker, run, index, images[i], skipped);
+      if (images[i].steps.back().failure) continue;
       const DatasetEntry& entry = entries[index];
-      TrackedImage image = track_image(tracker, *signatures[i], settings, std::move(moments[i]));
+      TrackedImage image =
+          track_image(tracker, images[i].view, settings, std::move(images[i].moment));
       if (image.moment && has_viewer_input) record_viewer_pose(*image.moment);
       image.index = index;
       image.file = entry.file;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "panonav/core/executor.hpp"
+#include "cli/session.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/memory/visual_memory.hpp"
@@ -34,21 +34,30 @@ struct TrackedImage {
 
 /// True if the robot was localised at the image.
 [[nodiscard]] bool is_localised(const TrackedImage& image);
+/// True if the image is localised, or its position is known but not its heading.
+[[nodiscard]] bool is_position_known(const TrackedImage& image);
 /// Returns the distance between estimated and true position; nullopt if one is unknown.
 [[nodiscard]] std::optional<double> position_error_m(const TrackedImage& image);
 [[nodiscard]] std::optional<double> heading_error_rad(const TrackedImage& image);
 
+/// Returns the state in words.
+[[nodiscard]] std::string format_state(LocalisationState state);
+
 struct TrackSummary {
   std::size_t localised = 0;
+  std::size_t position_known = 0;  ///< without a known heading
   std::size_t ambiguous = 0;
   std::size_t lost = 0;
   std::optional<std::size_t>
       first_localised;           ///< number of images up to and including the first localised one
-  std::vector<double> errors_m;  ///< position errors of localised images
+  std::vector<double> errors_m;  ///< position errors of images whose position is known
   std::vector<double> heading_errors_rad;
 };
 /// Adds the next image to the summary.
 void add(TrackSummary& summary, const TrackedImage& image);
+/// Explains for people why the position was never known, and what to check; empty if it was.
+[[nodiscard]] std::string explain_never_localised(const TrackSummary& summary,
+                                                  const std::string& memory);
 [[nodiscard]] TrackSummary summarise_track(const std::vector<TrackedImage>& images);
 
 struct TrackSettings {
@@ -75,11 +84,12 @@ void record_viewer_pose(recordings::RunMoment& moment);
 /// Adds the image to the page that replays the run. `image.moment` must be set.
 void add(viewer::RunPage& page, const TrackedImage& image);
 
-/// Runs the filter over a recording whose entries all have odometry. Every entry is a motion step;
-/// every `settings.every`-th image, from the first on, is an observation. Signatures are computed
-/// on all threads; results do not depend on their number. `report` is called after each image, in
-/// order. Throws FileError on an image that cannot be read.
-void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Executor& executor,
+/// Runs the filter over a recording, whose pauses of odometry are filled
+/// (`Tracker::bridge_pauses`). Every entry is a motion step; every `settings.every`-th image, from
+/// the first on, is an observation. Signatures are computed on all threads; results do not depend
+/// on their number. `report` is called after each image, in order. An image that cannot be read is
+/// skipped (`SkippedImages`).
+void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, Session& session,
            const std::function<void(TrackedImage&&)>& report);
 
 }  // namespace panonav::command

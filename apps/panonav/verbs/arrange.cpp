@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/pipeline/arrangement.hpp"
@@ -92,7 +93,7 @@ ordered_json to_json(const ArrangeArguments& arguments, const Lattice& lattice,
 }
 
 void print_result(const Lattice& lattice, const VisualMemory& memory, Session& session) {
-  session.print(session.bold(std::to_string(lattice.nodes.size())) + " views arranged by " +
+  session.print(session.bold(format_count(lattice.nodes.size(), "view")) + " arranged by " +
                 std::to_string(lattice.springs.size()) + " springs of " +
                 std::to_string(lattice.candidates) + " candidates, " +
                 std::to_string(count_rejected_springs(lattice)) + " of them rejected; unit: " +
@@ -106,11 +107,12 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
       others += (others.empty() ? "; the others hold " : ", ") + std::to_string(component.views);
     }
     if (single_views > 0)
-      others += "; " + std::to_string(single_views) + " views are not connected to any other view";
+      others +=
+          "; " + format_count(single_views, "view") + " without a connection to any other view";
     session.print("The largest of " +
                   session.red(std::to_string(lattice.components.size()) + " connected components") +
                   " holds " + std::to_string(lattice.components.front().views) + " of the " +
-                  std::to_string(lattice.nodes.size()) + " views" + others +
+                  format_count(lattice.nodes.size(), "view") + others +
                   ". Their positions relative to each other are unknown, and no path leads from "
                   "one to another.");
   }
@@ -120,7 +122,7 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
     session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
                   session.bold(format_fixed(comparison->shape.value, 4)) + " over " +
-                  std::to_string(comparison->compared) + " views, " +
+                  format_count(comparison->compared, "view") + ", " +
                   format_fixed(comparison->truth_from_map.rms_m, 2) +
                   " m rms with a free scale of " +
                   format_fixed(comparison->truth_from_map.scale, 3));
@@ -128,14 +130,22 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
   }
 }
 
+/// Loads the memory without poses that come from its map: they are no ground truth.
+VisualMemory load_with_true_poses(const MemoryFile& file) {
+  VisualMemory memory = file.load();
+  if (!has_positions_from_map(file)) return memory;
+  for (const ViewId view : memory.views()) memory.set_pose(view, std::nullopt);
+  return memory;
+}
+
 ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
   auto file = MemoryFile::open(arguments.memory,
                                arguments.no_save ? Access::read_only : Access::read_write);
-  const VisualMemory memory = file.load();
+  const VisualMemory memory = load_with_true_poses(file);
   if (memory.empty()) {
     return session.no_answer("panonav arrange: " + arguments.memory + " contains no views");
   }
-  session.detail(std::to_string(memory.size()) + " views loaded");
+  session.detail(format_count(memory.size(), "view") + " loaded");
   if (arguments.report) prepare_report_folder(*arguments.report, "arrange");
   LatticeSteps steps;
   const LatticeStepCallback step_callback =
@@ -162,7 +172,7 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
       session.print(*arguments.files.picture +
                     " shows the largest connected component of the map, " +
                     std::to_string(lattice.components.front().views) + " of " +
-                    std::to_string(lattice.nodes.size()) + " views.");
+                    format_count(lattice.nodes.size(), "view") + ".");
     }
     if (arguments.report) print_report_path(*arguments.report, session);
   }
@@ -184,13 +194,18 @@ Run declare_arrange(Arguments& arguments) {
   arguments.show_in_help({"--neighbours"});
   arguments.reject_options_unless(
       {"[coarse_motion]"}, [values] { return values->odometry.has_value(); }, "without --odometry");
+  arguments.explain_interruption(
+      "The memory is as before. To start over, run the same command again.",
+      [values] { return !values->no_save; });
   return [values](Session& session) { return arrange_views(*values, session); };
 }
 
 }  // namespace
 
 Verb arrange_verb() {
-  return {"arrange", "Compute the positions of all views of a memory from their similarity",
+  return {"arrange",
+          VerbGroup::maps_and_routes,
+          "Compute positions of views from their similarity",
           "The views may be in any order. Poses in the memory are only used to measure the error "
           "of the result. If the views form several unconnected groups, each group is a separate "
           "component. The result is stored in the memory as a map with the name 'lattice'.",

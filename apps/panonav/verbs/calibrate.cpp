@@ -5,10 +5,12 @@
 #include "panonav/camera/calibrate_dual_fisheye.hpp"
 #include "panonav/camera/find_mirror.hpp"
 #include "panonav/camera/mirror_camera.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/open_input.hpp"
+#include "runs/file_content.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {
@@ -86,6 +88,8 @@ struct CalibrateArguments {
   PictureArguments pictures;  // topics and part of a recording
   std::string out;
   std::optional<std::string> overlay;
+  std::optional<std::string> mount;
+  std::optional<std::string> export_format;
   std::optional<double> inner_radius_px;
   MirrorCircle::SearchOptions search;
   MirrorOptions mirror;
@@ -108,7 +112,7 @@ std::vector<DatasetEntry> choose_entries(const std::string& input,
   std::vector<DatasetEntry> all =
       open_recording(input, arguments.pictures, default_source, session).entries;
   if (all.size() <= max_pictures) return all;
-  session.note("of the " + std::to_string(all.size()) + " images of " + to_readable_line(input) +
+  session.note("of the " + format_count(all.size(), "image") + " of " + to_readable_line(input) +
                " " + std::to_string(max_pictures) + " are used, at equal intervals");
   std::vector<DatasetEntry> selected;
   for (std::size_t i = 0; i < max_pictures; ++i) {
@@ -193,8 +197,8 @@ void print_text(const Arguments& declared, const CalibrateArguments& arguments, 
   session.print("quality " + format_fixed(mirror.quality, 2) + " of 1, edges within " +
                 format_fixed(mirror.residual_px, 2) + " px of the rim");
   if (const auto spread = agreement(mirror)) {
-    session.print("over the " + std::to_string(spread->images) +
-                  " images that show the rim, the centre varies by " +
+    session.print("over the " + format_count(spread->images, "image") +
+                  " that show the rim, the centre varies by " +
                   format_fixed(spread->centre_u_px, 2) + ", " +
                   format_fixed(spread->centre_v_px, 2) + " px and the radius by " +
                   format_fixed(spread->rim_radius_px, 2) + " px (standard deviations)");
@@ -211,6 +215,21 @@ void print_text(const Arguments& declared, const CalibrateArguments& arguments, 
   session.suggest({"panonav", "unwrap", arguments.inputs.front(), "--camera", arguments.out, "-o",
                    several ? "panoramas" : "panorama.png"},
                   arguments.overlay ? "Next: look at " + *arguments.overlay + ", then" : "Next:");
+  session.suggest({"panonav", "memorise", "place.panonav", "IMAGES", "--kind", "mirror", "--camera",
+                   arguments.out},
+                  "For the images of a walk:");
+}
+
+ExitCode refuse_scattered_rim(const MirrorCircle& mirror, Session& session) {
+  const MirrorCircle::Agreement spread = agreement(mirror).value();
+  return session.no_answer(
+      "panonav calibrate: over the " + format_count(spread.images, "image") +
+      " that show a rim, its centre varies by " + format_fixed(spread.centre_u_px, 1) + ", " +
+      format_fixed(spread.centre_v_px, 1) + " px and its radius by " +
+      format_fixed(spread.rim_radius_px, 1) +
+      " px (allowed: " + format_fixed(max_rim_scatter * mirror.rim_radius_px, 1) +
+      "); no camera file was written. Use images in which the camera is fixed to the mirror, and "
+      "leave out images in which another round object is larger than the mirror");
 }
 
 /// Draws the circles of both lenses over the image, in the style of draw_mirror.
@@ -247,6 +266,20 @@ ordered_json to_json(const DualFisheyeCalibration& found, std::size_t images,
   return json;
 }
 
+/// Writes the camera file, or with --export the file of another program.
+void write_result(const CalibrateArguments& arguments, const CameraFile& camera, Session& session) {
+  if (!arguments.export_format) return write_camera(arguments.out, camera);
+  const bool is_kalibr = *arguments.export_format == "kalibr";
+  try {
+    const double residual_rad = write_calibration(
+        arguments.out, camera.camera, is_kalibr ? ExportFormat::kalibr : ExportFormat::opencv);
+    session.note(arguments.out + ": elevations differ from the camera's by at most " +
+                 format_number(degrees(residual_rad), "deg") + " degrees");
+  } catch (const ContractError& error) {
+    throw FileError(arguments.out, std::string("the camera cannot be exported: ") + error.what());
+  }
+}
+
 ExitCode calibrate_lenses(const CalibrateArguments& arguments,
                           const std::vector<std::string>& names, const std::vector<ImageView>& all,
                           Session& session) {
@@ -278,7 +311,7 @@ ExitCode calibrate_lenses(const CalibrateArguments& arguments,
     const Image overlay = draw_lenses(views.front(), found.camera);
     write_png(*arguments.overlay, overlay.view());
   }
-  write_camera(arguments.out, {found.camera, std::nullopt});
+  write_result(arguments, {found.camera, std::nullopt, {}}, session);
   if (session.json()) {
     session.print(json_line(to_json(found, views.size(), arguments.out)));
     return ExitCode::done;
@@ -299,8 +332,57 @@ ExitCode calibrate_lenses(const CalibrateArguments& arguments,
   return ExitCode::done;
 }
 
+bool is_camera_file(const std::string& input) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(input, error)) return false;
+  const FileContent kind = identify_content(input).kind;
+  return kind == FileContent::toml || kind == FileContent::calibration;
+}
+
+/// Converts a camera file, or the calibration of another program.
+ExitCode convert_camera(const CalibrateArguments& arguments, Session& session) {
+  const std::string& input = arguments.inputs.front();
+  const std::string mount = arguments.mount.value_or("up");
+  const CameraFile camera = read_camera(input, mount == "up"     ? CameraMount::up
+                                               : mount == "down" ? CameraMount::down
+                                                                 : CameraMount::mirror);
+  if (camera.format.empty() && arguments.mount) {
+    throw UsageError("--mount is " + mount + "; allowed: nothing, as " + input +
+                     " contains the direction of the camera");
+  }
+  write_result(arguments, camera, session);
+  const std::string format = camera.format.empty() ? "camera file" : camera.format + " calibration";
+  const auto [bottom_rad, top_rad] = visible_elevations(camera.camera);
+  if (session.json()) {
+    session.print(json_line({{"input", input},
+                             {"format", format},
+                             {"elevations_rad", {bottom_rad, top_rad}},
+                             {"camera", arguments.out}}));
+    return ExitCode::done;
+  }
+  session.print(input + ": " + format + "; all azimuths show the elevations from " +
+                format_number(degrees(bottom_rad), "deg") + " to " +
+                format_number(degrees(top_rad), "deg") + " degrees");
+  session.print(arguments.out + " is written");
+  return ExitCode::done;
+}
+
 ExitCode calibrate(const Arguments& declared, const CalibrateArguments& arguments,
                    Session& session) {
+  if (arguments.inputs.size() == 1 && is_camera_file(arguments.inputs.front())) {
+    auto unused = recording_flags();
+    for (const char* flag :
+         {"--overlay", "--inner-radius-px", "[mirror]", "[lenses]", "[mirror_search]"}) {
+      unused.emplace_back(flag);
+    }
+    declared.reject_options(unused, "as the input is the calibration of a camera");
+    return convert_camera(arguments, session);
+  }
+  if (std::ranges::all_of(arguments.inputs, [](const std::string& input) {
+        return std::filesystem::exists(input);
+      })) {
+    declared.reject_options({"--mount"}, "as the input is no calibration of another program");
+  }
   if (std::ranges::all_of(arguments.inputs, is_one_picture)) {
     declared.reject_options(recording_flags(), "as all inputs are single images");
   }
@@ -318,6 +400,7 @@ ExitCode calibrate(const Arguments& declared, const CalibrateArguments& argument
         (images.size() > 1 ? " and the others" : "") +
         "; add more images, or reduce --min-quality to accept a less visible rim");
   }
+  if (is_scattered(*mirror)) return refuse_scattered_rim(*mirror, session);
   const double forward_rad = radians(arguments.mirror.forward_angle_deg);
   const Camera camera = camera_from_mirror(
       *mirror, {.model = make_mirror_model(arguments.mirror, mirror->rim_radius_px),
@@ -329,7 +412,7 @@ ExitCode calibrate(const Arguments& declared, const CalibrateArguments& argument
     const Image overlay = draw_mirror(views.front(), *mirror, forward_rad);
     write_png(*arguments.overlay, overlay.view());
   }
-  write_camera(arguments.out, {camera, std::nullopt});
+  write_result(arguments, {camera, std::nullopt, {}}, session);
   if (session.json()) {
     session.print(json_line(to_json(arguments, images.size(), *mirror, camera)));
   } else {
@@ -345,7 +428,9 @@ Run declare_calibrate(Arguments& arguments) {
                         "Raw images of one mirror camera; more images give a better result. For a "
                         "camera with two fisheye lenses: images from one place, each with a "
                         "different rotation of the camera. Folders, videos and recordings are also "
-                        "allowed; with -, JPEG images are read from standard input");
+                        "allowed; with -, JPEG images are read from standard input. A camera file, "
+                        "or a calibration of OCamCalib, Kalibr, OpenCV, ROS or stella_vslam, is "
+                        "converted");
   declare_topics(arguments, values->pictures.topics);
   declare_part(arguments, values->pictures.part, true);
   arguments.required_option("-o,--out", values->out, "Name of the new camera file (camera.toml)");
@@ -354,6 +439,11 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.option(
       "--inner-radius-px", values->inner_radius_px,
       "Radius of the camera's reflection in the mirror; by default, it is measured in the images");
+  arguments.choice("--mount", values->mount, {"up", "down", "mirror"},
+                   "Direction of a camera calibrated by another program: a lens that looks up "
+                   "(default) or down, or a camera that looks up into a mirror");
+  arguments.choice("--export", values->export_format, {"kalibr", "opencv"},
+                   "Write --out for another program: a Kalibr camchain or an OpenCV YAML file");
   arguments.options("mirror", values->mirror);
   arguments.options("lenses", values->lenses);
   arguments.options("mirror_search", values->search);
@@ -381,12 +471,17 @@ Run declare_calibrate(Arguments& arguments) {
 
 Verb calibrate_verb() {
   return {
-      "calibrate", "Calibrate a mirror camera or a 360 degree camera with two lenses",
+      "calibrate",
+      VerbGroup::first_steps,
+      "Calibrate a mirror camera or a 360 degree camera",
       "For a camera with two lenses, take three or four images at one place that has many objects "
       "around it. Rotate the camera on its stand by about 90 degrees between the images. Check the "
       "image of --overlay before you use the camera file. The exit code is 1 if no image shows the "
-      "rim of a mirror, or if the images are not sufficient to calibrate two lenses.",
+      "rim of a mirror, if the rim is not at the same pixels in all images, or if the images are "
+      "not sufficient to calibrate two lenses.",
       "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
+      "  panonav calibrate camchain.yaml -o camera.toml --mount down\n"
+      "  panonav calibrate camera.toml -o camchain.yaml --export kalibr\n"
       "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
       "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "
       "--right-roll-deg -90 -o camera.toml",

@@ -88,8 +88,8 @@ void print_text(const CatchmentArguments& arguments, const CatchmentResult& resu
   const std::string range = arguments.settings.up_to_m
                                 ? " up to " + format_number(*arguments.settings.up_to_m) + " m"
                                 : "";
-  session.print("Average homeward component over " + std::to_string(result.pairs) + " pairs" +
-                range + ": " + session.bold(format_fixed(result.component, 3)) +
+  session.print("Average homeward component over " + format_count(result.pairs, "pair") + range +
+                ": " + session.bold(format_fixed(result.component, 3)) +
                 " (1: straight home, 0: random direction)");
   session.print("  heading error " + format_fixed(degrees(result.orientation_error_rad), 1) +
                 " degrees (circular standard deviation); a home vector of length 1 means " +
@@ -108,8 +108,8 @@ void print_text(const CatchmentArguments& arguments, const CatchmentResult& resu
                   padded(format_fixed(bin.homeward.component, 3), 10) +
                   format_fixed(degrees(bin.orientation_error_rad), 1));
   }
-  session.print("Drives home between the " + std::to_string(result.survey.places.size()) +
-                " places, " + format_fixed(result.spacing_m, 3) + " m apart; mean catchment area:");
+  session.print("Drives home between the " + format_count(result.survey.places.size(), "place") +
+                ", " + format_fixed(result.spacing_m, 3) + " m apart; mean catchment area:");
   const auto places = static_cast<double>(result.survey.places.size());
   for (std::size_t i = 0; i < result.areas.size(); ++i) {
     session.print("  ending within " + format_fixed(result.accepted_m[i], 3) + " m: from " +
@@ -123,8 +123,8 @@ ExitCode measure_travel_direction(const CatchmentArguments& arguments, const Rec
                                   const FourierHomingOptions& options, Session& session) {
   const auto ahead = static_cast<std::size_t>(*arguments.ahead);
   if (views.files.size() <= ahead) {
-    throw FileError(arguments.dataset, "has " + std::to_string(views.files.size()) +
-                                           " images; --ahead allows 1 to " +
+    throw FileError(arguments.dataset, "has " + format_count(views.files.size(), "image") +
+                                           "; --ahead allows 1 to " +
                                            std::to_string(views.files.size() - 1));
   }
   std::vector<double> directions;
@@ -147,7 +147,7 @@ ExitCode measure_travel_direction(const CatchmentArguments& arguments, const Rec
                      {"backward", backward}}));
   } else if (mean) {
     const double degrees_left = degrees(mean->direction_rad);
-    session.print("From each of " + std::to_string(directions.size()) + " views to the one " +
+    session.print("From each of " + format_count(directions.size(), "view") + " to the one " +
                   std::to_string(ahead) + " later: on average " +
                   session.bold(format_fixed(std::abs(degrees_left), 1) + " degrees to the " +
                                (degrees_left > 0.0 ? "left" : "right")) +
@@ -330,7 +330,8 @@ Run declare_catchment(Arguments& arguments) {
 
 Verb catchment_verb() {
   return {"catchment",
-          "Measure the distances from which a robot finds the way home to the views of a data set",
+          VerbGroup::experiments,
+          "Measure from how far a robot finds the way home to views",
           "The verb computes the direction home for all pairs of views and simulates drives home "
           "from place to place [S06 section 4]. By default, a step is at most twice as long as the "
           "spacing of the places, and the distance from its end to the nearest place is at most "

@@ -17,11 +17,14 @@ Run declare_completion(Arguments& arguments) {
 }  // namespace
 
 Verb completion_verb() {
-  return {"completion", "Print a script for the completion of verbs, options and values in a shell",
+  return {"completion",
+          VerbGroup::tools,
+          "Print a completion script for a shell",
           "Load the bash script with 'source'. Save the fish script as "
           "~/.config/fish/completions/panonav.fish and the zsh script as _panonav in a folder of "
           "$fpath. If panonav is installed, these scripts are installed, too.",
-          "  panonav completion bash\n  panonav completion fish", declare_completion};
+          "  panonav completion bash\n  panonav completion fish",
+          declare_completion};
 }
 
 }  // namespace panonav::command

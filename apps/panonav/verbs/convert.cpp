@@ -1,6 +1,7 @@
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/recording.hpp"
 #include "panonav_recordings/recording_conversion.hpp"
@@ -38,8 +39,7 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
                      "recording to a folder");
   }
   // A recording does not state the layout of its images.
-  PictureSource default_source{.kind = PictureKind::equirectangular};
-  default_source.layout.elevations = ElevationBand{-1.0, 1.0};
+  const PictureSource default_source;
   const Dataset dataset =
       open_recording(arguments.input, arguments.pictures,
                      is_mcap_output ? std::optional(default_source) : std::nullopt, session);
@@ -60,7 +60,7 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
                                          {"tilts", done.tilts}}));
     return ExitCode::done;
   }
-  session.print(session.bold(std::to_string(dataset.entries.size())) + " images of " +
+  session.print(session.bold(format_count(dataset.entries.size(), "image")) + " of " +
                 arguments.input + " in " + arguments.output + describe_fields(done));
   if (is_mcap_output && !done.stamps) {
     session.print(
@@ -84,7 +84,8 @@ Run declare_convert(Arguments& arguments) {
 
 Verb convert_verb() {
   return {"convert",
-          "Convert a data set to a recording of ROS 2 messages, or a recording to a data set",
+          VerbGroup::tools,
+          "Convert a data set to a ROS 2 recording, or back",
           "Images are copied unchanged, together with their time stamps, odometry, poses, roll and "
           "pitch. To convert a recording to a data set, set --kind, because a recording does not "
           "contain the type of its images.",

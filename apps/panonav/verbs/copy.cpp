@@ -1,4 +1,5 @@
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
@@ -23,7 +24,7 @@ ExitCode copy(const CopyArguments& arguments, Session& session) {
                                          {"routes", info.routes}}));
     return ExitCode::done;
   }
-  session.print(arguments.copy + " holds the " + std::to_string(info.views) + " views of " +
+  session.print(arguments.copy + " holds the " + format_count(info.views, "view") + " of " +
                 arguments.memory);
   session.suggest({"panonav", "localise", arguments.copy, "INPUT"});
   return ExitCode::done;
@@ -40,7 +41,9 @@ Run declare_copy(Arguments& arguments) {
 }  // namespace
 
 Verb copy_verb() {
-  return {"copy", "Copy a memory to another file, to a server or from a server",
+  return {"copy",
+          VerbGroup::memory,
+          "Copy a memory to a file, to a server or from a server",
           "The copy contains the same views, images, features, links, maps, routes and models, "
           "with the same ids, and it gives the same results. If copying is interrupted, no copy is "
           "left. The address of a memory on a PostgreSQL server is "

@@ -1,6 +1,12 @@
+#include <array>
+#include <filesystem>
+
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/estimate_evaluation.hpp"
+#include "panonav_recordings/recorded_poses.hpp"
+#include "panonav_recordings/recording.hpp"
 #include "reports/map_measures.hpp"
 
 namespace panonav::command {
@@ -10,8 +16,16 @@ namespace {
 struct EvaluateArguments {
   std::string estimate;
   std::string truth;
+  std::optional<std::string> estimate_topic;
+  std::optional<std::string> truth_topic;
   TrajectoryError::Options options;
 };
+
+constexpr std::array<std::string_view, 3> align_names{"rigid", "similarity", "none"};
+
+std::string_view align_name(const TrajectoryError::Options& options) {
+  return align_names[static_cast<std::size_t>(options.align)];
+}
 
 ordered_json to_json(const TrajectoryError::Summary& errors) {
   return {{"rmse", errors.rms},
@@ -21,25 +35,33 @@ ordered_json to_json(const TrajectoryError::Summary& errors) {
           {"max", errors.largest}};
 }
 
-ordered_json to_json(const EstimateEvaluation& evaluation) {
+ordered_json to_json(const EstimateEvaluation& evaluation, const TrajectoryError::Options& options,
+                     const std::array<std::string, 2>& formats) {
   const TrajectoryError& error = evaluation.trajectory;
-  const auto& alignment = error.ground_truth_from_estimate;
-  ordered_json json{{"pairs", error.pairs},
+  const Alignment3& alignment = error.truth_from_estimate;
+  const Rotation3& q = alignment.rotation;
+  ordered_json json{{"formats", formats},
+                    {"paired_by", evaluation.paired_by_stamp ? "stamp" : "order"},
+                    {"pairs", error.pairs},
                     {"left_out", error.left_out},
                     {"alignment",
-                     {{"scale", alignment.scale},
-                      {"rotation_rad", alignment.rotation_rad},
+                     {{"kind", align_name(options)},
+                      {"dimensions", error.planar ? 2 : 3},
+                      {"scale", alignment.scale},
+                      {"rotation_xyzw", {q.x, q.y, q.z, q.w}},
                       {"x_m", alignment.translation.x_m},
                       {"y_m", alignment.translation.y_m},
+                      {"z_m", alignment.translation.z_m},
                       {"reflected", alignment.reflected}}},
                     {"ate_m", to_json(error.position_m)},
-                    {"heading_rad", to_json(error.heading_rad)},
+                    {"rotation_rad", nullptr},
                     {"relative_pairs", error.relative_pairs},
                     {"rpe_m", nullptr},
-                    {"rpe_heading_rad", nullptr}};
+                    {"rpe_rotation_rad", nullptr}};
+  if (alignment.is_unique) json["rotation_rad"] = to_json(error.rotation_rad);
   if (error.relative_pairs > 0) {
     json["rpe_m"] = to_json(error.relative_position_m);
-    json["rpe_heading_rad"] = to_json(error.relative_heading_rad);
+    json["rpe_rotation_rad"] = to_json(error.relative_rotation_rad);
   }
   json["procrustes_disparity"] = nullptr;
   json["procrustes_disparity_with_reflection"] = nullptr;
@@ -52,6 +74,20 @@ ordered_json to_json(const EstimateEvaluation& evaluation) {
   return json;
 }
 
+/// Says which alignment was used, as in "rigid alignment in space (SE3)".
+std::string describe_alignment(const TrajectoryError& error,
+                               const TrajectoryError::Options& options) {
+  if (options.align == TrajectoryError::Align::none) return "no alignment";
+  const bool has_scale = options.align == TrajectoryError::Align::similarity;
+  std::string text = std::string(align_name(options)) + " alignment";
+  text += error.planar ? " in the plane, as both stay at one height without tilt"
+                       : std::string(" in space (") + (has_scale ? "Sim3)" : "SE3)");
+  const Alignment3& alignment = error.truth_from_estimate;
+  if (has_scale) text += ", scale " + format_fixed(alignment.scale, 6);
+  if (alignment.reflected) text += ", mirrored";
+  return text;
+}
+
 std::string format_line(const std::string& label, const TrajectoryError::Summary& errors,
                         double unit, int digits) {
   return label + "  RMSE " + format_fixed(errors.rms * unit, digits) + "  median " +
@@ -60,49 +96,111 @@ std::string format_line(const std::string& label, const TrajectoryError::Summary
          format_fixed(errors.largest * unit, digits);
 }
 
+TrajectoryFile read_poses(const std::string& input, const std::optional<std::string>& topic,
+                          std::string_view flag) {
+  if (recordings::is_recording(input)) {
+    try {
+      return recordings::read_recorded_poses(input, topic);
+    } catch (const FileError& error) {
+      const std::string_view text = error.what();
+      if (!text.ends_with("choose one")) throw;
+      throw Error(std::string(text) + " with " + std::string(flag) + " NAME");
+    }
+  }
+  if (topic && std::filesystem::exists(input)) {
+    throw UsageError(std::string(flag) + " is " + to_readable_line(*topic) +
+                     "; allowed: nothing, as " + to_readable_line(input) + " is no recording");
+  }
+  return read_trajectory_file(input);
+}
+
+TrajectoryEstimate read_estimate(const EvaluateArguments& arguments) {
+  if (!arguments.estimate_topic && !recordings::is_recording(arguments.estimate)) {
+    return panonav::read_estimate(arguments.estimate);
+  }
+  return {read_poses(arguments.estimate, arguments.estimate_topic, "--estimate-topic"), {}, {}};
+}
+
+void print_errors(const EstimateEvaluation& evaluation, const EvaluateArguments& arguments,
+                  Session& session) {
+  constexpr int metre_digits = 6;  // as many as evo_ape prints
+  const TrajectoryError& error = evaluation.trajectory;
+  session.print(format_line("ATE [m]            ", error.position_m, 1.0, metre_digits));
+  if (error.truth_from_estimate.is_unique) {
+    session.print(format_line("rotation [degrees] ", error.rotation_rad, degrees(1.0), 2));
+  } else {
+    session.print(
+        "rotation: unknown, as the positions lie on a line, about which any rotation fits");
+  }
+  if (error.relative_pairs > 0) {
+    session.print("over " + to_text(arguments.options.relative_distance_m) + " m of path:");
+    session.print(format_line("RPE [m]            ", error.relative_position_m, 1.0, metre_digits));
+    session.print(format_line("RPE [degrees]      ", error.relative_rotation_rad, degrees(1.0), 2));
+  }
+  if (evaluation.map) {
+    session.print("Procrustes disparity " + format_fixed(evaluation.map->shape.value, 4) +
+                  "  with a reflection allowed " +
+                  format_fixed(evaluation.map->shape.with_reflection, 4));
+    print_neighbours(*evaluation.map, session);
+  }
+  if (evaluation.closures) print_closures(*evaluation.closures, session);
+}
+
 ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
-  const auto evaluation = evaluate_estimate(arguments.estimate, arguments.truth, arguments.options);
+  TrajectoryEstimate estimate = read_estimate(arguments);
+  TrajectoryFile truth = read_poses(arguments.truth, arguments.truth_topic, "--truth-topic");
+  const std::array<std::string, 2> formats{estimate.trajectory.format, truth.format};
+  const std::size_t repeated = estimate.trajectory.repeated + truth.repeated;
+  std::optional<EstimateEvaluation> evaluation;
+  try {
+    evaluation = evaluate_estimate(std::move(estimate), std::move(truth), arguments.options);
+  } catch (const ContractError& error) {
+    throw FileError(arguments.estimate, error.what());
+  }
   if (!evaluation) {
     return session.no_answer("panonav evaluate: fewer than two poses of " + arguments.estimate +
-                             " are in the time range of " + arguments.truth +
-                             ", without its gaps longer than --max-gap-s; check that both use the "
-                             "same clock");
+                             " have a true pose in " + arguments.truth + " within " +
+                             to_text(arguments.options.max_stamp_difference_s) +
+                             " s (--max-stamp-difference-s); check that both use the same clock");
+  }
+  if (repeated > 0) {
+    session.note("panonav evaluate: " + format_count(repeated, "pose") +
+                 " left out, because the pose before has the same stamp");
   }
   if (session.json()) {
-    session.print(json_line(to_json(*evaluation)));
+    session.print(json_line(to_json(*evaluation, arguments.options, formats)));
     return ExitCode::done;
   }
   const TrajectoryError& error = evaluation->trajectory;
-  session.print(std::to_string(error.pairs) + " poses compared, " + std::to_string(error.left_out) +
-                " without ground truth");
-  session.print(format_line("ATE [m]            ", error.position_m, 1.0, 3));
-  session.print(format_line("heading [degrees]  ", error.heading_rad, degrees(1.0), 2));
-  if (error.relative_pairs > 0) {
-    session.print("over " + to_text(arguments.options.relative_distance_m) + " m of path:");
-    session.print(format_line("RPE [m]            ", error.relative_position_m, 1.0, 3));
-    session.print(format_line("RPE [degrees]      ", error.relative_heading_rad, degrees(1.0), 2));
-  }
-  if (evaluation->map) {
-    session.print("Procrustes disparity " + format_fixed(evaluation->map->shape.value, 4) +
-                  "  with a reflection allowed " +
-                  format_fixed(evaluation->map->shape.with_reflection, 4));
-    print_neighbours(*evaluation->map, session);
-  }
-  if (evaluation->closures) print_closures(*evaluation->closures, session);
+  session.print("estimate: " + formats[0] + ", ground truth: " + formats[1]);
+  session.print(format_count(error.pairs, "pose") + " compared, " + std::to_string(error.left_out) +
+                " without ground truth; paired by " +
+                (evaluation->paired_by_stamp
+                     ? "stamp"
+                     : "their order in the files, as KITTI poses have no stamps"));
+  session.print(describe_alignment(error, arguments.options));
+  print_errors(*evaluation, arguments, session);
   return ExitCode::done;
 }
 
 Run declare_evaluate(Arguments& arguments) {
   auto values = std::make_shared<EvaluateArguments>();
-  arguments.positional(
-      "ESTIMATE", values->estimate,
-      "Estimated trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
-  arguments.positional("GROUND_TRUTH", values->truth, "True trajectory as TUM text or CSV");
+  arguments.positional("ESTIMATE", values->estimate,
+                       "Estimated trajectory: TUM, KITTI, EuRoC, a CSV table or a recording; or a "
+                       "memory file (NAME.panonav) with a map");
+  arguments.positional("GROUND_TRUTH", values->truth,
+                       "True trajectory: TUM, KITTI, EuRoC, a CSV table or a recording");
+  arguments.option("--estimate-topic NAME", values->estimate_topic,
+                   "Topic of the estimated poses in a recording; needed if there are several "
+                   "topics with poses");
+  arguments.option("--truth-topic NAME", values->truth_topic,
+                   "Topic of the true poses in a recording");
   arguments.options("evaluation", values->options);
-  arguments.show_in_help({"--align", "--align-scale"});
+  arguments.show_in_help({"--align"});
   arguments.reject_options_unless(
-      {"--align-scale", "--align-reflection"}, [values] { return values->options.align; },
-      "with --align false");
+      {"--align-reflection"},
+      [values] { return values->options.align != TrajectoryError::Align::none; },
+      "with --align none");
   return [values](Session& session) { return evaluate(*values, session); };
 }
 
@@ -110,12 +208,16 @@ Run declare_evaluate(Arguments& arguments) {
 
 Verb evaluate_verb() {
   return {
-      "evaluate", "Compare an estimated trajectory or map with the true trajectory",
-      "The true poses are interpolated at the time stamps of the estimated poses. Unless --align "
-      "is false, the estimate is first aligned with the true trajectory by least squares. The exit "
-      "code is 1 if fewer than two estimated poses have a corresponding true pose.",
+      "evaluate",
+      VerbGroup::experiments,
+      "Compare an estimated trajectory or map with the true one",
+      "Each estimated pose is compared with the true pose of the nearest time stamp; poses without "
+      "stamps (KITTI) are compared in their order. Unless --align is none, the estimate is first "
+      "aligned with the true trajectory by least squares, as by evo_ape. The exit code is 1 if "
+      "fewer than two estimated poses have a corresponding true pose.",
       "  panonav evaluate estimate.tum truth.tum\n"
-      "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
+      "  panonav evaluate estimate.txt euroc/data.csv --align similarity --json\n"
+      "  panonav evaluate drive.bag drive.bag --estimate-topic /odom --truth-topic /vicon/robot\n"
       "  panonav evaluate office.panonav run/poses.csv",
       declare_evaluate};
 }

@@ -1,4 +1,5 @@
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/memory_export.hpp"
 
 namespace panonav::command {
@@ -23,7 +24,7 @@ std::string list_missing_values(const MemoryExport& done) {
 void print_export(const MemoryExport& done, const MemoryFile& memory, const std::string& out,
                   Session& session) {
   const auto info = memory.info();
-  session.print(session.bold(std::to_string(done.views)) + " views of " + memory.path().string() +
+  session.print(session.bold(format_count(done.views, "view")) + " of " + memory.path().string() +
                 " in " + out +
                 ": names, poses and stamps in views.csv, signatures in signatures.npy");
   if (done.pictures == 0) {
@@ -36,19 +37,19 @@ void print_export(const MemoryExport& done, const MemoryFile& memory, const std:
                   " components or were not made by panonav. memorise cannot read this folder.");
     return;
   }
-  session.print("Data set with " + std::to_string(done.pictures) +
-                " images made from the thumbnails" +
+  session.print("Data set with " + format_count(done.pictures, "image") +
+                " made from the thumbnails" +
                 (done.enlarged ? ", enlarged to the size of the memory's panoramas; fine detail is "
                                  "lost, and signatures differ slightly from the memory's"
                                : "") +
                 ".");
   if (done.pictures < done.views) {
-    session.print(std::to_string(done.views - done.pictures) +
-                  " views without a thumbnail are not in the data set.");
+    session.print(format_count(done.views - done.pictures, "view") +
+                  " without a thumbnail left out of the data set.");
   }
   if (done.renamed > 0) {
-    session.print(std::to_string(done.renamed) +
-                  " images have other names than their views, because file names cannot contain "
+    session.print(format_count(done.renamed, "image") +
+                  " with other names than their views, because file names cannot contain "
                   "the names of these views; views.csv lists both names.");
   }
   const std::string lost = list_missing_values(done);
@@ -59,7 +60,7 @@ void print_export(const MemoryExport& done, const MemoryFile& memory, const std:
   }
   const bool more = info.links + info.maps + info.routes > 0;
   if (more) session.print("Links, maps and routes are not exported.");
-  session.suggest({"panonav", "memorise", out, "NEW.panonav", "--config", out + "/memorise.toml"},
+  session.suggest({"panonav", "memorise", "NEW.panonav", out, "--config", out + "/memorise.toml"},
                   "To make a memory of this folder:");
 }
 
@@ -95,13 +96,15 @@ Run declare_export(Arguments& arguments) {
 }  // namespace
 
 Verb export_verb() {
-  return {"export", "Export the views, poses, thumbnails and signatures of a memory as a data set",
+  return {"export",
+          VerbGroup::memory,
+          "Export the views of a memory as a data set",
           "A memory stores its images only as thumbnails. The verb enlarges these thumbnails to "
           "panoramas that panonav memorise can read. The files views.csv and signatures.npy "
           "contain the poses and signatures of all views without loss. Links, maps and routes are "
           "not exported. If the export is interrupted, no folder is written.",
           "  panonav export office.panonav -o office_views\n"
-          "  panonav memorise office_views again.panonav --config office_views/memorise.toml",
+          "  panonav memorise again.panonav office_views --config office_views/memorise.toml",
           declare_export};
 }
 

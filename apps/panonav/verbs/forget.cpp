@@ -2,8 +2,10 @@
 #include <set>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/view_list.hpp"
 
 namespace panonav::command {
 
@@ -21,11 +23,7 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
   const auto find_all = [&] {
     std::set<ViewId> views;
     for (const auto& name : arguments.views) {
-      const auto view = memory.find(name);
-      if (!view) {
-        throw FileError(arguments.memory, "contains no view " + name + "; no view was deleted");
-      }
-      views.insert(*view);
+      views.insert(find_view_by_name_or_id(memory, name));
     }
     return std::vector<ViewId>(views.begin(), views.end());
   };
@@ -37,7 +35,7 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
           memory.remove(find_all());
           learn_and_store_models(memory);
         },
-        "forget: " + std::to_string(views.size()) + " views deleted");
+        "forget: " + format_count(views.size(), "view") + " deleted");
   }
   const auto left = memory.info().views - (arguments.dry_run ? views.size() : 0);
   if (session.json()) {
@@ -55,12 +53,12 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
               ? 1
               : 0;
     }
-    session.print("would delete " + std::to_string(views.size()) + " views and " +
-                  std::to_string(links) + " links to them; " + arguments.memory +
+    session.print("would delete " + format_count(views.size(), "view") + " and " +
+                  format_count(links, "link") + " to them; " + arguments.memory +
                   " would then contain " + std::to_string(left));
     return ExitCode::done;
   }
-  session.print(std::to_string(views.size()) + " views deleted; " + arguments.memory + " holds " +
+  session.print(format_count(views.size(), "view") + " deleted; " + arguments.memory + " holds " +
                 std::to_string(left));
   session.suggest({"panonav", "undo", arguments.memory}, "To restore them:");
   return ExitCode::done;
@@ -69,16 +67,21 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
 Run declare_forget(Arguments& arguments) {
   auto values = std::make_shared<ForgetArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positionals("VIEW", values->views, "Names of views");
+  arguments.positionals("VIEW", values->views, "Names or ids of views");
   arguments.flag("--dry-run", values->dry_run,
                  "Print how many views and links would be deleted, but do not change the memory");
+  arguments.explain_interruption(
+      "The memory is as before. To start over, run the same command again.",
+      [values] { return !values->dry_run; });
   return [values](Session& session) { return forget(*values, session); };
 }
 
 }  // namespace
 
 Verb forget_verb() {
-  return {"forget", "Delete views from a memory",
+  return {"forget",
+          VerbGroup::memory,
+          "Delete views from a memory",
           "If one of the views does not exist, no view is deleted. panonav undo restores deleted "
           "views.",
           "  panonav forget office.panonav view_0012.png view_0013.png\n"

@@ -20,10 +20,13 @@ Run declare_help(Arguments& arguments) {
 }  // namespace
 
 Verb help_verb() {
-  return {"help", "Explain a verb",
+  return {"help",
+          VerbGroup::tools,
+          "Explain a verb",
           "panonav help VERB is the same as panonav VERB --help. panonav VERB --help-all lists all "
           "options of a verb.",
-          "  panonav help\n  panonav help route record", declare_help};
+          "  panonav help\n  panonav help route record",
+          declare_help};
 }
 
 }  // namespace panonav::command

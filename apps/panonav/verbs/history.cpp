@@ -50,7 +50,9 @@ Run declare_history(Arguments& arguments) {
 }  // namespace
 
 Verb history_verb() {
-  return {"history", "List the changes of a memory, newest first",
+  return {"history",
+          VerbGroup::memory,
+          "List the changes of a memory, newest first",
           "The list contains the newest 1000 changes by forget, prune, rename and localise "
           "--update. panonav undo reverts the newest change; run it again to revert the change "
           "before. The newest 100 changes (at most 64 MiB in total) can be reverted.",

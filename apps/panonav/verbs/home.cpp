@@ -30,38 +30,45 @@ struct HomeArguments {
 };
 
 ordered_json to_json(const HomeAnswer& answer, const std::string& goal) {
-  const HomingResult& result = answer.result;
-  const HomeVector& found = result.vector;
-  const auto if_known = [&](double value) {
-    return result.known ? ordered_json(value) : ordered_json();
+  const auto& evidence = answer.result.evidence;
+  ordered_json json = {{"goal", goal},
+                       {"current", answer.file},
+                       {"known", evidence.has_value()},
+                       {"direction_rad", to_json_or_null(answer.result.direction_rad)}};
+  const auto add = [&](const char* key, const auto& value_of) {
+    json[key] = evidence ? ordered_json(value_of(*evidence)) : ordered_json();
   };
-  return {{"goal", goal},
-          {"current", answer.file},
-          {"known", result.known},
-          {"probability", result.probability},
-          {"direction_rad", to_json_or_null(result.direction_rad)},
-          {"length", if_known(found.length())},
-          {"xi", if_known(found.xi)},
-          {"eta", if_known(found.eta)},
-          {"heading_rad", if_known(found.heading_rad)},
-          {"correlation", found.correlation},
-          {"residual", found.residual},
-          {"confidence", if_known(found.confidence)},
-          {"frequencies", found.frequencies}};
+  using Evidence = PairEvidence;
+  add("probability", [](const Evidence& e) { return e.probability; });
+  add("length", [](const Evidence& e) { return e.vector.length(); });
+  add("xi", [](const Evidence& e) { return e.vector.xi; });
+  add("eta", [](const Evidence& e) { return e.vector.eta; });
+  add("heading_rad", [](const Evidence& e) { return e.vector.heading_rad; });
+  add("direction_deviation_rad", [](const Evidence& e) { return e.direction_deviation_rad; });
+  add("heading_deviation_rad", [](const Evidence& e) { return e.turn_deviation_rad; });
+  add("correlation", [](const Evidence& e) { return e.vector.correlation; });
+  add("residual", [](const Evidence& e) { return e.vector.residual; });
+  add("frequencies", [](const Evidence& e) { return e.vector.frequencies; });
+  add("covariance", [](const Evidence& e) { return e.vector.covariance; });
+  const bool has_second = evidence && evidence->second;
+  json["second"] = has_second ? ordered_json{{"heading_rad", evidence->second->heading_rad},
+                                             {"residual", evidence->second->residual}}
+                              : ordered_json();
+  return json;
 }
 
 std::string format_line(const HomeAnswer& answer, Session& session) {
   const HomingResult& result = answer.result;
-  if (!result.known)
+  if (!result.known())
     return answer.file + "  " + session.red("no answer") + ": " + explain_no_direction(result);
-  const std::string sure = "; probability " + format_fixed(result.probability, 2);
   if (result.direction_rad) {
     return answer.file + "  home is " + session.green(describe_direction(*result.direction_rad)) +
-           ", about " + format_fixed(result.distance_r, 2) + " R away; " +
-           describe_rotation(result.vector.heading_rad) + sure;
+           ", about " + format_fixed(result.distance_r(), 2) +
+           " R away (R: distance of the surroundings); " + describe_rotation(-result.turn_rad()) +
+           "; probability " + format_fixed(result.probability(), 2);
   }
   return answer.file + "  " + session.red("no direction home") + ": " +
-         explain_no_direction(result) + sure;
+         explain_no_direction(result);
 }
 
 /// Returns the layout in the dataset.toml next to the image; nullopt if there is no such file.
@@ -78,7 +85,9 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
                     const Dataset& recording, Session& session) {
   const std::size_t total = recording.entries.size();
   std::vector<HomeAnswer> answers;
+  std::vector<std::size_t> answered;  // indices of their images
   std::size_t answers_with_direction = 0;
+  SkippedImages skipped(total, session);
   Progress progress(session, "homing", total);
   process_in_order(
       total, session.executor(),
@@ -86,23 +95,29 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
         const DatasetEntry& entry = recording.entries[i];
         return HomeAnswer{entry.file, entry.pose, guide.home(read_observation(entry))};
       },
-      [&](std::size_t, HomeAnswer&& answer) {
+      [&](std::size_t i, HomeAnswer&& answer) {
         progress.clear();
+        answered.push_back(i);
         answers_with_direction += answer.result.direction_rad ? 1 : 0;
         session.print(session.json() ? json_line(to_json(answer, goal.name))
                                      : format_line(answer, session));
         answers.push_back(std::move(answer));
         progress.advance();
+      },
+      [&](std::size_t, const std::exception_ptr& failure) {
+        progress.clear();
+        skipped.add(failure);
+        progress.advance();
       });
   progress.clear();
   if (!session.json() && total > 1) {
-    session.print(
-        session.bold(std::to_string(answers_with_direction) + " of " + std::to_string(total)) +
-        " views give the direction to " + goal.name);
+    session.print(session.bold(std::to_string(answers_with_direction) + " of " +
+                               std::to_string(answers.size())) +
+                  " views give the direction to " + goal.name);
   }
   if (arguments.report) {
     write_home_report(*arguments.report, goal, answers, [&](std::size_t i) {
-      return guide.encoder().panorama(read_observation(recording.entries[i]));
+      return guide.encoder().panorama(read_observation(recording.entries[answered[i]]));
     });
     print_report_path(*arguments.report, session);
   }
@@ -165,6 +180,7 @@ Run declare_home(Arguments& arguments) {
                        "Current image, or a data set with several current images");
   arguments.option("--memory FILE", values->memory, "Memory file that contains the view GOAL");
   declare_pictures(arguments, values->pictures);
+  values->pictures.check = PictureArguments::Check::heads;
   declare_report(arguments, values->report, "a page with both views and the direction home");
   declare_homing(arguments, values->homing);
   return [values, &arguments](Session& session) { return home(arguments, *values, session); };
@@ -173,7 +189,9 @@ Run declare_home(Arguments& arguments) {
 }  // namespace
 
 Verb home_verb() {
-  return {"home", "Compute the direction back to a place from one image of that place",
+  return {"home",
+          VerbGroup::localisation,
+          "Compute the direction back to a place from its image",
           "Directions are relative to the robot's current heading, which may be unknown. The "
           "distance is given in units of R, the typical distance of the objects around the robot. "
           "If an image is in the folder of a data set, the type of the image is read "

@@ -1,12 +1,18 @@
 #include <algorithm>
+#include <fstream>
 
+#include "cli/texts.hpp"
 #include "cli/verbs.hpp"
+#include "panonav/core/address.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/live_pictures.hpp"
 #include "panonav_recordings/recorded_dataset.hpp"
 #include "panonav_recordings/video_file.hpp"
+#include "runs/described_input.hpp"
 
 namespace panonav::command {
 
@@ -22,6 +28,19 @@ std::string_view kind_name(PictureKind kind) {
       return "mirror";
   }
   return "panorama";
+}
+
+/// Prints the verbs that take an input, and the next command.
+void print_use(const InputUse& use, Session& session) {
+  if (session.json()) return;
+  std::string verbs;
+  for (const auto& verb : use.verbs) verbs += (verbs.empty() ? "" : ", ") + verb;
+  constexpr std::size_t column = 14;
+  if (!verbs.empty()) session.print("  verbs       " + wrap_text(verbs, column, column));
+  if (use.next.empty() || session.quiet()) return;
+  std::string line = "Next:";
+  for (const auto& word : use.next) line += " " + quote_for_shell(word);
+  session.print(line);
 }
 
 struct NamedRoute {
@@ -40,6 +59,14 @@ std::vector<NamedRoute> list_routes(const MemoryFile& memory) {
     routes.push_back({std::move(name), route->size(), route->length_m(), bytes});
   }
   return routes;
+}
+
+/// Returns the verbs that take the memory: not those for routes or changes that it does not have.
+std::vector<std::string> find_memory_verbs(const MemoryFile& memory) {
+  std::vector<std::string> verbs = list_verbs_that_take(InputKind::memory);
+  if (memory.route_names().empty()) std::erase(verbs, "route follow");
+  if (memory.history().empty()) std::erase(verbs, "undo");
+  return verbs;
 }
 
 ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
@@ -68,11 +95,18 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
                       {"edge_channel", steps.edge_channel},
                       {"remove_mean", steps.remove_mean},
                       {"normalise_gain", steps.normalise_gain}}}};
+  json["verbs"] = find_memory_verbs(memory);
   auto routes = ordered_json::array();
   for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
     routes.push_back({{"name", name}, {"lines", lines}, {"length_m", length_m}, {"bytes", bytes}});
   }
   json["routes"] = std::move(routes);
+  json["map"] = nullptr;
+  if (const auto map = describe_map(memory)) {
+    json["map"] = {{"unit", map->unit == LengthUnit::metres ? "m" : "view_steps"},
+                   {"views", map->views},
+                   {"part_sizes", map->part_sizes}};
+  }
   if (header.elevations) {
     json["elevations_rad"] = {header.elevations->bottom_rad, header.elevations->top_rad};
   }
@@ -82,21 +116,22 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
 ExitCode print_memory(const std::string& path, Session& session) {
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto info = memory.info();
+  session.set_length_unit(read_length_unit(memory));
   if (session.json()) {
-    session.print(json_line(to_json(memory, info)));
+    session.print(session.json_line(to_json(memory, info)));
     return ExitCode::done;
   }
   const auto& header = memory.header();
-  session.print(session.bold(path) + ": " + std::to_string(info.views) + " views, " +
+  session.print(session.bold(path) + ": " + format_count(info.views, "view") + ", " +
                 std::to_string(info.views_with_position) + " with a position, " +
                 std::to_string(info.views_with_heading) + " with a heading, " +
-                std::to_string(info.links) + " links");
+                format_count(info.links, "link"));
   session.print("  signatures  " + std::to_string(header.shape.rows) + " rows x " +
                 std::to_string(header.shape.components) + " components, " +
                 std::to_string(2 * header.shape.size()) + " bytes per view");
   if (info.views_with_features > 0) {
-    session.print("  features    " + std::to_string(info.views_with_features) +
-                  " views with local features, " +
+    session.print("  features    " + format_count(info.views_with_features, "view") +
+                  " with local features, " +
                   std::to_string(info.feature_bytes / info.views_with_features) +
                   " bytes per view");
   }
@@ -106,21 +141,61 @@ ExitCode print_memory(const std::string& path, Session& session) {
                      ? format_number(degrees(header.elevations->bottom_rad)) + " to " +
                            format_number(degrees(header.elevations->top_rad)) + " degrees"
                      : std::string("unknown")));
-  session.print("  file        " + std::to_string(info.file_bytes) + " bytes, format " +
-                std::to_string(info.format_version) + ", " + std::to_string(info.thumbnails) +
-                " thumbnails");
-  for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
-    session.print("  route       " + name + ": " + std::to_string(lines) + " lines over " +
-                  format_fixed(length_m, 1) + " m, " +
-                  (length_m > 0.0 ? format_fixed(1e-3 * static_cast<double>(bytes) / length_m, 2) +
-                                        " MB per kilometre"
-                                  : std::to_string(bytes) + " bytes"));
+  session.print("  file        " + std::to_string(info.file_bytes) + " bytes" +
+                (info.views > 0 ? ", " + std::to_string(info.file_bytes / info.views) + " per view"
+                                : std::string()) +
+                ", format " + std::to_string(info.format_version) + ", " +
+                format_count(info.thumbnails, "thumbnail"));
+  if (const auto map = describe_map(memory)) {
+    session.print(
+        "  map         " + format_count(map->views, "view") + " in " +
+        format_count(map->part_sizes.size(), "part") +
+        (map->part_sizes.size() == 1 ? "" : " that are not connected") + ", positions in " +
+        (map->unit == LengthUnit::metres ? "metres" : "view steps (panonav scale makes metres)"));
   }
+  for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
+    const int columns = memory.route(name).value().columns();
+    const bool is_in_steps = read_route_source(memory, name, columns).assumed_unit_m.has_value();
+    session.set_length_unit(is_in_steps ? LengthUnit::view_steps : LengthUnit::metres);
+    session.print(
+        "  route       " + name + ": " + format_count(lines, "line") + " over " +
+        session.format_length(length_m, 1) + ", " +
+        (length_m > 0.0 && session.length_unit() == LengthUnit::metres
+             ? format_fixed(1e-3 * static_cast<double>(bytes) / length_m, 2) + " MB per kilometre"
+             : std::to_string(bytes) + " bytes"));
+  }
+  InputUse use{find_memory_verbs(memory), {"panonav", "localise", path, "INPUT"}};
+  if (info.views == 0) use.next = {"panonav", "memorise", path, "INPUT"};
+  print_use(use, session);
   return ExitCode::done;
+}
+
+/// Returns the command that stores images of a guessed kind in a memory, or that calibrates their
+/// camera if they may be those of a mirror.
+std::vector<std::string> make_first_command(const std::string& input, ImageSize size) {
+  const GuessedKind guess = guess_kind(size);
+  if (guess.kind.empty()) return {"panonav", "calibrate", input, "-o", "camera.toml"};
+  return make_memorise_command(input, guess.kind);
+}
+
+/// Verbs take a recording that has images which panonav can read.
+InputUse find_use(const std::string& path, const recordings::RecordingSummary& summary) {
+  InputUse use;
+  std::int64_t largest_px = 0;
+  for (const recordings::TopicSummary& each : summary.topics) {
+    if (!each.shows) continue;
+    if (use.verbs.empty()) use.verbs = list_verbs_that_take(InputKind::recording);
+    const std::int64_t area_px = each.size ? std::int64_t{each.size->width} * each.size->height : 0;
+    if (area_px <= largest_px) continue;
+    largest_px = area_px;
+    use.next = make_first_command(path, *each.size);
+  }
+  return use;
 }
 
 ExitCode print_recording(const std::string& path, Session& session) {
   const recordings::RecordingSummary summary = recordings::describe_recording(path);
+  const InputUse use = find_use(path, summary);
   const auto seconds = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns); };
   if (session.json()) {
     ordered_json json{{"recording", path}, {"begin_s", nullptr}, {"end_s", nullptr}};
@@ -131,7 +206,7 @@ ExitCode print_recording(const std::string& path, Session& session) {
     };
     add_span(json, summary.time);
     auto topics = ordered_json::array();
-    for (const auto& [topic, time, rate_hz, shows] : summary.topics) {
+    for (const auto& [topic, time, rate_hz, shows, size] : summary.topics) {
       ordered_json each{{"name", topic.name},    {"type", topic.type}, {"messages", topic.messages},
                         {"begin_s", nullptr},    {"end_s", nullptr},   {"rate_hz", nullptr},
                         {"first_image", nullptr}};
@@ -142,6 +217,7 @@ ExitCode print_recording(const std::string& path, Session& session) {
     }
     json["topics"] = std::move(topics);
     json["warnings"] = summary.warnings;
+    json["verbs"] = use.verbs;
     session.print(json_line(json));
     return ExitCode::done;
   }
@@ -153,8 +229,8 @@ ExitCode print_recording(const std::string& path, Session& session) {
     name_width = std::max(name_width, each.topic.name.size());
     type_width = std::max(type_width, each.topic.type.size());
   }
-  session.print(session.bold(path) + ": " + std::to_string(messages) + " messages of " +
-                std::to_string(summary.topics.size()) + " topics" +
+  session.print(session.bold(path) + ": " + format_count(messages, "message") + " of " +
+                format_count(summary.topics.size(), "topic") +
                 (summary.time
                      ? " in " +
                            format_fixed(seconds(summary.time->end_ns - summary.time->begin_ns), 1) +
@@ -164,13 +240,21 @@ ExitCode print_recording(const std::string& path, Session& session) {
     text.resize(std::max(width, text.size()), ' ');
     return to_readable_line(text);
   };
-  for (const auto& [topic, time, rate_hz, shows] : summary.topics) {
+  for (const auto& [topic, time, rate_hz, shows, size] : summary.topics) {
     session.print("  " + padded(topic.name, name_width) + "  " + padded(topic.type, type_width) +
                   "  " + std::to_string(topic.messages) +
                   (rate_hz ? ", " + format_number(*rate_hz, {}, 3) + " per second" : "") +
                   (shows ? ", " + *shows : ""));
   }
-  for (const std::string& warning : summary.warnings) session.note(path + ": " + warning);
+  if (use.verbs.empty()) {
+    session.print("  no verb takes it: " +
+                  std::string(messages == 0
+                                  ? "it is empty; it was probably not written completely"
+                                  : "it has no images that panonav reads (docs/recordings.md)"));
+  }
+  print_use(use, session);
+  for (const std::string& warning : summary.warnings)
+    session.note(warning.starts_with(path + ": ") ? warning : path + ": " + warning);
   return ExitCode::done;
 }
 
@@ -188,7 +272,12 @@ ExitCode print_camera(const std::string& path, Session& session) {
         {{"pixels", format.pixels}, {"usable", format.is_supported}, {"sizes", sizes}});
     if (!session.json()) session.print(line);
   }
-  if (session.json()) session.print(json_line({{"camera", path}, {"formats", listed}}));
+  const InputUse use{list_verbs_that_take(InputKind::live),
+                     {"panonav", "localise", "MEMORY", path}};
+  print_use(use, session);
+  if (session.json()) {
+    session.print(json_line({{"camera", path}, {"formats", listed}, {"verbs", use.verbs}}));
+  }
   return ExitCode::done;
 }
 
@@ -197,40 +286,88 @@ ExitCode print_video(const std::string& path, Session& session) {
   const ImageSize size = read_picture(video.entries.front()).size();
   const double begin_s = *video.entries.front().stamp_s;
   const double end_s = *video.entries.back().stamp_s;
+  const InputUse use{list_verbs_that_take(InputKind::video), make_first_command(path, size)};
   if (session.json()) {
     session.print(json_line({{"video", path},
                              {"images", video.entries.size()},
                              {"begin_s", begin_s},
                              {"end_s", end_s},
                              {"width", size.width},
-                             {"height", size.height}}));
+                             {"height", size.height},
+                             {"verbs", use.verbs}}));
     return ExitCode::done;
   }
-  session.print(session.bold(std::to_string(video.entries.size()) + " images") + " of " +
+  session.print(session.bold(format_count(video.entries.size(), "image")) + " of " +
                 std::to_string(size.width) + " x " + std::to_string(size.height) + " px, from " +
                 format_number(begin_s) + " s to " + format_number(end_s) + " s");
+  for (const std::string& warning : video.warnings) session.print("  " + warning);
+  session.print("  " + std::string(guess_kind(size).text));
+  print_use(use, session);
   return ExitCode::done;
+}
+
+ExitCode print_described(const std::string& path, Session& session) {
+  const DescribedInput described = describe_input(path);
+  if (session.json()) {
+    session.print(json_line({{"input", path},
+                             {"type", described.type},
+                             {"summary", described.summary},
+                             {"bytes", described.bytes},
+                             {"images", described.images},
+                             {"facts", described.facts},
+                             {"verbs", described.use.verbs}}));
+    return ExitCode::done;
+  }
+  session.print(session.bold(path) + ": " + described.type + ", " + described.summary);
+  if (described.bytes > 0) {
+    session.print("  size        " + std::to_string(described.bytes) + " bytes");
+  }
+  for (const auto& fact : described.facts) session.print("  " + fact);
+  print_use(described.use, session);
+  return ExitCode::done;
+}
+
+/// True if the first bytes are those of a database, as memories are.
+bool is_database(const std::string& path) {
+  constexpr std::string_view magic = "SQLite format 3";
+  std::string head(magic.size(), '\0');
+  std::ifstream(path, std::ios::binary)
+      .read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head == magic;
+}
+
+ExitCode info(const std::string& path, Session& session) {
+  if (path.starts_with("/dev/video")) return print_camera(path, session);
+  if (recordings::is_live(path)) return print_described(path, session);
+  if (is_address(path)) return print_memory(path, session);
+  if (recordings::is_video(path)) return print_video(path, session);
+  if (recordings::is_recording(path)) return print_recording(path, session);
+  return is_database(path) ? print_memory(path, session) : print_described(path, session);
 }
 
 Run declare_info(Arguments& arguments) {
   auto path = std::make_shared<std::string>();
   arguments.positional(
       "FILE", *path,
-      "Memory file, recording (MCAP, rosbag2, ROS 1 bag), video, or camera (/dev/video0)");
-  return [path](Session& session) {
-    if (path->starts_with("/dev/video")) return print_camera(*path, session);
-    if (recordings::is_video(*path)) return print_video(*path, session);
-    return recordings::is_recording(*path) ? print_recording(*path, session)
-                                           : print_memory(*path, session);
-  };
+      "Any file or folder, such as a memory, an image, a folder of images, a data set, a video, a "
+      "recording, a camera file, a trajectory, a world or a report; the address of a memory or of "
+      "a "
+      "live source; or a camera (/dev/video0)");
+  return [path](Session& session) { return info(*path, session); };
 }
 
 }  // namespace
 
 Verb info_verb() {
-  return {"info",
-          "Show the content of a memory or recording, or the image sizes that a camera offers", "",
-          "  panonav info office.panonav\n  panonav info drive.mcap", declare_info};
+  return {
+      "info",
+      VerbGroup::first_steps,
+      "Say what a file, folder or address is and which verbs read it",
+      "The verb prints the type, the content, the verbs that take it, and the next command. A live "
+      "source is not opened. The exit code is 2 if no verb takes the file; one line then "
+      "describes its content.",
+      "  panonav info photos\n  panonav info office.panonav\n  panonav info drive.mcap",
+      declare_info};
 }
 
 }  // namespace panonav::command

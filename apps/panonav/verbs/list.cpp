@@ -40,14 +40,15 @@ std::size_t display_width(const std::string& text) {
 }
 
 /// Returns the lines of the table, the header first. Columns without any value are left out.
-std::vector<std::string> format_table(const std::vector<ViewRecord>& views) {
+std::vector<std::string> format_table(const std::vector<ViewRecord>& views, LengthUnit unit) {
+  const std::string brackets = unit == LengthUnit::metres ? " [m]" : " [view steps]";
   const std::vector<Column> columns{
       {"id", [](const ViewRecord& v) { return std::to_string(v.view.value); }},
       {"name",
        [](const ViewRecord& v) { return shorten_middle(to_readable_line(v.info.name), 60); }, true},
-      {"x [m]",
+      {"x" + brackets,
        [](const ViewRecord& v) { return v.info.pose ? format_fixed(v.info.pose->x_m, 2) : ""; }},
-      {"y [m]",
+      {"y" + brackets,
        [](const ViewRecord& v) { return v.info.pose ? format_fixed(v.info.pose->y_m, 2) : ""; }},
       {"heading [deg]",
        [](const ViewRecord& v) {
@@ -89,11 +90,12 @@ std::string list_names(const std::string& what, const std::vector<std::string>& 
 ExitCode list(const ListArguments& arguments, Session& session) {
   if (arguments.csv && session.json()) throw UsageError("--csv and --json cannot be combined");
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
+  session.set_length_unit(read_length_unit(memory));
   const auto all = list_views(memory);
   const auto views = select_views(all, arguments.selection);
   const ExitCode code = views.empty() ? ExitCode::no_answer : ExitCode::done;
   if (arguments.csv) {
-    std::string table = format_view_table(views);
+    std::string table = format_view_table(views, session.length_unit());
     table.pop_back();
     session.print(table);
     return code;
@@ -103,14 +105,14 @@ ExitCode list(const ListArguments& arguments, Session& session) {
   if (session.json()) {
     auto list = ordered_json::array();
     for (const ViewRecord& view : views) list.push_back(to_json(view));
-    session.print(json_line(ordered_json{{"memory", arguments.memory},
-                                         {"views", std::move(list)},
-                                         {"routes", routes},
-                                         {"maps", maps}}));
+    session.print(session.json_line(ordered_json{{"memory", arguments.memory},
+                                                 {"views", std::move(list)},
+                                                 {"routes", routes},
+                                                 {"maps", maps}}));
     return code;
   }
   if (!views.empty()) {
-    const auto lines = format_table(views);
+    const auto lines = format_table(views, session.length_unit());
     session.print(session.bold(lines.front()));
     for (std::size_t i = 1; i < lines.size(); ++i) session.print(lines[i]);
   }
@@ -131,7 +133,9 @@ Run declare_list(Arguments& arguments) {
 }  // namespace
 
 Verb list_verb() {
-  return {"list", "List the views, routes and maps of a memory",
+  return {"list",
+          VerbGroup::memory,
+          "List the views, routes and maps of a memory",
           "Each line describes one view: id, name, position, heading, time stamp, number of links "
           "to other views, connected component of the map that contains it, and whether it has a "
           "thumbnail. The exit code is 1 if no view is listed.",

@@ -38,20 +38,20 @@ void print_answer(const LocalisedQuery& query, const LocaliseArguments& argument
                   Session& session) {
   if (!query.error.empty()) session.note("skipped: " + to_readable_line(query.error));
   if (session.json()) {
-    session.print(json_line(to_json(query, arguments.areas)));
+    session.print(session.json_line(to_json(query, arguments.areas)));
   } else if (query.error.empty()) {
     session.print(format_line(query, session));
   }
 }
 
 /// Localises all images on all threads and prints the answers in order. Reports images that cannot
-/// be read; throws FileError if none can be read.
+/// be used; throws FileError if none can be used.
 std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const LocaliseArguments& arguments, const Dataset& recording,
                                        Session& session) {
   struct Answer {
     LocalisedQuery query;
-    std::exception_ptr failure = {};  ///< why the image could not be read
+    std::exception_ptr failure = {};  ///< why the image could not be used
   };
   Progress progress(session, "localising", recording.entries.size());
   std::vector<LocalisedQuery> answers;
@@ -61,19 +61,18 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
       recording.entries.size(), session.executor(),
       [&](std::size_t i) -> Answer {
         const DatasetEntry& entry = recording.entries[i];
-        std::optional<Observation> observation;
+        // The entries of several typed images contain paths; the memory has file names.
+        const std::string name =
+            arguments.inputs.size() > 1 ? escape_name(entry.path.filename().string()) : entry.file;
         try {
-          observation = read_observation(entry);
+          Observation observation = read_observation(entry);
+          const double turned_rad = rotate_randomly(observation, recogniser, arguments, i);
+          Place place = recogniser.localise(observation,
+                                            std::span(&name, arguments.exclude_same_file ? 1 : 0));
+          return {{observation.name, turned_rad, std::move(place), observation.pose, ""}};
         } catch (const FileError& error) {
           return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
         }
-        const double turned_rad = rotate_randomly(*observation, recogniser, arguments, i);
-        // The entries of several typed images contain paths; the memory has file names.
-        const std::string name =
-            arguments.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
-        Place place = recogniser.localise(*observation,
-                                          std::span(&name, arguments.exclude_same_file ? 1 : 0));
-        return {{observation->name, turned_rad, std::move(place), observation->pose, ""}};
       },
       [&](std::size_t, Answer&& made) {
         answers.push_back(std::move(made.query));
@@ -92,7 +91,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
 /// Writes the CSV table and prints how many images show known places; returns this number.
 std::size_t write_table_and_count(const LocaliseArguments& arguments,
                                   const std::vector<LocalisedQuery>& answers, Session& session) {
-  std::string table(csv_header);
+  std::string table = make_csv_header(session.length_unit());
   std::size_t known = 0;
   std::size_t unread = 0;
   for (const LocalisedQuery& answer : answers) {
@@ -104,7 +103,7 @@ std::size_t write_table_and_count(const LocaliseArguments& arguments,
   if (!session.json() && answers.size() > 1) {
     session.print(
         session.bold(std::to_string(known) + " of " + std::to_string(answers.size() - unread)) +
-        " views show a place of " + arguments.memory +
+        " images show a place of " + arguments.memory +
         (unread > 0 ? "; " + std::to_string(unread) + " could not be read" : ""));
   }
   return known;
@@ -117,11 +116,15 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
     return localise_in_order(declared, arguments, session);
   }
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
+  session.set_length_unit(read_length_unit(file));
   require_components(declared, arguments, file.header());
   reject_live_options(declared, arguments.inputs.front(), true);
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
   require_stored_band(arguments.pictures, file);
-  const Dataset recording = open_queries(arguments, file.header().source, session);
+  Dataset recording = open_queries(arguments, file.header().source, session);
+  if (session.length_unit() != LengthUnit::metres) {  // true positions cannot be compared
+    for (DatasetEntry& entry : recording.entries) entry.pose.reset();
+  }
   PlaceRecogniserOptions options{.localiser = arguments.localiser, .source = recording.source};
   if (arguments.areas) options.areas = arguments.accuracy;
   // Loads the whole memory for a report, which shows all its views.
@@ -166,10 +169,11 @@ void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArgumen
 Run declare_localise(Arguments& arguments) {
   auto values = std::make_shared<LocaliseArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positionals("INPUT", values->inputs,
-                        "Data set, folder of images, video, recording, one or more images, or a "
-                        "live source: - (JPEG images on standard input), a camera (/dev/video0), "
-                        "or an address (rtsp://, http://, tcp://)");
+  arguments.positionals(
+      "INPUT", values->inputs,
+      "Data set, folder of images, video (several are joined), recording, one or "
+      "more images, or a live source: - (JPEG images on standard input), a camera (/dev/video0), "
+      "or an address (rtsp://, http://, tcp://)");
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   declare_record(arguments, values->record);
@@ -194,6 +198,10 @@ Run declare_localise(Arguments& arguments) {
   arguments.reject_options_unless(
       {"[accuracy]"}, [values] { return values->areas; }, "without --areas");
   arguments.declare_outputs({"--out"});
+  arguments.explain_interruption(
+      "Views added so far are kept; --update changes nothing before the end. To continue, run the "
+      "same command again.",
+      [values] { return values->add || values->update; });
   return [values, &arguments](Session& session) { return localise(arguments, *values, session); };
 }
 
@@ -202,6 +210,7 @@ Run declare_localise(Arguments& arguments) {
 Verb localise_verb() {
   return {
       "localise",
+      VerbGroup::localisation,
       "Find the position and heading of a robot from images",
       "An image without a dataset.toml is read with the image type of the memory. Images that "
       "cannot be read are reported and skipped. From a live source, the verb always reads the "

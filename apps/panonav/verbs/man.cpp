@@ -56,10 +56,13 @@ Run declare_man(Arguments& arguments) {
 }  // namespace
 
 Verb man_verb() {
-  return {"man", "Print the manual page of a verb",
+  return {"man",
+          VerbGroup::tools,
+          "Print the manual page of a verb",
           "The page is printed in roff format. To read a page that is saved in a file, run man -l "
           "FILE. If panonav is installed, you can also run, for example, man panonav-localise.",
-          "  panonav man localise\n  panonav man --out pages", declare_man};
+          "  panonav man localise\n  panonav man --out pages",
+          declare_man};
 }
 
 }  // namespace panonav::command

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/pipeline/graph_file.hpp"
 #include "panonav/pipeline/known_views.hpp"
@@ -27,8 +28,9 @@ namespace {
 namespace fs = std::filesystem;
 
 struct MapArguments {
-  std::string dataset;
   std::string memory;
+  std::string dataset;
+  std::vector<std::string> inputs;  // `dataset` and the videos that continue it
   MapFileArguments files;
   std::optional<std::string> report;
   RunRecordArguments record;
@@ -48,10 +50,7 @@ std::vector<StampedPose> make_trajectory(const Dataset& recording, const Mapper:
     if (run.map.nodes[i].component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
     const double stamp_s = entry.stamp_s.value_or(static_cast<double>(run.observations[i]));
-    if (!trajectory.empty()) {
-      require_later_stamp(dataset, entry.file, stamp_s, trajectory.back().stamp_s);
-    }
-    trajectory.push_back({stamp_s, run.map.nodes[i].pose});
+    append_pose(trajectory, {stamp_s, run.map.nodes[i].pose}, dataset, entry.file);
   }
   return trajectory;
 }
@@ -96,6 +95,48 @@ void print_comparison(const RecordedMapComparison& comparison, const Mapper::Res
   print_closures(comparison.closures, session);
 }
 
+void print_components(const std::vector<std::size_t>& sizes, Session& session) {
+  if (sizes.size() < 2) return;
+  std::string text;
+  for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
+  session.print(
+      session.red("The map has " + std::to_string(sizes.size()) + " connected components") +
+      ", with these numbers of places: " + text + ".");
+  session.print(
+      "To connect them, take images at shorter distances, record odometry, or drive through the "
+      "same places again.");
+}
+
+/// Prints what a unit of length of the map is.
+void print_unit(const MapArguments& arguments, const Mapper::Result& run, Session& session) {
+  if (run.wheels) return;
+  const double height_m = arguments.mapper.odometry.camera_height_m;
+  if (height_m > 0.0 && run.unit != LengthUnit::metres) {
+    session.print("The camera height was not used: the images do not show enough ground.");
+  }
+  if (height_m > 0.0 && run.unit == LengthUnit::metres) {
+    session.print("Lengths are computed from the image of the ground, " + format_number(height_m) +
+                  " m below the camera.");
+  } else if (run.unit == LengthUnit::metres && arguments.mapper.is_scale_known) {
+    session.print("Lengths are computed from the images: one unit is " +
+                  format_number(arguments.mapper.odometry.scale_m) + " m (--scale-m).");
+  } else if (run.unit == LengthUnit::metres) {
+    session.print(
+        "Lengths are those of the odometry; of images without odometry they are computed from the "
+        "images, in its scale.");
+  } else if (has_positions_from_map(MemoryFile::open(arguments.memory, Access::read_only))) {
+    session.print(
+        "Lengths are in view steps (median distance between consecutive views). For metres: "
+        "panonav "
+        "scale " +
+        arguments.memory + " --distance VIEW VIEW LENGTH");
+  } else {
+    session.print(
+        "The scale of the map is not known (--scale-m, --camera-height-m); the views have the "
+        "positions of the data set.");
+  }
+}
+
 void print_result(const MapArguments& arguments, const Dataset& recording,
                   const Mapper::Result& run, Session& session) {
   const std::size_t nodes = run.map.nodes.size();
@@ -110,42 +151,27 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
                       {"skipped", run.skipped},
                       {"connected_components", sizes},
                       {"closures", count_closures(run.map)},
-                      {"scale_m", run.scale_m},
+                      {"unit", run.unit == LengthUnit::metres ? "m" : "view_steps"},
+                      {"scale_m", to_json_or_null(run.scale_m)},
                       {"wheels", run.wheels},
                       {"step_ms", step_ms},
                       {"ground_truth", nullptr}};
     if (comparison) json["ground_truth"] = to_json(*comparison);
-    session.print(json_line(json));
+    session.print(session.json_line(std::move(json)));
     return;
   }
-  session.print(session.bold(std::to_string(nodes)) + " places from " +
-                std::to_string(recording.entries.size()) + " images, " +
+  session.print(session.bold(format_count(nodes, "place")) + " from " +
+                format_count(recording.entries.size(), "image") + ", " +
                 std::to_string(count_closures(run.map)) + " closures; " + format_fixed(step_ms, 2) +
                 " ms per image");
-  if (sizes.size() > 1) {
-    std::string text;
-    for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
-    session.print(
-        session.red("The map has " + std::to_string(sizes.size()) + " connected components") +
-        ", with these numbers of places: " + text + ".");
-    session.print(
-        "To connect them, take images at shorter distances, record odometry, or drive through the "
-        "same places again.");
-  }
-  const double height_m = arguments.mapper.odometry.camera_height_m;
-  if (!run.wheels && height_m > 0.0) {
-    session.print("Lengths are computed from the image of the ground, " + format_number(height_m) +
-                  " m below the camera.");
-  } else if (!run.wheels) {
-    session.print("Lengths are computed from the images: one unit is " +
-                  format_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
-  }
+  print_components(sizes, session);
+  print_unit(arguments, run, session);
   if (comparison) print_comparison(*comparison, run, session);
   if (arguments.files.picture) {
     session.print(*arguments.files.picture + " shows " +
                   (sizes.size() > 1 ? "the largest connected component of the map, " +
                                           std::to_string(std::ranges::max(sizes)) + " of " +
-                                          std::to_string(nodes) + " places"
+                                          format_count(nodes, "place")
                                     : "the map"));
   }
   session.print(arguments.memory + " contains the map and the views of its places.");
@@ -159,7 +185,14 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
 
 Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
   Progress progress(session, "mapping", recording.entries.size());
-  return mapper.map(recording, session.executor(), [&] { progress.advance(); });
+  SkippedImages skipped(recording.entries.size(), session);
+  return mapper.map(
+      recording, session.executor(), [&] { progress.advance(); },
+      [&](std::size_t, const std::exception_ptr& failure) {
+        progress.clear();
+        skipped.add(failure);
+        progress.advance();
+      });
 }
 
 /// Maps the recording like `map_recording` and shows the growing map to viewers.
@@ -175,6 +208,7 @@ Mapper::Result map_with_viewers(const MapArguments& arguments, const Dataset& re
   };
   GrowingMap shown;
   std::optional<recordings::RunMoment> pending;  // sent with the next image or the finished map
+  SkippedImages skipped(recording.entries.size(), session);
   Progress progress(session, "mapping", recording.entries.size());
   process_in_order(
       recording.entries.size(), session.executor(),
@@ -199,6 +233,12 @@ Mapper::Result map_with_viewers(const MapArguments& arguments, const Dataset& re
         shown.add_to(encoded.moment, mapper.current_map(), is_node, encoded.name);
         pending = std::move(encoded.moment);
         progress.advance();
+      },
+      [&](std::size_t, const std::exception_ptr& failure) {
+        progress.clear();
+        skipped.add(failure);
+        mapper.skip();
+        progress.advance();
       });
   Mapper::Result run = mapper.finish();
   if (pending) {
@@ -207,6 +247,21 @@ Mapper::Result map_with_viewers(const MapArguments& arguments, const Dataset& re
   }
   record.close();
   return run;
+}
+
+/// Returns the texts of the report about an image and its node: in a map of several components,
+/// also the number of its component, as only the largest one is drawn.
+std::vector<std::pair<std::string, std::string>> describe_place(const TopologicalMap& map,
+                                                                const std::string& file,
+                                                                std::optional<std::size_t> node) {
+  std::vector<std::pair<std::string, std::string>> texts{{"image", file}};
+  const std::size_t components = count_components(map);
+  if (!node || components < 2) return texts;
+  const std::size_t component = map.nodes[*node].component;
+  texts.emplace_back("part of the map",
+                     std::to_string(component + 1) + " of " + std::to_string(components) +
+                         (component == find_largest_component(map) ? "" : ", not drawn"));
+  return texts;
 }
 
 /// Records the finished map and then each image with its pose. Only the largest connected component
@@ -223,6 +278,7 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
     names.push_back(recording.entries[run.observations[i]].file);
   }
   Progress progress(session, "recording", recording.entries.size());
+  bool is_first = true;
   process_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
@@ -238,15 +294,19 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
         if (moment.sure && run.map.nodes[node->second].component == component) {
           moment.pose = run.map.nodes[node->second].pose;
         }
-        if (i == 0) add_component(moment, run.map, component, names);
+        if (std::exchange(is_first, false)) add_component(moment, run.map, component, names);
         if (arguments.report) {
           recordings::RunMoment shown = moment;
           shown.truth.reset();  // its frame differs from the map's
+          shown.values =
+              describe_place(run.map, recording.entries[i].file,
+                             node == nodes.end() ? std::nullopt : std::optional(node->second));
           replay_page.add(shown);
         }
         record.add(std::move(moment));
         progress.advance();
-      });
+      },
+      [&](std::size_t, const std::exception_ptr&) { progress.advance(); });  // named before
   record.close();
 }
 
@@ -299,6 +359,7 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
   }
   MapperOptions options = arguments.mapper;
   options.thumbnails = !arguments.no_thumbnails;
+  options.is_scale_known = declared.is_set("visual_odometry", "scale_m");
   Mapper mapper(std::move(*memory), recording.source, options);
   if (memory_existed)
     check_known_views(recording, mapper.memory(), mapper.encoder(), session.executor());
@@ -331,12 +392,13 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
 
 Run declare_map(Arguments& arguments) {
   auto values = std::make_shared<MapArguments>();
-  arguments.positional(
-      "DATASET", values->dataset,
-      "Data set, folder of images, video or recording with images in the order of the drive");
   arguments.positional("MEMORY", values->memory,
                        "Memory file (NAME.panonav), to which new views are added");
+  arguments.positionals("DATASET", values->inputs,
+                        "Data set, folder of images, video (several are joined) or recording with "
+                        "images in the order of the drive");
   declare_pictures(arguments, values->pictures);
+  values->pictures.check = PictureArguments::Check::heads;
   declare_map_files(arguments, values->files);
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
@@ -360,23 +422,31 @@ Run declare_map(Arguments& arguments) {
       {"--iterations", "--nearer-side"},
       [values] { return values->mapper.odometry.rule == VisualOdometryOptions::Rule::home_vector; },
       "with --rule published");
-  return [values, &arguments](Session& session) { return map(arguments, *values, session); };
+  arguments.explain_interruption(
+      "Views stored so far are kept. To continue, run the same command again.");
+  return [values, &arguments](Session& session) {
+    values->dataset = values->inputs.front();
+    values->pictures.further_videos.assign(values->inputs.begin() + 1, values->inputs.end());
+    return map(arguments, *values, session);
+  };
 }
 
 }  // namespace
 
 Verb map_verb() {
   return {
-      "map", "Make a map from the images of a drive",
+      "map",
+      VerbGroup::maps_and_routes,
+      "Make a map from the images of a drive",
       "The images must be in the order of the drive. Each step is computed from two consecutive "
       "images. If the data set has odometry, the steps come from the odometry instead, and the "
       "images only correct the rotations of these steps. When the robot returns to a place, the "
       "map is corrected (loop closure). Without odometry, set --camera-height-m to compute lengths "
       "in metres. If the map has several unconnected parts, each part is a separate component.",
-      "  panonav map office_run office.panonav\n"
-      "  panonav map office_run office.panonav --report mapped --graphml map.graphml\n"
-      "  panonav map walk walk.panonav --camera-height-m 0.6\n"
-      "  panonav map walk walk.panonav --capture-difference 0.1 --json",
+      "  panonav map office.panonav office_run\n"
+      "  panonav map office.panonav office_run --report mapped --graphml map.graphml\n"
+      "  panonav map walk.panonav walk --camera-height-m 0.6\n"
+      "  panonav map walk.panonav walk --capture-difference 0.1 --json",
       declare_map};
 }
 

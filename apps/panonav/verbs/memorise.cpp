@@ -1,7 +1,11 @@
+#include <algorithm>
 #include <exception>
 #include <filesystem>
+#include <functional>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
+#include "panonav/localisation/observation_model.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -17,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct MemoriseArguments {
-  std::string input;
   std::string memory;
+  std::vector<std::string> inputs;
   PictureArguments pictures;
   SignatureOptions signature;
   PreprocessingOptions preprocessing;
@@ -75,7 +79,7 @@ void memorise_missing(const Dataset& missing, const Dataset& recording, bool str
     note();
   }
   if (failure) std::rethrow_exception(failure);
-  if (memoriser.file() == nullptr && skipped.size() == missing.entries.size()) {
+  if (memoriser.file() == nullptr && skipped.size() >= missing.entries.size()) {
     throw FileError(recording.folder.string(), "contains no image that can be read");
   }
 }
@@ -96,9 +100,49 @@ MemoriserOptions make_options(const MemoriseArguments& arguments, const PictureS
   return options;
 }
 
+ordered_json to_json(const std::optional<MemoryMap>& map) {
+  if (!map) return nullptr;
+  return {{"unit", map->unit == LengthUnit::metres ? "m" : "view_steps"},
+          {"views", map->views},
+          {"part_sizes", map->part_sizes}};
+}
+
+/// Prints whether the parts of the map are connected, and its unit.
+void print_map(const std::string& path, const MemoryMap& map, bool is_stored, Session& session) {
+  const std::size_t parts = map.part_sizes.size();
+  if (!is_stored) {
+    session.print(session.red("There is no map") + ": the largest connected part has " +
+                  format_count(map.part_sizes.front(), "view") +
+                  ". Take an image every 20 to 50 cm.");
+    return;
+  }
+  if (parts > 1) {
+    std::size_t unplaced = 0;
+    for (const std::size_t size : map.part_sizes) {
+      if (size < static_cast<std::size_t>(ObservationModel::min_views)) unplaced += size;
+    }
+    session.print("The map has " +
+                  session.red(std::to_string(parts) + " parts that are not connected") +
+                  "; the largest has " + format_count(map.part_sizes.front(), "view") + ". " +
+                  (unplaced > 0 ? "Without a position: " + format_count(unplaced, "view") +
+                                      " in parts of fewer than " +
+                                      std::to_string(ObservationModel::min_views) + ". "
+                                : "") +
+                  "Parts are placed beside each other; distances between them have no meaning. To "
+                  "connect them, take an image every 20 to 50 cm.");
+  }
+  if (map.unit == LengthUnit::view_steps) {
+    session.print(
+        "Positions are in view steps (median distance between consecutive views). For "
+        "metres: panonav scale " +
+        path + " --distance VIEW VIEW LENGTH");
+  }
+}
+
 void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
-                  std::size_t appended, std::size_t known_before,
+                  const Memoriser::Counts& counts, std::size_t known_before,
                   const std::vector<Skipped>& skipped, Session& session) {
+  const std::size_t appended = counts.appended;
   const auto info = memory.info();
   if (session.json()) {
     auto skipped_json = ordered_json::array();
@@ -110,13 +154,13 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
                                          {"known_before", known_before},
                                          {"skipped", std::move(skipped_json)},
                                          {"views", info.views},
+                                         {"map", to_json(counts.map)},
                                          {"file_bytes", info.file_bytes}}));
     return;
   }
   session.print(
-      session.bold(std::to_string(appended)) + " views stored" +
-      (known_before > 0 ? ", " + std::to_string(known_before) + " were already in the memory"
-                        : "") +
+      session.bold(format_count(appended, "view")) + " stored" +
+      (known_before > 0 ? ", " + std::to_string(known_before) + " already in the memory" : "") +
       (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " could not be read") + "; " +
       arguments.memory + " holds " + std::to_string(info.views));
   if (!memory.header().elevations) {
@@ -124,14 +168,17 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
         "The elevations of the images are not known; every row is treated as a row at the "
         "horizon.");
   }
+  if (counts.map) {
+    print_map(arguments.memory, *counts.map, has_positions_from_map(memory), session);
+  }
   session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
 }
 
 /// Memorises images of a live source until it ends or the user interrupts.
 ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& arguments,
                        const std::optional<PictureSource>& remembered, Session& session) {
-  const auto source =
-      open_live(declared, arguments.input, arguments.pictures, remembered, arguments.live, session);
+  const auto source = open_live(declared, arguments.inputs.front(), arguments.pictures, remembered,
+                                arguments.live, session);
   std::vector<Skipped> skipped;
   Memoriser memoriser(arguments.memory,
                       make_options(arguments, source->pictures(), skipped, session));
@@ -139,20 +186,19 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
   loop.run([](const Observation&) { return ""; },
            [&](Observation&& observation) { memoriser.add(std::move(observation)); });
   const LiveCounts& counts = loop.finish();
-  if (counts.pictures == 0) throw FileError(arguments.input, "provided no image");
+  if (counts.pictures == 0) throw FileError(arguments.inputs.front(), "provided no image");
   const auto stored = memoriser.finish(session.executor());
-  print_result(arguments, *memoriser.file(), stored.appended, stored.known_before, skipped,
-               session);
+  print_result(arguments, *memoriser.file(), stored, stored.known_before, skipped, session);
   if (const std::string events = describe_events(counts, 0); !events.empty()) {
-    session.note(std::to_string(counts.pictures) + " images" + events);
+    session.note(format_count(counts.pictures, "image") + events);
   }
   return ExitCode::done;
 }
 
 ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments, Session& session) {
   const bool memory_existed = memory_exists(arguments.memory);
-  const bool live = recordings::is_live(arguments.input);
-  if (!live) reject_live_options(declared, arguments.input, true);
+  const bool live = recordings::is_live(arguments.inputs.front());
+  if (!live) reject_live_options(declared, arguments.inputs.front(), true);
   std::optional<PictureSource> remembered;
   if (memory_existed) {
     const auto memory = MemoryFile::open(arguments.memory, Access::read_write);
@@ -161,34 +207,53 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
     remembered = memory.header().source;
   }
   if (live) return memorise_live(declared, arguments, remembered, session);
-  const Dataset recording =
-      open_recording(arguments.input, arguments.pictures, remembered, session);
+  PictureArguments pictures = arguments.pictures;
+  pictures.check = PictureArguments::Check::none;
+  pictures.further_videos.assign(arguments.inputs.begin() + 1, arguments.inputs.end());
+  const Dataset recording = open_recording(arguments.inputs.front(), pictures, remembered, session);
   std::vector<Skipped> skipped;
+  for (const Dataset::Unusable& one : recording.unusable) {
+    if (arguments.strict) throw FileError(one.path.string(), one.fault);
+    skipped.push_back({one.file, one.describe()});
+  }
   Memoriser memoriser(arguments.memory,
                       make_options(arguments, recording.source, skipped, session));
   Dataset missing = recording;
   if (memory_existed) {
     Progress comparing(session, "comparing", recording.entries.size());
-    check_known_views(recording, *memoriser.file(), *memoriser.encoder(), session.executor(),
-                      [&](std::size_t compared) { comparing.advance(compared); });
+    std::function<void(const DatasetEntry&, const Error&)> unread;
+    if (!arguments.strict) {
+      unread = [&](const DatasetEntry& entry, const Error& error) {
+        record_skipped(entry.file, error, skipped, session);
+      };
+    }
+    check_known_views(
+        recording, *memoriser.file(), *memoriser.encoder(), session.executor(),
+        [&](std::size_t compared) { comparing.advance(compared); }, unread);
     std::erase_if(missing.entries, [&](const DatasetEntry& entry) {
-      return memoriser.file()->find(entry.file).has_value();
+      if (!memoriser.file()->find(entry.file)) return false;
+      memoriser.recall(entry.file, entry.odometry);
+      return true;
     });
   }
   const std::size_t known_before = recording.entries.size() - missing.entries.size();
-  memorise_missing(missing, recording, arguments.strict, memoriser, skipped, session);
-  const auto counts = memoriser.finish(session.executor());
-  print_result(arguments, *memoriser.file(), counts.appended, known_before, skipped, session);
+  const bool is_strict = arguments.strict || recording.entries.size() == 1;
+  memorise_missing(missing, recording, is_strict, memoriser, skipped, session);
+  Progress mapping(session, "mapping", known_before + missing.entries.size());
+  const auto counts = memoriser.finish(session.executor(), [&] { mapping.advance(); });
+  mapping.clear();
+  print_result(arguments, *memoriser.file(), counts, known_before, skipped, session);
   return ExitCode::done;
 }
 
 Run declare_memorise(Arguments& arguments) {
   auto values = std::make_shared<MemoriseArguments>();
-  arguments.positional("INPUT", values->input,
-                       "Data set, folder of images, one image, video, recording (MCAP, rosbag2, "
-                       "ROS 1 bag), or a live source: - (JPEG images on standard input), a camera "
-                       "(/dev/video0), or an address (rtsp://, http://, tcp://)");
   arguments.positional("MEMORY", values->memory, "Memory file (NAME.panonav), new or existing");
+  arguments.positionals("INPUT", values->inputs,
+                        "Data set, folder of images, one image, video (several are joined), "
+                        "recording (MCAP, rosbag2, ROS 1 bag), or a live source: - (JPEG images on "
+                        "standard input), a camera (/dev/video0), or an address (rtsp://, http://, "
+                        "tcp://)");
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
@@ -202,6 +267,8 @@ Run declare_memorise(Arguments& arguments) {
   arguments.options("signature", values->signature);
   arguments.options("preprocessing", values->preprocessing);
   arguments.show_in_help({"--components"});
+  arguments.explain_interruption(
+      "Views stored so far are kept. To continue, run the same command again.");
   return [values, &arguments](Session& session) { return memorise(arguments, *values, session); };
 }
 
@@ -210,14 +277,15 @@ Run declare_memorise(Arguments& arguments) {
 Verb memorise_verb() {
   return {
       "memorise",
+      VerbGroup::memory,
       "Store the images of a recording as views in a memory",
       "Views are stored in batches of 16; the first batch of a new memory has 32 views. An "
       "interruption never leaves an incomplete batch. To continue, run the same command again. An "
       "image with the same name as a stored view is refused if its pose, time stamp or content "
       "differs from that view. From a live source, views are stored until you press Ctrl-C.",
-      "  panonav memorise office_run office.panonav\n"
-      "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
-      "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",
+      "  panonav memorise office.panonav office_run\n"
+      "  panonav memorise walk.panonav photos --kind equirectangular --elevation-deg -30 40\n"
+      "  panonav memorise walk.panonav /dev/video0 --kind equirectangular --every 0.5s",
       declare_memorise,
       "memorize"};
 }

@@ -1,6 +1,7 @@
 #include "panonav/pipeline/memory_merge.hpp"
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 
 namespace panonav::command {
@@ -37,38 +38,41 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
     return merge_memories(arguments.first, arguments.second, arguments.memory, arguments.alignment,
                           {}, [&] { progress.advance(); });
   }();
+  session.set_length_unit(read_length_unit(MemoryFile::open(arguments.memory, Access::read_only)));
   if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", arguments.memory},
-                                         {"views", merged.views},
-                                         {"shared", merged.shared},
-                                         {"renamed", merged.renamed},
-                                         {"alignment", to_json(merged.alignment)},
-                                         {"connected_components", merged.connected_components},
-                                         {"without_position", merged.without_position}}));
+    session.print(
+        session.json_line(ordered_json{{"memory", arguments.memory},
+                                       {"views", merged.views},
+                                       {"shared", merged.shared},
+                                       {"renamed", merged.renamed},
+                                       {"alignment", to_json(merged.alignment)},
+                                       {"connected_components", merged.connected_components},
+                                       {"without_position", merged.without_position}}));
     return merged.alignment ? ExitCode::done : ExitCode::no_answer;
   }
   if (merged.alignment) {
     const Pose2& pose = merged.alignment->first_from_second;
     session.print(
-        session.bold("joined") + " by " + std::to_string(merged.alignment->places) +
-        " places in common; of " + std::to_string(merged.alignment->expected_places) +
-        " places where both maps overlap, " + std::to_string(merged.alignment->confirmed_places) +
-        " match. " + arguments.second + " lies at x " + format_fixed(pose.x_m, 2) + " m, y " +
-        format_fixed(pose.y_m, 2) + " m, rotated by " + format_fixed(degrees(pose.heading_rad), 1) +
-        " degrees, in the frame of " + arguments.first + ".");
+        session.bold("joined") + " by " + format_count(merged.alignment->places, "place") +
+        " in common; of " + format_count(merged.alignment->expected_places, "place") +
+        " where both maps overlap, " + std::to_string(merged.alignment->confirmed_places) +
+        " match. " + arguments.second + " lies at x " + session.format_length(pose.x_m, 2) +
+        ", y " + session.format_length(pose.y_m, 2) + ", rotated by " +
+        format_fixed(degrees(pose.heading_rad), 1) + " degrees, in the frame of " +
+        arguments.first + ".");
   } else {
     session.print(session.red("no place in common was found") +
                   ": the map contains both as separate components" +
                   (merged.without_position > 0
-                       ? ", and " + std::to_string(merged.without_position) + " views of " +
+                       ? ", and " + format_count(merged.without_position, "view") + " of " +
                              arguments.second +
                              " have no position, because their positions are in another frame"
                        : "") +
                   ".");
   }
   session.print(
-      arguments.memory + " holds " + std::to_string(merged.views) + " views" +
-      (merged.shared > 0 ? "; " + std::to_string(merged.shared) + " were in both memories" : "") +
+      arguments.memory + " holds " + format_count(merged.views, "view") +
+      (merged.shared > 0 ? "; " + std::to_string(merged.shared) + " in both memories" : "") +
       (merged.renamed > 0 ? "; " + std::to_string(merged.renamed) +
                                 " were renamed, because another view has the same name"
                           : "") +
@@ -87,13 +91,17 @@ Run declare_merge(Arguments& arguments) {
   arguments.options("merge", values->alignment);
   arguments.show_in_help({"--min-places"});
   arguments.declare_outputs({"--out"});
+  arguments.explain_interruption(
+      "The new memory was not written. To start over, run the same command again.");
   return [values](Session& session) { return merge(*values, session); };
 }
 
 }  // namespace
 
 Verb merge_verb() {
-  return {"merge", "Merge two memories that have places in common",
+  return {"merge",
+          VerbGroup::several_robots,
+          "Merge two memories that have places in common",
           "Common places are found by their appearance. The maps of both memories are joined at "
           "these places and optimised together, in the coordinate frame of FIRST. If no common "
           "place is found, the new memory contains both maps as separate components, and the exit "

@@ -4,6 +4,7 @@
 
 #include "cli/option_values.hpp"
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -178,8 +179,8 @@ void print_summary(const simulation::MissionRun& run, Session& session) {
   const std::string name(to_string(run.end));
   session.print(
       (run.end == NavigationDecision::State::arrived ? session.green(name) : session.red(name)) +
-      " after " + std::to_string(run.decisions.size()) +
-      " steps: " + std::string(explain_end(run.end)));
+      " after " + format_count(run.decisions.size(), "step") + ": " +
+      std::string(explain_end(run.end)));
   if (std::isfinite(run.end_distance_m)) {
     session.print("distance from the goal's view: " +
                   session.bold(format_fixed(run.end_distance_m, 3) + " m"));
@@ -193,7 +194,7 @@ void print_summary(const simulation::MissionRun& run, Session& session) {
     return decision.probability >= 0.5;
   });
   session.print("certain of its position (probability 0.5 or more) in " + std::to_string(sure) +
-                " of " + std::to_string(run.decisions.size()) + " steps");
+                " of " + format_count(run.decisions.size(), "step"));
   if (run.kidnapped_at) {
     session.print("kidnapped after step " + std::to_string(*run.kidnapped_at + 1));
   }
@@ -240,8 +241,8 @@ void write_results(const NavigateArguments& arguments, const simulation::Mission
 }
 
 void print_graph(const RobotNavigator& robot, Session& session) {
-  session.print(std::to_string(robot.graph().size()) + " views, " +
-                std::to_string(robot.graph().edges().size()) + " edges from " +
+  session.print(format_count(robot.graph().size(), "view") + ", " +
+                format_count(robot.graph().edges().size(), "edge") + " from " +
                 (robot.origin() == RobotNavigatorOptions::GraphOrigin::arrangement
                      ? "a new arrangement (panonav arrange can store one)"
                      : "the memory's " + std::string(to_string(robot.origin()))));
@@ -255,6 +256,15 @@ void require_known_goal(const NavigateArguments& arguments, const RobotNavigator
     throw FileError(arguments.memory,
                     "does not contain the position of the view " + robot.info(robot.goal()).name +
                         ", so the middle of the path is unknown; leave out --kidnap");
+  }
+}
+
+void print_decision(const NavigationDecision& decision, const Pose2& pose,
+                    const RobotNavigator& robot, Session& session) {
+  if (session.json()) {
+    session.print(json_line(to_json(decision, pose, robot)));
+  } else if (!decision.events.empty()) {
+    session.print(format_line(decision, robot));
   }
 }
 
@@ -294,9 +304,7 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
   for (const auto& warning : place.scene.warnings) session.note("warning: " + warning);
   const auto seed = static_cast<std::uint64_t>(arguments.simulation.simulation.scene.seed);
   const simulation::Mission mission = make_mission(arguments, robot.goal(), place, seed);
-  if (!session.json()) {
-    print_graph(robot, session);
-  }
+  if (!session.json()) print_graph(robot, session);
   const simulation::MissionRun run = simulation::run_mission(
       place, remembered, robot.navigator(), mission, arguments.mission, seed,
       [&](const NavigationDecision& decision, const Pose2& pose) {
@@ -304,16 +312,11 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
           record.add(moments.make(decision, pose, place.scene));
           moments.restart_clock();
         }
-        if (session.json()) {
-          session.print(json_line(to_json(decision, pose, robot)));
-        } else if (!decision.events.empty()) {
-          session.print(format_line(decision, robot));
-        }
+        print_decision(decision, pose, robot, session);
       },
       [&] { return set_goal_of_viewer(robot, remembered, record, session); });
   record.close();
-  const std::string goal_file =
-      robot.info(robot.goal()).name;  // a viewer may have changed the goal
+  const std::string goal_file = robot.info(robot.goal()).name;  // may have changed in the viewer
   write_results(arguments, place, remembered, robot.goal(), goal_file, run, replay_page);
   if (session.json()) {
     session.print(json_line(summary_json(arguments, robot, goal_file, mission.start, run)));
@@ -383,7 +386,9 @@ Run declare_navigate(Arguments& arguments) {
 }  // namespace
 
 Verb navigate_verb() {
-  return {"navigate", "Drive a simulated robot to a stored view with only its images",
+  return {"navigate",
+          VerbGroup::experiments,
+          "Drive a simulated robot to a stored view by images",
           "The simulated robot uses the same camera as the views of the memory. Poses in the "
           "memory are only used to measure the final distance from the goal, and to find the views "
           "on the route of --route. The exit code is 1 if the robot does not arrive because its "

@@ -2,9 +2,11 @@
 #include <map>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/mapping/sparse_memory.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 
 namespace panonav::command {
 
@@ -54,17 +56,17 @@ void print_loss(const PruneArguments& arguments, const SparseSelection::Loss& lo
                 std::size_t before, std::size_t kept, double factor, std::size_t outdated,
                 const std::vector<std::string>& names, Session& session) {
   session.print(std::string(arguments.dry_run ? "would keep " : "kept ") +
-                session.bold(std::to_string(kept)) + " of " + std::to_string(before) +
-                " views: " + format_fixed(factor, 1) + " times fewer" +
-                (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
+                session.bold(std::to_string(kept)) + " of " + format_count(before, "view") + ": " +
+                format_fixed(factor, 1) + " times fewer" +
+                (outdated > 0 ? "; " + std::to_string(outdated) + " outdated" : ""));
   if (arguments.dry_run) {
     for (const std::string& name : names) session.print("  would delete  " + name);
   }
   if (loss.positions) {
     session.print("nearest reference of a deleted view  median " +
-                  format_fixed(loss.positions->median_after_m, 3) + " m (before " +
+                  session.format_length(loss.positions->median_after_m, 3) + " (before " +
                   format_fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
-                  format_fixed(loss.positions->p95_after_m, 3) + " m (before " +
+                  session.format_length(loss.positions->p95_after_m, 3) + " (before " +
                   format_fixed(loss.positions->p95_before_m, 3) + ")");
   } else if (loss.queries > 0) {
     session.print("deleted views differ from similar kept views by " +
@@ -75,8 +77,9 @@ void print_loss(const PruneArguments& arguments, const SparseSelection::Loss& lo
 ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Session& session) {
   auto file = MemoryFile::open(arguments.memory,
                                arguments.dry_run ? Access::read_only : Access::read_write);
+  session.set_length_unit(read_length_unit(file));
   const VisualMemory memory = file.load();
-  session.detail(std::to_string(memory.size()) + " views loaded");
+  session.detail(format_count(memory.size(), "view") + " loaded");
   reject_options_without_effect(declared, arguments.memory, memory);
   const SparseSelection selection = select_references(memory, arguments.options);
   session.detail("redundant views: " + std::to_string(selection.redundant.size()));
@@ -103,22 +106,22 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
           for (const auto& [name, map] : maps) file.save_map(name, map);
           learn_and_store_models(file);
         },
-        "prune: " + std::to_string(dropped.size()) + " views deleted");
+        "prune: " + format_count(dropped.size(), "view") + " deleted");
   }
   const double factor = selection.kept.empty() ? 1.0
                                                : static_cast<double>(memory.size()) /
                                                      static_cast<double>(selection.kept.size());
   if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", arguments.memory},
-                                         {"dry_run", arguments.dry_run},
-                                         {"views_before", memory.size()},
-                                         {"views", selection.kept.size()},
-                                         {"dropped", names},
-                                         {"outdated", outdated},
-                                         {"factor", factor},
-                                         {"median_difference", loss.median_difference},
-                                         {"queries", loss.queries},
-                                         {"position_error", to_json(loss.positions)}}));
+    session.print(session.json_line(ordered_json{{"memory", arguments.memory},
+                                                 {"dry_run", arguments.dry_run},
+                                                 {"views_before", memory.size()},
+                                                 {"views", selection.kept.size()},
+                                                 {"dropped", names},
+                                                 {"outdated", outdated},
+                                                 {"factor", factor},
+                                                 {"median_difference", loss.median_difference},
+                                                 {"queries", loss.queries},
+                                                 {"position_error", to_json(loss.positions)}}));
     return ExitCode::done;
   }
   print_loss(arguments, loss, memory.size(), selection.kept.size(), factor, outdated, names,
@@ -136,13 +139,18 @@ Run declare_prune(Arguments& arguments) {
                  "List the views that would be deleted, but do not change the memory");
   arguments.options("prune", values->options);
   arguments.show_in_help({"--max-difference", "--reach-m", "--outdated-within-m"});
+  arguments.explain_interruption(
+      "The memory is as before. To start over, run the same command again.",
+      [values] { return !values->dry_run; });
   return [values, &arguments](Session& session) { return prune(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb prune_verb() {
-  return {"prune", "Delete redundant views of a memory",
+  return {"prune",
+          VerbGroup::memory,
+          "Delete redundant views of a memory",
           "A view is deleted if a newer view near it differs from it by at most --max-difference. "
           "The verb reports how much smaller the memory becomes, and the distance to the nearest "
           "view before and after the deletion. panonav undo restores deleted views.",

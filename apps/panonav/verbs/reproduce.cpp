@@ -117,6 +117,8 @@ Run declare_reproduce(Arguments& arguments) {
                    "For m03: run only this part of the experiments (default: all parts)");
   arguments.hide_from_help({"--queries", "--rows", "--only"});
   arguments.declare_outputs({"--out"});
+  arguments.explain_interruption(
+      "Reports of finished papers are kept. Run the same command again; with all, add --continue.");
   return [values](Session& session) { return reproduce(*values, session); };
 }
 
@@ -124,7 +126,8 @@ Run declare_reproduce(Arguments& arguments) {
 
 Verb reproduce_verb() {
   return {"reproduce",
-          "Run the experiments of a paper and compare the results with the published results",
+          VerbGroup::experiments,
+          "Run the experiments of a paper and compare the results",
           "The verb writes images, results.json, results.md and index.html into the folder. The "
           "full run of a paper takes minutes. 'all' runs every paper in a separate folder and "
           "writes a table with all results. The exit code is 0 even if a result misses its target.",

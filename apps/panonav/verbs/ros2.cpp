@@ -4,6 +4,7 @@
 #include "cli/option_values.hpp"
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav_ros2/localisation_node.hpp"
 #include "panonav_ros2/ros_arguments.hpp"
 #include "runs/recording.hpp"
@@ -101,8 +102,9 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
     arguments.setup.participant.remappings.insert_or_assign(from, to);
   }
   if (arguments.teach) {
-    const auto pictures = make_picture_source(arguments.pictures);
+    const auto pictures = make_picture_source(arguments.pictures, session);
     if (!pictures) throw UsageError("set --kind to the type of the images");
+    note_default_band(*pictures, session);
     arguments.setup.teacher = arguments.teacher;
     arguments.setup.teacher->pictures = *pictures;
     arguments.setup.teacher->route = arguments.route;
@@ -122,11 +124,11 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
   node.run();
   running = nullptr;
   const auto counts = node.counts();
-  session.note(std::to_string(counts.pictures) + " images, localised at " +
+  session.note(format_count(counts.pictures, "image") + ", localised at " +
                std::to_string(counts.localised) + ", " +
-               (arguments.teach ? std::to_string(counts.taught) + " views stored, " : "") +
-               std::to_string(counts.dropped) + " came too fast and were dropped, " +
-               std::to_string(counts.notes) + " warnings");
+               (arguments.teach ? format_count(counts.taught, "view") + " stored, " : "") +
+               std::to_string(counts.dropped) + " dropped because of too fast a rate, " +
+               format_count(counts.notes, "warning"));
   return ExitCode::done;
 }
 
@@ -158,7 +160,7 @@ Run declare_ros2(Arguments& arguments) {
   arguments.options("preprocessing", values->teacher.preprocessing);
   arguments.options("ros2", setup.node);
   arguments.options("monte_carlo", setup.tracker.filter);
-  arguments.options("odometry", setup.tracker.odometry, "odometry");
+  arguments.options("odometry", setup.tracker.odometry.emplace(), "odometry");
   arguments.options("base", setup.navigator.base);
   arguments.reject_options_unless(
       {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
@@ -174,6 +176,7 @@ Run declare_ros2(Arguments& arguments) {
 
 Verb ros2_verb() {
   return {"ros2",
+          VerbGroup::localisation,
           "Run a ROS 2 node that localises a robot",
           "The node reads the topics image, odom, initialpose and goal_pose. The node publishes "
           "the transform map -> odom on /tf, and the pose, particles, reference views, best match "

@@ -20,8 +20,7 @@ namespace {
 struct FollowArguments {
   std::string memory;
   std::string dataset;
-  InputOptions::Topics topics;
-  PartArguments part;
+  RunArguments run;
   std::optional<std::string> name;
   int every = 1;
   bool no_odometry = false;
@@ -74,11 +73,12 @@ ordered_json to_json(const FollowedImage& image, bool headings_known) {
 std::string format_line(const FollowedImage& image, Session& session) {
   if (!image.fix) return image.file + "  " + session.red("not on this route");
   const RouteFix& fix = *image.fix;
-  std::string line = image.file + "  " + session.green(to_string(image.fix->origin)) + "  x " +
-                     format_fixed(fix.pose.x_m, 3) + " m  y " + format_fixed(fix.pose.y_m, 3) +
-                     " m  heading " + format_fixed(degrees(fix.pose.heading_rad), 1) +
-                     " degrees  along " + format_fixed(image.fix->along_m, 3) + " m  lateral " +
-                     format_fixed(image.fix->lateral_m, 3) + " m  correlation " +
+  std::string line = image.file + "  " + session.green(format_origin(image.fix->origin)) + "  x " +
+                     session.format_length(fix.pose.x_m, 3) + "  y " +
+                     session.format_length(fix.pose.y_m, 3) + "  heading " +
+                     format_fixed(degrees(fix.pose.heading_rad), 1) + " degrees  along " +
+                     session.format_length(image.fix->along_m, 3) + "  lateral " +
+                     session.format_length(image.fix->lateral_m, 3) + "  correlation " +
                      format_fixed(fix.correlation, 3);
   for (const RouteChanges::AzimuthRange& range : image.changed) {
     line += "  changed at " + format_fixed(degrees(range.from_rad), 0) + " to " +
@@ -99,16 +99,18 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   session.print(
       "on the route at " +
       session.bold(std::to_string(summary.on_route) + " of " + std::to_string(summary.images)) +
-      " images: " + std::to_string(summary.predicted) + " as predicted, " +
+      " images: " + std::to_string(summary.predicted) + " predicted, " +
       std::to_string(summary.recovered) + " recovered, " + std::to_string(summary.searched) +
-      " found by search");
-  print_error("error of position      ", summary.position_m, 1.0, 4, " m", session);
-  print_error("error along the route  ", summary.along_m, 1.0, 4, " m", session);
-  print_error("lateral error          ", summary.lateral_m, 1.0, 4, " m", session);
+      " found");
+  if (summary.on_route > 0) session.print(std::string("(") + std::string(origin_explanation) + ")");
+  const std::string unit = std::string(" ") + to_string(session.length_unit());
+  print_error("error of position      ", summary.position_m, 1.0, 4, unit, session);
+  print_error("error along the route  ", summary.along_m, 1.0, 4, unit, session);
+  print_error("lateral error          ", summary.lateral_m, 1.0, 4, unit, session);
   print_error("error of heading       ", summary.heading_rad, degrees(1.0), 2, " degrees", session);
   for (const auto& [from_m, to_m] : find_changed_sections(images)) {
-    session.print("changed scene from " + format_fixed(from_m, 2) + " to " + format_fixed(to_m, 2) +
-                  " m along the route");
+    session.print("changed scene from " + format_fixed(from_m, 2) + " to " +
+                  session.format_length(to_m, 2) + " along the route");
   }
 }
 
@@ -116,16 +118,16 @@ void write_fixes(const std::string& path, const std::vector<FollowedImage>& imag
                  const std::vector<double>& seconds) {
   std::vector<StampedPose> trajectory;
   for (const FollowedImage& image : images) {
-    if (image.fix) trajectory.push_back({seconds[image.index], image.fix->pose});
+    if (image.fix)
+      append_pose(trajectory, {seconds[image.index], image.fix->pose}, path, image.file);
   }
   write_trajectory(path, trajectory);
 }
 
 ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments, Session& session) {
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
-  const Dataset run =
-      open_run(arguments.dataset, arguments.topics, arguments.part, memory, session);
-  if (odometry_poses(run).empty()) {
+  const Dataset run = open_run(arguments.dataset, arguments.run, memory, session);
+  if (!has_odometry(run)) {
     declared.reject_options({"--recovery-m", "--surprise-m"},
                             "as " + arguments.dataset + " has no odometry");
   }
@@ -133,9 +135,13 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
                          {.name = arguments.name,
                           .tracker = arguments.tracker,
                           .fit = arguments.fit,
-                          .use_odometry = !arguments.no_odometry && !odometry_poses(run).empty()});
-  // The poses of a data set are no ground truth for a route in the frame of its odometry.
-  const auto truth = follower.source().from_odometry ? std::vector<Pose2>{} : dataset_poses(run);
+                          .use_odometry = !arguments.no_odometry && has_odometry(run)});
+  // The poses of a data set are no ground truth for a route in another frame: of odometry or a map.
+  const bool is_unscaled = follower.source().assumed_unit_m.has_value();
+  if (is_unscaled) session.set_length_unit(LengthUnit::view_steps);
+  const bool is_other_frame =
+      follower.source().from_odometry || is_unscaled || has_positions_from_map(memory);
+  const auto truth = is_other_frame ? std::vector<Pose2>{} : dataset_poses(run);
   const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
   std::vector<double> seconds;
   if (arguments.tum)
@@ -150,9 +156,9 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   viewer::RunPage replay_page(
       "", (run.entries.size() - 1) / static_cast<std::size_t>(arguments.every) + 1);
   follow(follower, run, truth, arguments.every, panorama_reader ? &*panorama_reader : nullptr,
-         session.executor(), [&](FollowedImage&& image) {
+         session, [&](FollowedImage&& image) {
            progress.clear();
-           session.print(session.json() ? json_line(to_json(image, headings_known))
+           session.print(session.json() ? session.json_line(to_json(image, headings_known))
                                         : format_line(image, session));
            if (arguments.report) {
              recordings::RunMoment moment = *image.moment;
@@ -172,8 +178,10 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   if (!session.json()) print_summary(summary, images, session);
   if (arguments.report) {
     const auto panorama = memory.route(follower.name());
-    write_follow_report(*arguments.report, {follower.name(), *panorama, follower.tracker().lines()},
-                        images, summary, std::move(replay_page));
+    write_follow_report(
+        *arguments.report,
+        {follower.name(), *panorama, follower.tracker().lines(), session.length_unit()}, images,
+        summary, std::move(replay_page));
     print_report_path(*arguments.report, session);
   }
   return summary.on_route > 0 ? ExitCode::done : ExitCode::no_answer;
@@ -185,8 +193,9 @@ Run declare_route_follow(Arguments& arguments) {
   arguments.positional("DATASET", values->dataset,
                        "Data set, folder of images, video or recording of a later drive, with "
                        "images in the order of the drive");
-  declare_topics(arguments, values->topics);
-  declare_part(arguments, values->part, false);
+  declare_topics(arguments, values->run.topics);
+  declare_part(arguments, values->run.part, false);
+  declare_gpano(arguments, values->run.ignore_gpano);
   arguments.option("--name NAME", values->name,
                    "Name of the route; needed if the memory contains several routes");
   arguments.option("--every N", values->every, 1,
@@ -214,13 +223,16 @@ Run declare_route_follow(Arguments& arguments) {
 }  // namespace
 
 Verb route_follow_verb() {
-  return {"route follow", "Find the position of a robot relative to a recorded route",
+  return {"route follow",
+          VerbGroup::maps_and_routes,
+          "Find the position of a robot relative to a recorded route",
           "From the recorded lines of the route, the verb predicts the images at other poses, and "
           "searches for the pose whose predicted image agrees best with the image of the robot. "
           "The robot may also be between the lines or beside the route. If the data set has "
-          "odometry, the search starts at the pose that the odometry predicts. If this search "
-          "fails, the verb searches near this pose, and then along the whole route. Parts of the "
-          "scene that have changed are ignored and reported. The exit code is 1 if no image can be "
+          "odometry, the search starts at the pose that the odometry predicts (in the output: "
+          "predicted). If this search fails, the verb searches near this pose (recovered), and "
+          "then along the whole route (found). Parts of the scene that have changed are ignored "
+          "and reported. The exit code is 1 if no image can be "
           "located on the route.",
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"

@@ -19,12 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* position_columns = "x_m,y_m,heading_deg";
-constexpr const char* position_values = "1.5,0.25,90";
-
 struct RecordArguments {
-  std::string dataset;
   std::string memory;
+  std::string dataset;
   PictureArguments pictures;
   std::string name = "route";
   std::optional<double> every_m;
@@ -50,37 +47,51 @@ std::pair<int, int> parse_rows(const std::string& text) {
                    "'; allowed: FIRST-LAST, rows from 0 at the top, such as 17-20");
 }
 
-/// Returns the poses of the data set, or of its odometry, and sets `from_odometry`. Throws
-/// FileError if there are none.
-std::vector<Pose2> choose_poses(const RecordArguments& arguments, const Dataset& dataset,
-                                bool& from_odometry, Session& session) {
-  from_odometry = false;
-  if (!arguments.odometry) {
-    auto poses = dataset_poses(dataset);
-    if (!poses.empty()) {
-      if (!dataset.entries.front().pose->heading_rad) {
-        session.note("panonav route record: " + arguments.dataset +
-                     " contains no headings; the direction of travel is used");
+/// Finds the poses of the drive and prints a note about poses that were computed. Throws FileError
+/// if there are none.
+DrivePoses find_poses(const Arguments& declared, const RecordArguments& arguments,
+                      const Dataset& dataset, const MemoryFile& memory, Session& session) {
+  DrivePoses found =
+      find_drive_poses(dataset, memory, arguments.name, arguments.odometry, session.executor());
+  if (found.assumed_unit_m) {
+    session.set_length_unit(LengthUnit::view_steps);
+    declared.reject_options({"--every-m"},
+                            "because the positions are in view steps, not metres "
+                            "(panonav scale)");
+  }
+  const std::string lead = "panonav route record: " + arguments.dataset;
+  const std::size_t left_out = dataset.entries.size() - found.drive.entries.size();
+  const std::string rest = left_out > 0 ? "; " + format_count(left_out, "image") +
+                                              " left out, not connected with the others"
+                                        : "";
+  const auto note_left_out = [&](const std::string& what) {
+    if (left_out == 0) return;
+    session.note(lead + ": " + std::to_string(left_out) + " of " +
+                 format_count(dataset.entries.size(), "image") + " have no " + what +
+                 " and are left out");
+  };
+  switch (found.origin) {
+    case RoutePoseOrigin::data_set:
+      note_left_out("position");
+      if (!found.drive.entries.front().pose->heading_rad) {
+        session.note(lead + " contains no headings; the direction of travel is used");
       }
-      return poses;
-    }
+      break;
+    case RoutePoseOrigin::odometry:
+      note_left_out("odometry");
+      break;
+    case RoutePoseOrigin::map:
+      session.note(lead +
+                   " has neither positions nor odometry; the poses are those of the map of " +
+                   arguments.memory + rest);
+      break;
+    case RoutePoseOrigin::images:
+      session.note(lead +
+                   " has neither positions nor odometry; the motion is computed from the images" +
+                   rest);
+      break;
   }
-  auto poses = odometry_poses(dataset);
-  if (poses.empty()) {
-    throw FileError(
-        arguments.dataset,
-        arguments.odometry
-            ? "has no odometry; allowed for --odometry: a table with the columns "
-              "'odom_x_m', 'odom_y_m' and 'odom_heading_deg'"
-            : "has neither positions nor odometry" +
-                  (can_have_table(arguments.dataset)
-                       ? explain_columns(arguments.dataset, position_columns, position_values) +
-                             "; or odom_x_m,odom_y_m,odom_heading_deg instead"
-                       : "; a recording of topics needs odometry (nav_msgs/Odometry or TF) or "
-                         "poses (/ground_truth)"));
-  }
-  from_odometry = true;
-  return poses;
+  return found;
 }
 
 std::string format_rows(const std::optional<std::pair<int, int>>& rows) {
@@ -112,6 +123,32 @@ void set_line_options(const Arguments& declared, const RecordArguments& argument
   }
 }
 
+void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recorded& recorded,
+                    std::uint64_t file_bytes, Session& session) {
+  const double length_m = recorded.route.length_m();
+  const double bytes_per_km = recorded.bytes_per_km();
+  const bool is_metric = session.length_unit() == LengthUnit::metres;
+  if (session.json()) {
+    session.print(session.json_line(
+        ordered_json{{"memory", arguments.memory},
+                     {"route", arguments.name},
+                     {"appended", recorded.appended},
+                     {"lines", recorded.route.size()},
+                     {"columns", recorded.route.columns()},
+                     {"length_m", length_m},
+                     {"bytes", recorded.bytes},
+                     {"bytes_per_km", is_metric ? ordered_json(bytes_per_km) : ordered_json()},
+                     {"file_bytes", file_bytes}}));
+    return;
+  }
+  session.print(session.bold(format_count(recorded.appended, "line")) + " recorded; route '" +
+                arguments.name + "' in " + arguments.memory + " has " +
+                std::to_string(recorded.route.size()) + " over " +
+                session.format_length(length_m, 2) +
+                (is_metric ? ", " + format_fixed(1e-6 * bytes_per_km, 2) + " MB per kilometre"
+                           : ", " + std::to_string(recorded.bytes) + " bytes"));
+}
+
 ExitCode record(const Arguments& declared, const RecordArguments& arguments, Session& session) {
   if (arguments.every_m && !(*arguments.every_m >= 0.0)) {
     throw UsageError("--every-m is " + to_text(*arguments.every_m) + "; allowed: 0 or more");
@@ -121,44 +158,41 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   if (memory_exists(arguments.memory))
     memory = MemoryFile::open(arguments.memory, Access::read_write);
   const Dataset dataset =
-      read_dataset_with_columns(arguments.dataset, arguments.pictures,
-                                memory ? std::optional(memory->header().source) : std::nullopt,
-                                position_columns, position_values, session);
+      open_recording(arguments.dataset, arguments.pictures,
+                     memory ? std::optional(memory->header().source) : std::nullopt, session);
   set_line_options(declared, arguments, dataset.source, memory, options);
-  const auto poses = choose_poses(arguments, dataset, options.odometry, session);
   if (arguments.report) prepare_report_folder(*arguments.report, "route record");
+  const bool is_new = !memory;
   // Sets the image layout of a new file now, so that views can be memorised into it later.
-  RouteRecorder recorder(
-      memory ? std::move(*memory)
-             : MemoryFile::create(arguments.memory,
-                                  make_header_from_recording(dataset, {}, {}, session.executor())),
-      dataset.source, options);
-  std::optional<Progress> bar;
-  const auto recorded = recorder.record(dataset, poses, session.executor(), [&](std::size_t lines) {
-    if (!bar) bar.emplace(session, "recording", lines);
-    bar->advance();
-  });
-  bar.reset();
-  const double length_m = recorded.route.length_m();
-  const double bytes_per_km = recorded.bytes_per_km();
-  if (arguments.report)
-    write_record_report(*arguments.report, arguments.name, recorded.route, bytes_per_km);
-  if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", arguments.memory},
-                                         {"route", arguments.name},
-                                         {"appended", recorded.appended},
-                                         {"lines", recorded.route.size()},
-                                         {"columns", recorded.route.columns()},
-                                         {"length_m", length_m},
-                                         {"bytes", recorded.bytes},
-                                         {"bytes_per_km", bytes_per_km},
-                                         {"file_bytes", recorder.memory().info().file_bytes}}));
-    return ExitCode::done;
+  if (is_new) {
+    memory = MemoryFile::create(arguments.memory,
+                                make_header_from_recording(dataset, {}, {}, session.executor()));
   }
-  session.print(session.bold(std::to_string(recorded.appended)) + " lines recorded; route '" +
-                arguments.name + "' in " + arguments.memory + " has " +
-                std::to_string(recorded.route.size()) + " over " + format_fixed(length_m, 2) +
-                " m, " + format_fixed(1e-6 * bytes_per_km, 2) + " MB per kilometre");
+  const DrivePoses drive = [&] {
+    try {
+      return find_poses(declared, arguments, dataset, *memory, session);
+    } catch (...) {
+      memory.reset();
+      std::error_code ignored;
+      if (is_new) fs::remove(arguments.memory, ignored);
+      throw;
+    }
+  }();
+  options.odometry =
+      drive.origin == RoutePoseOrigin::odometry || drive.origin == RoutePoseOrigin::images;
+  options.assumed_unit_m = drive.assumed_unit_m;
+  RouteRecorder recorder(std::move(*memory), dataset.source, options);
+  std::optional<Progress> bar;
+  const auto recorded =
+      recorder.record(drive.drive, drive.poses, session.executor(), [&](std::size_t lines) {
+        if (!bar) bar.emplace(session, "recording", lines);
+        bar->advance();
+      });
+  bar.reset();
+  if (arguments.report)
+    write_record_report(*arguments.report, arguments.name, recorded, session.length_unit());
+  print_recorded(arguments, recorded, recorder.memory().info().file_bytes, session);
+  if (session.json()) return ExitCode::done;
   if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&
       !recorder.source().horizon_rows) {
     session.print(
@@ -171,10 +205,11 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
 
 Run declare_route_record(Arguments& arguments) {
   auto values = std::make_shared<RecordArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file (NAME.panonav), new or existing");
   arguments.positional(
       "DATASET", values->dataset,
-      "Data set or recording with positions or odometry, with images in the order of the drive");
-  arguments.positional("MEMORY", values->memory, "Memory file (NAME.panonav), new or existing");
+      "Data set, folder of images, video or recording with images in the order of the drive. If it "
+      "has neither positions nor odometry, the motion is computed from the images");
   arguments.option("--name NAME", values->name,
                    "Name of the route; an existing route is continued");
   arguments.option("--every-m METRES", values->every_m,
@@ -187,19 +222,23 @@ Run declare_route_record(Arguments& arguments) {
   declare_report(arguments, values->report, "a page with all lines of the route as one image");
   declare_pictures(arguments, values->pictures);
   arguments.options("line", values->line);
+  arguments.explain_interruption(
+      "Lines stored so far are kept. To continue, run the same command again.");
   return [values, &arguments](Session& session) { return record(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb route_record_verb() {
-  return {"route record", "Record a route as lines of pixels at equal distances",
+  return {"route record",
+          VerbGroup::maps_and_routes,
+          "Record a route as lines of pixels at equal distances",
           "A line of pixels shows the horizon all around the robot at one place of the route. A "
           "line has one byte per degree, and one kilometre of route needs a few megabytes. Lines "
           "are stored in batches. To continue after an interruption, run the same command again. A "
           "recording that starts at the end of the route extends the route.",
-          "  panonav route record teach_run office.panonav\n"
-          "  panonav route record teach_run office.panonav --name corridor --odometry --report "
+          "  panonav route record office.panonav teach_run\n"
+          "  panonav route record office.panonav teach_run --name corridor --odometry --report "
           "corridor",
           declare_route_record};
 }

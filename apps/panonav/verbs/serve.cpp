@@ -107,8 +107,10 @@ Run declare_serve(Arguments& arguments) {
   arguments.option("--listen PORT", values->listen,
                    "Port for programs on this computer (0: any free port); with ADDRESS:PORT, "
                    "other computers in this network can also connect");
-  arguments.option("--token-file FILE", values->token_file,
-                   "Answer only clients that send the first line of this file as bearer token");
+  arguments.option(
+      "--token-file FILE", values->token_file,
+      "Answer only clients that send the first line of this file as bearer token, or as "
+      "password in a browser");
   arguments.option("--max-waiting", values->max_waiting, 1,
                    "Largest number of images that wait for an answer; more images are "
                    "answered with status 503 (retry later)");
@@ -124,17 +126,21 @@ Run declare_serve(Arguments& arguments) {
 }  // namespace
 
 Verb serve_verb() {
-  return {"serve", "Run an HTTP server that finds the position and heading of a robot from images",
-          "Clients send a PNG or JPEG image with POST to /v1/memories/NAME/localise and receive "
-          "the same JSON as panonav localise --json prints. GET /v1/memories lists the memories. "
-          "GET /health reports whether the server is ready. GET /metrics returns metrics for "
-          "Prometheus. If the file of a memory changes, the server loads it again. The server does "
-          "not use encryption. If other computers can reach the server, put a proxy with "
-          "encryption in front of it.",
-          "  panonav serve office.panonav\n"
-          "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
-          "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",
-          declare_serve};
+  return {
+      "serve",
+      VerbGroup::localisation,
+      "Run an HTTP server that localises robots from images",
+      "A browser that opens the address shows a page where you can choose or photograph an image. "
+      "Other clients send a PNG or JPEG image with POST to /v1/memories/NAME/localise and receive "
+      "the same JSON as panonav localise --json prints. GET /v1/memories lists the memories. "
+      "GET /health reports whether the server is ready. GET /metrics returns metrics for "
+      "Prometheus. If the file of a memory changes, the server loads it again. The server does "
+      "not use encryption. If other computers can reach the server, put a proxy with "
+      "encryption in front of it.",
+      "  panonav serve office.panonav\n"
+      "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
+      "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",
+      declare_serve};
 }
 
 }  // namespace panonav::command

@@ -5,6 +5,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/mapping/topological_map.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
 namespace panonav::command {
@@ -90,13 +91,16 @@ void print_view(const ordered_json& view, Session& session) {
   const auto number = [](const ordered_json& value, int digits) {
     return format_fixed(value.get<double>(), digits);
   };
+  const auto length = [&](const ordered_json& value) {
+    return session.format_length(value.get<double>(), 2);
+  };
   const auto name_in = [](const ordered_json& json, const char* key) {
     return to_readable_line(json[key].get<std::string>());
   };
   session.print(session.bold(name_in(view, "name")) + ", view " + view["id"].dump());
   std::string place = "not known";
   if (const auto& pose = view["pose"]; !pose.is_null()) {
-    place = "x " + number(pose["x_m"], 2) + " m, y " + number(pose["y_m"], 2) + " m";
+    place = "x " + length(pose["x_m"]) + ", y " + length(pose["y_m"]);
     const auto& heading = pose["heading_rad"];
     if (!heading.is_null()) place += ", heading " + format_fixed(degrees(heading), 1) + " degrees";
   }
@@ -121,20 +125,22 @@ void print_view(const ordered_json& view, Session& session) {
       if (other.contains("dissimilarity")) {
         line += ", dissimilarity " + other["dissimilarity"].dump();
       }
-      if (!other["distance_m"].is_null()) line += ", " + number(other["distance_m"], 2) + " m away";
+      if (!other["distance_m"].is_null()) line += ", " + length(other["distance_m"]) + " away";
       session.print(line);
       begin.clear();
     }
   }
   for (const auto& map : view["maps"]) {
-    session.print("  in " + name_in(map, "map") + ", component " +
-                  map["connected_component"].dump() + ": x " + number(map["pose"]["x_m"], 2) +
-                  ", y " + number(map["pose"]["y_m"], 2) + ", " + map["edges"].dump() + " edges");
+    session.print("  in " + name_in(map, "map") + ", part " +
+                  std::to_string(map["connected_component"].get<std::uint64_t>() + 1) + ": x " +
+                  number(map["pose"]["x_m"], 2) + ", y " + number(map["pose"]["y_m"], 2) + ", " +
+                  map["edges"].dump() + " edges");
   }
 }
 
 ExitCode show(const ShowArguments& arguments, Session& session) {
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
+  session.set_length_unit(read_length_unit(file));
   const ViewId view = find_view_by_name_or_id(file, arguments.view);
   const VisualMemory memory = file.load();
   const ReferenceInfo& info = memory.info(view);
@@ -168,7 +174,7 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
                           {"height_px", picture ? picture->height() : 0}};
   }
   if (session.json()) {
-    session.print(json_line(shown));
+    session.print(session.json_line(shown));
     return ExitCode::done;
   }
   print_view(shown, session);
@@ -189,7 +195,9 @@ Run declare_show(Arguments& arguments) {
 }  // namespace
 
 Verb show_verb() {
-  return {"show", "Show all data that a memory stores about a view",
+  return {"show",
+          VerbGroup::memory,
+          "Show all data that a memory stores about a view",
           "The output contains the pose, links, positions in maps and stored size of the view. The "
           "output also lists the five most similar and the five nearest views.",
           "  panonav show office.panonav view_00012.png\n"

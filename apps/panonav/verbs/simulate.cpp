@@ -4,6 +4,7 @@
 #include "cli/option_values.hpp"
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "runs/ros2_robot.hpp"
@@ -95,9 +96,9 @@ ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Sessio
   const std::string out = arguments.ros2 ? "" : arguments.out.front();
   apply_path_options(declared, arguments);
   if (!arguments.ros2) require_new_folder(out);
-  const simulation::SimulatedWorld world(arguments.scene, arguments.simulation,
-                                         make_option_lookup(declared), session.executor());
-  for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
+  const simulation::SimulatedWorld world(
+      arguments.scene, arguments.simulation, make_option_lookup(declared), session.executor(),
+      [&](const std::string& warning) { session.note("warning: " + warning); });
   if (arguments.ros2) return arguments.robot.run(world, session);
   const auto poses = arguments.trajectory ? read_poses(*arguments.trajectory, world) : world.plan();
   const bool with_path = arguments.trajectory.has_value() ||
@@ -123,9 +124,9 @@ ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Sessio
                                          {"free_area_m2", world.free_space().area_m2()},
                                          {"warnings", world.scene().warnings}}));
   } else {
-    session.print(session.bold(std::to_string(dataset.entries.size())) + " views of " +
+    session.print(session.bold(format_count(dataset.entries.size(), "view")) + " of " +
                   world.scene().name + " in " + out);
-    session.suggest({"panonav", "memorise", out, "NAME.panonav"});
+    session.suggest({"panonav", "memorise", "NAME.panonav", out});
   }
   return ExitCode::done;
 }
@@ -190,7 +191,9 @@ Run declare_simulate_verb(Arguments& arguments) {
 }  // namespace
 
 Verb simulate_verb() {
-  return {"simulate", "Make a data set with the images of a simulated robot",
+  return {"simulate",
+          VerbGroup::experiments,
+          "Make a data set with the images of a simulated robot",
           "Each image has a time stamp and noisy odometry, unless the poses are random. The same "
           "options and seeds give the same images on the same type of processor.",
           "  panonav simulate office memory_run --grid 0.25\n"

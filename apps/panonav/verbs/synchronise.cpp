@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav_fleet/memory_synchronisation.hpp"
 
@@ -91,11 +92,11 @@ ExitCode synchronise(const SynchroniseArguments& arguments, Session& session) {
     return ExitCode::done;
   }
   session.print(arguments.memory + " and " + arguments.server + ": " + describe_report(report) +
-                ". " + arguments.memory + " holds " + std::to_string(report.views) + " views.");
+                ". " + arguments.memory + " holds " + format_count(report.views, "view") + ".");
   if (report.conflicts > 0) {
     session.note((report.conflicts == 1
                       ? "1 change of this file was"
-                      : std::to_string(report.conflicts) + " changes of this file were") +
+                      : format_count(report.conflicts, "change") + " of this file were") +
                  " discarded, because others had changed or removed the same views first");
   }
   if (report.restored) {
@@ -116,6 +117,8 @@ Run declare_synchronise(Arguments& arguments) {
   arguments.option(
       "--within-m", values->within_m,
       "Largest distance in metres from the position of --around to an area that is kept");
+  arguments.explain_interruption(
+      "Changes exchanged so far are kept. To continue, run the same command again.");
   return [values](Session& session) { return synchronise(*values, session); };
 }
 
@@ -123,7 +126,9 @@ Run declare_synchronise(Arguments& arguments) {
 
 Verb synchronise_verb() {
   return {
-      "synchronise", "Synchronise a memory file with a memory on a server",
+      "synchronise",
+      VerbGroup::several_robots,
+      "Synchronise a memory file with a memory on a server",
       "The verb uploads new views and changes from the file, and downloads the changes that other "
       "robots uploaded. Changes concern views with their images and features, poses, names, "
       "deletions and links. If two robots change the same view, the change that the server "

@@ -6,10 +6,12 @@
 #include <utility>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/position_bound.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "reports/report_page.hpp"
 #include "reports/track_report.hpp"
 #include "runs/live_run.hpp"
@@ -40,8 +42,8 @@ void visit_options(StartOptions& options, OptionVisitor& visitor) {
 struct TrackArguments {
   std::string memory;
   std::string dataset;
-  InputOptions::Topics topics;
-  PartArguments part;
+  std::vector<std::string> inputs;  // `dataset` and the videos that continue it
+  RunArguments run;
   int every = 1;
   std::optional<double> start_x_m;
   std::optional<double> start_y_m;
@@ -90,9 +92,10 @@ void set_start(Tracker& tracker, const TrackArguments& arguments) {
   }
 }
 
-ordered_json to_json(const PoseMode& mode) {
+ordered_json to_json(const PoseMode& mode, bool is_heading_known) {
+  const auto heading = is_heading_known ? std::optional(mode.mean.heading_rad) : std::nullopt;
   return {{"weight", mode.weight},        {"x_m", mode.mean.x_m},
-          {"y_m", mode.mean.y_m},         {"heading_rad", mode.mean.heading_rad},
+          {"y_m", mode.mean.y_m},         {"heading_rad", to_json_or_null(heading)},
           {"spread_m", mode.spread_m},    {"heading_spread_rad", mode.heading_spread_rad},
           {"covariance", mode.covariance}};
 }
@@ -100,11 +103,18 @@ ordered_json to_json(const PoseMode& mode) {
 ordered_json to_json(const TrackedImage& image) {
   const MonteCarloEstimate& estimate = image.estimate;
   auto modes = ordered_json::array();
-  for (const PoseMode& mode : estimate.modes) modes.push_back(to_json(mode));
+  const bool is_heading_known = estimate.state != LocalisationState::position_known;
+  for (const PoseMode& mode : estimate.modes) modes.push_back(to_json(mode, is_heading_known));
+  const auto pose =
+      estimate.position
+          ? std::optional(ReferencePose{
+                estimate.position->x_m, estimate.position->y_m,
+                estimate.pose ? std::optional(estimate.pose->heading_rad) : std::nullopt})
+          : std::nullopt;
   return {{"file", image.file},
           {"stamp_s", to_json_or_null(image.stamp_s)},
           {"state", to_string(estimate.state)},
-          {"pose", pose_json(estimate.pose)},
+          {"pose", pose_json(pose)},
           {"inside", estimate.p_inside},
           {"probability", estimate.probability},
           {"modes", std::move(modes)},
@@ -118,54 +128,61 @@ ordered_json to_json(const TrackedImage& image) {
           {"ground_truth", pose_json(image.truth)}};
 }
 
-std::string format_position(const Pose2& pose) {
-  return "x " + format_fixed(pose.x_m, 2) + " m  y " + format_fixed(pose.y_m, 2) + " m";
+std::string format_position(const Pose2& pose, const Session& session) {
+  return "x " + session.format_length(pose.x_m, 2) + "  y " + session.format_length(pose.y_m, 2);
 }
 
 std::string format_line(const TrackedImage& image, Session& session) {
   const MonteCarloEstimate& estimate = image.estimate;
   std::string line = image.file + "  ";
-  const std::string state(to_string(estimate.state));
+  const std::string state = format_state(estimate.state);
   if (estimate.state == LocalisationState::lost || estimate.modes.empty()) {
     return line + session.red(state);
   }
   const PoseMode& best = estimate.modes.front();
   if (is_localised(image)) {
-    return line + session.green(state) + "  " + format_position(*estimate.pose) + "  heading " +
-           format_fixed(degrees(estimate.pose->heading_rad), 1) + " degrees  spread " +
-           format_fixed(best.spread_m, 2) + " m";
+    return line + session.green(state) + "  " + format_position(*estimate.pose, session) +
+           "  heading " + format_fixed(degrees(estimate.pose->heading_rad), 1) +
+           " degrees  spread " + session.format_length(best.spread_m, 2);
+  }
+  if (is_position_known(image)) {
+    return line + session.green(state) + "  " + format_position(best.mean, session) + "  spread " +
+           session.format_length(best.spread_m, 2);
   }
   line += session.bold(state) + "  ";
   if (estimate.modes.size() == 1) {
-    return line + "an area around " + format_position(best.mean) + "  spread " +
-           format_fixed(best.spread_m, 2) + " m";
+    return line + "an area around " + format_position(best.mean, session) + "  spread " +
+           session.format_length(best.spread_m, 2);
   }
   constexpr std::size_t max_shown = 3;
-  line += std::to_string(estimate.modes.size()) + " places:";
+  line += format_count(estimate.modes.size(), "place") + ":";
   for (std::size_t i = 0; i < std::min(max_shown, estimate.modes.size()); ++i) {
     const PoseMode& mode = estimate.modes[i];
-    line += (i > 0 ? ",  " : "  ") + format_position(mode.mean) + " (" +
+    line += (i > 0 ? ",  " : "  ") + format_position(mode.mean, session) + " (" +
             format_fixed(100.0 * mode.weight, 0) + " %)";
   }
   return estimate.modes.size() > max_shown ? line + ", .." : line;
 }
 
-std::string format_count(std::size_t count, std::size_t total) {
-  return std::to_string(count) + " of " + std::to_string(total);
-}
-
 void print_summary(const TrackSummary& summary, Session& session) {
-  const std::size_t total = summary.localised + summary.ambiguous + summary.lost;
-  session.print("localised at " + session.bold(format_count(summary.localised, total)) +
-                " images, ambiguous at " + std::to_string(summary.ambiguous) + ", lost at " +
+  const std::size_t total =
+      summary.localised + summary.position_known + summary.ambiguous + summary.lost;
+  session.print("localised at " +
+                session.bold(std::to_string(summary.localised) + " of " + std::to_string(total)) +
+                " images, " +
+                (summary.position_known > 0 ? "position known without heading at " +
+                                                  std::to_string(summary.position_known) + ", "
+                                            : "") +
+                "ambiguous at " + std::to_string(summary.ambiguous) + ", lost at " +
                 std::to_string(summary.lost) +
                 (summary.first_localised
                      ? "; first localised at image " + std::to_string(*summary.first_localised)
                      : "; never localised"));
   if (!summary.errors_m.empty()) {
-    session.print("error of localised images  median " +
-                  format_fixed(quantile(summary.errors_m, 0.5), 3) + " m  95 % within " +
-                  format_fixed(quantile(summary.errors_m, 0.95), 3) + " m");
+    session.print((summary.position_known > 0 ? "error of known positions   median "
+                                              : "error of localised images  median ") +
+                  session.format_length(quantile(summary.errors_m, 0.5), 3) + "  95 % within " +
+                  session.format_length(quantile(summary.errors_m, 0.95), 3));
   }
   if (!summary.heading_errors_rad.empty()) {
     session.print("error of their headings    median " +
@@ -176,8 +193,14 @@ void print_summary(const TrackSummary& summary, Session& session) {
   }
 }
 
-ExitCode to_exit_code(const TrackSummary& summary) {
-  return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
+/// Returns the exit code. If the position was never known, prints why and the next command.
+ExitCode conclude(const TrackSummary& summary, const TrackArguments& arguments, Session& session) {
+  const std::string why = explain_never_localised(summary, arguments.memory);
+  if (why.empty()) return ExitCode::done;
+  const ExitCode code = session.no_answer("panonav track: never localised: " + why);
+  session.suggest({"panonav", "localise", arguments.memory, arguments.dataset},
+                  "To compare each image with the memory:");
+  return code;
 }
 
 /// Restarts the tracker at the pose that a viewer has set; false if none did.
@@ -195,16 +218,12 @@ bool start_at_viewer_pose(Tracker& tracker, RunRecord& record) {
   return true;
 }
 
-/// `uses_visual_odometry`: the motion is read from the images.
 TrackerOptions make_tracker_options(const Arguments& declared, const TrackArguments& arguments,
-                                    const PictureSource& source, bool uses_visual_odometry) {
-  TrackerOptions options{arguments.filter,
-                         uses_visual_odometry && !declared.is_set("odometry")
-                             ? visual_odometry_noise()
-                             : arguments.odometry,
-                         source};
-  // Visual odometry, reports and records need all views of the memory, so all are loaded.
-  if (uses_visual_odometry || arguments.report || arguments.record.file || arguments.record.view) {
+                                    const PictureSource& source) {
+  TrackerOptions options{.filter = arguments.filter, .odometry = {}, .source = source};
+  if (declared.is_set("odometry")) options.odometry = arguments.odometry;
+  // Reports and records need all views of the memory, so all are loaded.
+  if (arguments.report || arguments.record.file || arguments.record.view) {
     options.max_held_views = std::numeric_limits<std::size_t>::max();
   }
   return options;
@@ -218,14 +237,12 @@ class LiveTrack {
             const PictureSource& source, Session& session)
       : arguments_(arguments),
         session_(session),
-        tracker_(file, make_tracker_options(declared, arguments, source, true)),
-        odometry_(visual_odometry(tracker_.memory())),
+        tracker_(file, make_tracker_options(declared, arguments, source)),
         record_(arguments.record, std::span(&arguments.memory, 1), true, session,
                 {.memory = arguments.memory, .takes = viewer::ViewerInput::pose}) {
-    session.note("panonav track: motion is computed from the images; one unit of the views is " +
-                 format_number(odometry_.scale_m()) + " m, as in the memory");
+    session.note("panonav track: motion is computed from the images");
     set_start(tracker_, arguments);
-    if (record_.is_active()) shown_.emplace(tracker_.memory());
+    if (record_.is_active()) shown_.emplace(tracker_.memory(), session.length_unit());
     settings_ = {.thumbnail_file = &file, .shown_references = shown_ ? &*shown_ : nullptr};
   }
 
@@ -242,15 +259,14 @@ class LiveTrack {
     const FourierSignature view =
         unwarped ? encoder.signature(*unwarped) : encoder.signature(observation);
     clock.stage(unwarped ? "signature" : "unwarping and signature");
-    odometry_.add(OdometryView(view));
-    tracker_.move_to(odometry_.pose());
+    tracker_.move_by_image(view);
     clock.stage("visual odometry");
     const bool is_set_by_viewer = start_at_viewer_pose(tracker_, record_);
     if (number % static_cast<std::size_t>(arguments_.every) != 0) return "";
     if (record_.is_active()) {
       moment_ = record_.make_moment(observation, number);
       moment_->panorama = std::move(unwarped);
-      moment_->odometry = odometry_.pose();
+      moment_->odometry = tracker_.visual_odometry()->pose();
       if (number == 0) shown_->add_to(*moment_);
       clock.add_to(*moment_);
     }
@@ -266,7 +282,7 @@ class LiveTrack {
     if (arguments_.tum && is_localised(image) && is_later) {
       trajectory_.push_back({*observation.stamp_s, *image.estimate.pose});
     }
-    return session_.json() ? json_line(to_json(image)) : format_line(image, session_);
+    return session_.json() ? session_.json_line(to_json(image)) : format_line(image, session_);
   }
   /// Adds the last observed image to the record.
   void record() {
@@ -278,17 +294,17 @@ class LiveTrack {
     record_.close();
     const LiveCounts& counts = loop.finish();
     if (!session_.json()) print_summary(summary_, session_);
-    session_.note(std::to_string(counts.pictures) + " images, " +
-                  std::to_string(odometry_.breaks()) + " steps unread" +
+    const VisualOdometry* const motion = tracker_.visual_odometry();
+    session_.note(format_count(counts.pictures, "image") +
+                  (motion ? ", " + describe_visual_motion(*motion) : "") +
                   describe_events(counts, record_.left_out()));
-    return to_exit_code(summary_);
+    return conclude(summary_, arguments_, session_);
   }
 
  private:
   const TrackArguments& arguments_;
   Session& session_;
   Tracker tracker_;
-  VisualOdometry odometry_;
   RunRecord record_;
   std::optional<ShownReferences> shown_;
   TrackSettings settings_;
@@ -304,7 +320,7 @@ ExitCode track_live(const Arguments& declared, const TrackArguments& arguments,
   const auto source =
       open_live(declared, arguments.dataset, {}, file.header().source, arguments.live, session);
   LiveTrack track(declared, arguments, file, source->pictures(), session);
-  LiveRun loop(*source, arguments.part, arguments.live, session);
+  LiveRun loop(*source, arguments.run.part, arguments.live, session);
   loop.run(
       [&](const Observation& observation) {
         return track.observe(observation, loop.decoding_ms());
@@ -318,35 +334,45 @@ void write_localised_poses(const std::string& path, const std::vector<TrackedIma
                            const std::vector<double>& seconds) {
   std::vector<StampedPose> trajectory;
   for (const TrackedImage& image : images) {
-    if (is_localised(image)) trajectory.push_back({seconds[image.index], *image.estimate.pose});
+    if (!is_localised(image)) continue;
+    append_pose(trajectory, {seconds[image.index], *image.estimate.pose}, path, image.file);
   }
   write_trajectory(path, trajectory);
 }
 
-/// Adds odometry that is computed from the images, and prints a note.
-void estimate_odometry(Dataset& run, const std::string& name, const Tracker& tracker,
-                       Session& session) {
-  session.note("panonav track: " + to_readable_line(name) +
-               " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is computed "
-               "from the images, " +
-               add_visual_odometry(run, tracker.memory(), tracker.encoder(), session.executor()));
+/// Prints a note if the motion is computed from the images.
+void note_motion_from_images(const TrackArguments& arguments, bool has_odometry, bool is_metric,
+                             Session& session) {
+  if (has_odometry && !is_metric) {
+    session.note("panonav track: the positions of " + arguments.memory +
+                 " are in view steps, so the odometry in metres is not used; motion is computed "
+                 "from the images (panonav scale)");
+  } else if (!has_odometry) {
+    session.note(
+        "panonav track: " + to_readable_line(arguments.dataset) +
+        " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is computed "
+        "from the images");
+  }
 }
 
 ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, Session& session) {
   check_arguments(declared, arguments);
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
+  session.set_length_unit(read_length_unit(file));
   if (recordings::is_live(arguments.dataset)) return track_live(declared, arguments, file, session);
   reject_live_options(declared, arguments.dataset, true);
-  Dataset run = open_run(arguments.dataset, arguments.topics, arguments.part, file, session);
-  const bool uses_visual_odometry = odometry_poses(run).empty();
+  Dataset run = open_run(arguments.dataset, arguments.run, file, session);
   std::vector<double> seconds;
   if (arguments.tum)
     seconds = trajectory_stamps(run, "track", arguments.dataset, *arguments.tum, session);
-  Tracker tracker(arguments.memory,
-                  make_tracker_options(declared, arguments, run.source, uses_visual_odometry));
-  if (uses_visual_odometry) estimate_odometry(run, arguments.dataset, tracker, session);
+  Tracker tracker(arguments.memory, make_tracker_options(declared, arguments, run.source));
   set_start(tracker, arguments);
+  const bool is_metric = session.length_unit() == LengthUnit::metres;
+  if (!is_metric) {  // true positions are in metres and cannot be compared
+    for (DatasetEntry& entry : run.entries) entry.pose.reset();
+  }
   TrackSettings settings{.every = arguments.every};
+  note_motion_from_images(arguments, has_odometry(run), is_metric, session);
   if (arguments.report) {
     prepare_report_folder(*arguments.report, "track");
     settings.particles_per_image = count_shown_particles(run.entries.size());
@@ -358,15 +384,15 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   std::optional<ShownReferences> shown_references;
   if (record.is_active() || arguments.report) {
     settings.thumbnail_file = &file;
-    settings.shown_references = &shown_references.emplace(tracker.memory());
+    settings.shown_references = &shown_references.emplace(tracker.memory(), session.length_unit());
     settings.has_viewer_input = [&] { return start_at_viewer_pose(tracker, record); };
   }
   viewer::RunPage replay_page("panonav track: " + to_readable_line(arguments.dataset), image_count);
   std::vector<TrackedImage> images;
   Progress progress(session, "tracking", image_count);
-  track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
+  track(tracker, run, settings, session, [&](TrackedImage&& image) {
     progress.clear();
-    session.print(session.json() ? json_line(to_json(image)) : format_line(image, session));
+    session.print(session.json() ? session.json_line(to_json(image)) : format_line(image, session));
     if (arguments.report) add(replay_page, image);
     if (record.is_active()) record.add(std::move(*image.moment));
     image.moment.reset();
@@ -379,23 +405,28 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   if (arguments.tum) write_localised_poses(*arguments.tum, images, seconds);
   const TrackSummary summary = summarise_track(images);
   if (!session.json()) print_summary(summary, session);
+  if (const auto* motion = tracker.visual_odometry()) {
+    session.note("motion" +
+                 std::string(has_odometry(run) && is_metric ? " without odometry: " : ": ") +
+                 describe_visual_motion(*motion));
+  }
   if (arguments.report) {
-    write_track_report(*arguments.report, tracker.memory(), tracker.localiser().model().spacing_m,
-                       images, summary, replay_page);
+    write_track_report(*arguments.report, tracker, images, summary, replay_page);
     print_report_path(*arguments.report, session);
   }
-  return to_exit_code(summary);
+  return conclude(summary, arguments, session);
 }
 
 Run declare_track(Arguments& arguments) {
   auto values = std::make_shared<TrackArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positional("DATASET", values->dataset,
-                       "Data set, folder of images, video or recording with images in the order of "
-                       "the run, or a live source (-, /dev/video0, rtsp://). If there is no "
-                       "odometry, motion is computed from the images");
-  declare_topics(arguments, values->topics);
-  declare_part(arguments, values->part, false);
+  arguments.positionals("DATASET", values->inputs,
+                        "Data set, folder of images, video (several are joined) or recording with "
+                        "images in the order of the run, or a live source (-, /dev/video0, "
+                        "rtsp://). If there is no odometry, motion is computed from the images");
+  declare_topics(arguments, values->run.topics);
+  declare_part(arguments, values->run.part, false);
+  declare_gpano(arguments, values->run.ignore_gpano);
   arguments.option("--every N", values->every, 1,
                    "Use only every N-th image; the odometry of skipped images is added up");
   arguments.option("--start-x-m", values->start_x_m,
@@ -415,22 +446,28 @@ Run declare_track(Arguments& arguments) {
   arguments.options("odometry", values->odometry, "odometry");
   arguments.show_in_help({"--seed"});
   arguments.declare_outputs({"--tum"});
-  return [values, &arguments](Session& session) { return track_run(arguments, *values, session); };
+  return [values, &arguments](Session& session) {
+    values->dataset = values->inputs.front();
+    values->run.further_videos.assign(values->inputs.begin() + 1, values->inputs.end());
+    return track_run(arguments, *values, session);
+  };
 }
 
 }  // namespace
 
 Verb track_verb() {
-  return {"track", "Track the position of a moving robot from images and odometry",
+  return {"track",
+          VerbGroup::localisation,
+          "Track the position of a moving robot from images and odometry",
           "The verb uses Monte-Carlo localisation. The start pose may be unknown. If several "
           "places look similar, all of them are tracked until an image shows which one is correct. "
           "A robot that was moved without odometry (kidnapped) is localised again. With a live "
-          "source, tracking continues until you press Ctrl-C. The exit code is 1 if the robot was "
-          "never localised.",
+          "source, tracking continues until you press Ctrl-C. If only its position is "
+          "known, no heading is printed. The exit code is 1 if its position was never known.",
           "  panonav track office.panonav run\n"
           "  panonav track office.panonav run --every 10 --report report\n"
           "  panonav track office.panonav run --tum estimate.tum --json\n"
-          "  panonav evaluate estimate.tum run/poses.csv --align false",
+          "  panonav evaluate estimate.tum run/poses.csv --align none",
           declare_track};
 }
 

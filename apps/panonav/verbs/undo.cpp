@@ -1,4 +1,5 @@
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
@@ -29,7 +30,7 @@ ExitCode undo(const UndoArguments& arguments, Session& session) {
     return ExitCode::done;
   }
   session.print((arguments.dry_run ? "would revert \"" : "reverted \"") + *what + "\"; " +
-                arguments.memory + " holds " + std::to_string(views) + " views");
+                arguments.memory + " holds " + format_count(views, "view"));
   return ExitCode::done;
 }
 
@@ -38,13 +39,17 @@ Run declare_undo(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.flag("--dry-run", values->dry_run,
                  "Print the change that would be reverted, but do not change the memory");
+  arguments.explain_interruption(
+      "The memory is as before. To start over, run the same command again.");
   return [values](Session& session) { return undo(*values, session); };
 }
 
 }  // namespace
 
 Verb undo_verb() {
-  return {"undo", "Revert the last forget, prune, rename or localise --update",
+  return {"undo",
+          VerbGroup::memory,
+          "Revert the last forget, prune, rename or localise --update",
           "Run panonav undo again to revert earlier changes; panonav history lists all changes. "
           "Views are restored with their thumbnails, links, positions in maps and former names. "
           "Views that were added after the reverted change stay in the memory. The verb refuses to "

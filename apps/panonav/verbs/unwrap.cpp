@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
@@ -49,11 +50,21 @@ std::string format_line(const Panorama& panorama) {
 /// Returns the file name of a panorama: "morning/view_1.jpg" becomes "morning_view_1.png".
 std::string panorama_name(const std::string& file) {
   std::string name = file;
-  for (const char* ending : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-    if (name.ends_with(ending)) name.resize(name.size() - std::string_view(ending).size());
+  for (const char* ending : {".png", ".jpg", ".jpeg", ".insp"}) {
+    if (to_lower_case(name).ends_with(ending)) {
+      name.resize(name.size() - std::string_view(ending).size());
+    }
   }
   std::ranges::replace(name, '/', '_');
   return name + ".png";
+}
+
+Panorama convert(const PanoramaReader& reader, const DatasetEntry& entry) {
+  const Observation observation = read_observation(entry);
+  return rethrow_with_file_name(observation, [&] {
+    return reader.convert(std::get<Image>(observation.picture).view(),
+                          observation.tilt.value_or(Tilt{}));
+  });
 }
 
 ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recording,
@@ -62,32 +73,34 @@ ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recordin
   const PanoramaReader reader(recording.source,
                               {arguments.unwarper.rows, arguments.unwarper.columns});
   Progress progress(session, "unwrapping", recording.entries.size());
+  SkippedImages skipped(recording.entries.size(), session);
+  std::size_t written = 0;
   std::optional<Panorama> last;
   process_in_order(
       recording.entries.size(), session.executor(),
-      [&](std::size_t i) {
-        const Observation observation = read_observation(recording.entries[i]);
-        return rethrow_with_file_name(observation, [&] {
-          return reader.convert(std::get<Image>(observation.picture).view(),
-                                observation.tilt.value_or(Tilt{}));
-        });
-      },
+      [&](std::size_t i) { return convert(reader, recording.entries[i]); },
       [&](std::size_t i, Panorama&& panorama) {
         const Image picture = to_picture(panorama);
-        write_png(unfinished.path() / panorama_name(recording.entries[i].file), picture.view());
+        write_png(unfinished.path() / unescape_name(panorama_name(recording.entries[i].file)),
+                  picture.view());
         last = std::move(panorama);
+        ++written;
+        progress.advance();
+      },
+      [&](std::size_t, const std::exception_ptr& failure) {
+        progress.clear();
+        skipped.add(failure);
         progress.advance();
       });
   unfinished.finish();
   progress.clear();
   if (session.json()) {
-    ordered_json json{
-        {"input", arguments.input}, {"out", arguments.out}, {"images", recording.entries.size()}};
+    ordered_json json{{"input", arguments.input}, {"out", arguments.out}, {"images", written}};
     json.update(to_json(*last));
     session.print(json_line(json));
   } else {
-    session.print(arguments.out + ": " + std::to_string(recording.entries.size()) +
-                  " panoramas of " + format_line(*last));
+    session.print(arguments.out + ": " + format_count(written, "panorama") + " of " +
+                  format_line(*last));
   }
   return ExitCode::done;
 }
@@ -101,14 +114,14 @@ ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Ses
   if (fs::exists(input)) {
     declared.reject_options(recording_flags(), "as " + input + " is one image");
   }
-  auto source = make_picture_source(arguments.pictures);
-  if (!source) {
+  if (!make_picture_source(arguments.pictures, session)) {
     throw UsageError(
         "set the type of the image: --camera camera.toml for a mirror, or --kind equirectangular");
   }
-  const PanoramaReader reader(std::move(*source),
+  const Dataset recording = open_recording(input, arguments.pictures, std::nullopt, session);
+  const PanoramaReader reader(recording.source,
                               {arguments.unwarper.rows, arguments.unwarper.columns});
-  const auto panorama = reader.read(input);
+  const Panorama panorama = convert(reader, recording.entries.front());
   const Image picture = to_picture(panorama);
   write_png(arguments.out, picture.view());
   if (session.json()) {
@@ -130,6 +143,7 @@ Run declare_unwrap(Arguments& arguments) {
   arguments.required_option("-o,--out", values->out,
                             "Name of the new PNG image; for several images: a new folder");
   declare_pictures(arguments, values->pictures);
+  values->pictures.check = PictureArguments::Check::heads;
   arguments.options("unwarper", values->unwarper);
   arguments.show_in_help({"--rows", "--columns"});
   arguments.declare_outputs({"--out"});
@@ -139,7 +153,9 @@ Run declare_unwrap(Arguments& arguments) {
 }  // namespace
 
 Verb unwrap_verb() {
-  return {"unwrap", "Convert images to panoramas",
+  return {"unwrap",
+          VerbGroup::first_steps,
+          "Convert images to panoramas",
           "From the left to the right edge of the panorama, the view turns clockwise. The forward "
           "direction is in the middle.",
           "  panonav unwrap mirror.jpg --camera camera.toml -o panorama.png\n"

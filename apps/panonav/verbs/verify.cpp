@@ -1,4 +1,5 @@
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav/storage/memory_scheme.hpp"
 
@@ -20,7 +21,7 @@ ExitCode verify(const std::string& path, Session& session) {
         json_line(ordered_json{{"memory", path}, {"intact", faults.empty()}, {"faults", listed}}));
   } else if (faults.empty()) {
     session.print(path + ": " + session.green("intact") + ", " +
-                  std::to_string(memory.info().views) + " views");
+                  format_count(memory.info().views, "view"));
   } else {
     for (const auto& fault : faults) {
       session.print((fault.view ? "view " + std::to_string(fault.view->value) + ": " : "") +
@@ -42,9 +43,12 @@ Run declare_verify(Arguments& arguments) {
 }  // namespace
 
 Verb verify_verb() {
-  return {"verify", "Check a memory for damage",
+  return {"verify",
+          VerbGroup::memory,
+          "Check a memory for damage",
           "The exit code is 0 if the file is intact, and 2 if it is damaged.",
-          "  panonav verify office.panonav", declare_verify};
+          "  panonav verify office.panonav",
+          declare_verify};
 }
 
 }  // namespace panonav::command

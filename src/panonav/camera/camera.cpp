@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "panonav/camera/internal/image_distortion.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -103,6 +104,7 @@ void validate_mirror(const Camera& camera) {
                  },
                  [](const EquirectangularModel&) {}, [](const auto& model) { validate(model); }},
       camera.model);
+  validate_distortion(camera);
   require(elevation_at(camera, camera.rim_radius_px).has_value(), "rim_radius_px",
           camera.rim_radius_px, "within the valid domain of the camera's model");
 }
@@ -218,8 +220,10 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
   const auto radius_px = radius_at(camera, elevation_rad);
   if (!radius_px) return std::nullopt;
   const double angle_rad = camera.forward_angle_rad + azimuth_sign(camera) * azimuth_rad;
-  return clamp_to_image(camera, {camera.centre.u_px + *radius_px * std::cos(angle_rad),
-                                 camera.centre.v_px - *radius_px * std::sin(angle_rad)});
+  const ImageOffset offset =
+      distort(camera, {*radius_px * std::cos(angle_rad), -*radius_px * std::sin(angle_rad)});
+  return clamp_to_image(
+      camera, {camera.centre.u_px + offset.right_px, camera.centre.v_px + offset.down_px});
 }
 
 std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
@@ -240,11 +244,12 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
     if (!in_lens) return std::nullopt;
     return FisheyeLens::Rotation(lens).robot_from_lens(*in_lens);
   }
-  const double right_px = inside->u_px - camera.centre.u_px;
-  const double up_px = camera.centre.v_px - inside->v_px;
-  const auto elevation_rad = elevation_at(camera, std::hypot(right_px, up_px));
+  const auto ideal =
+      undistort(camera, {inside->u_px - camera.centre.u_px, inside->v_px - camera.centre.v_px});
+  if (!ideal) return std::nullopt;
+  const auto elevation_rad = elevation_at(camera, std::hypot(ideal->right_px, ideal->down_px));
   if (!elevation_rad) return std::nullopt;
-  const double angle_rad = std::atan2(up_px, right_px);
+  const double angle_rad = std::atan2(-ideal->down_px, ideal->right_px);
   return Direction3::from_angles(azimuth_sign(camera) * (angle_rad - camera.forward_angle_rad),
                                  *elevation_rad);
 }
@@ -277,18 +282,60 @@ ImageCircle image_circle(const Camera& camera, int lens) {
     return {
         {fisheye.centre_u_px, fisheye.centre_v_px}, 0.0, radius_at(fisheye, fisheye.max_angle_rad)};
   }
-  return {camera.centre, camera.inner_radius_px, camera.rim_radius_px};
+  if (is_ideal_image(camera)) return {camera.centre, camera.inner_radius_px, camera.rim_radius_px};
+  ImageCircle circle{camera.centre, camera.inner_radius_px, 0.0};
+  constexpr int azimuths = 64;
+  for (int i = 0; i < azimuths; ++i) {
+    const double angle_rad = 2 * std::numbers::pi * i / azimuths;
+    const ImageOffset rim = distort(camera, {camera.rim_radius_px * std::cos(angle_rad),
+                                             camera.rim_radius_px * std::sin(angle_rad)});
+    circle.rim_radius_px = std::max(circle.rim_radius_px, std::hypot(rim.right_px, rim.down_px));
+  }
+  return circle;
 }
+
+namespace {
+
+/// Returns the radius of the largest circle of the ideal image, up to the rim, that lies within the
+/// picture.
+double find_outer_radius(const Camera& camera) {
+  const auto [width, height] = camera.image_size;
+  const auto [u_px, v_px] = camera.centre;
+  if (is_ideal_image(camera)) {
+    return std::min({camera.rim_radius_px, u_px, width - u_px, v_px, height - v_px});
+  }
+  constexpr int azimuths = 720;
+  constexpr int bisections = 40;
+  constexpr double between_azimuths = 1 - 2e-5;  // what a straight edge cuts off between two
+  double outer_px = camera.rim_radius_px;
+  for (int i = 0; i < azimuths; ++i) {
+    const double angle_rad = 2 * std::numbers::pi * i / azimuths;
+    const auto is_inside = [&](double radius_px) {
+      const ImageOffset at =
+          distort(camera, {radius_px * std::cos(angle_rad), radius_px * std::sin(angle_rad)});
+      const PixelPoint pixel{camera.centre.u_px + at.right_px, camera.centre.v_px + at.down_px};
+      return pixel.u_px >= 0 && pixel.u_px <= camera.image_size.width && pixel.v_px >= 0 &&
+             pixel.v_px <= camera.image_size.height;
+    };
+    if (is_inside(outer_px)) continue;
+    double low = 0.0;
+    for (int k = 0; k < bisections; ++k) {
+      const double middle = 0.5 * (low + outer_px);
+      (is_inside(middle) ? low : outer_px) = middle;
+    }
+    outer_px = low;
+  }
+  return outer_px < camera.rim_radius_px ? between_azimuths * outer_px : outer_px;
+}
+
+}  // namespace
 
 ElevationBand visible_elevations(const Camera& camera) {
   if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
     return {model->elevation_bottom_rad, model->elevation_top_rad};
   }
   if (lens_count(camera) == 2) return visible_elevations_of_lenses(camera);
-  const auto [width, height] = camera.image_size;
-  const double outer_px =
-      std::min({camera.rim_radius_px, camera.centre.u_px, width - camera.centre.u_px,
-                camera.centre.v_px, height - camera.centre.v_px});
+  const double outer_px = find_outer_radius(camera);
   require(outer_px > camera.inner_radius_px, "distance from the centre to the frame", outer_px,
           "above inner_radius_px " + to_text(camera.inner_radius_px));
   const double at_inner_rad = elevation_at(camera, camera.inner_radius_px).value();

@@ -6,6 +6,7 @@
 
 #include "panonav/camera/dual_fisheye_model.hpp"
 #include "panonav/camera/equiangular_model.hpp"
+#include "panonav/camera/fisheye_model.hpp"
 #include "panonav/camera/hyperboloidal_model.hpp"
 #include "panonav/camera/polynomial_model.hpp"
 #include "panonav/camera/unified_model.hpp"
@@ -31,8 +32,9 @@ struct EquirectangularModel {
 
 /// Any of the projection models, each defined in its own header. All code that enumerates models
 /// uses this list.
-using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel,
-                                 EquiangularModel, EquirectangularModel, DualFisheyeModel>;
+using CameraModel =
+    std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel, EquiangularModel,
+                 EquirectangularModel, DualFisheyeModel, FisheyeModel>;
 
 /// Sense of rotation in which azimuths run in a picture; `Camera::direction` gives its exact
 /// meaning for each model.
@@ -53,7 +55,8 @@ struct Camera {
 
   CameraModel model;     ///< mapping between directions (or elevations) and image positions
   ImageSize image_size;  ///< of every picture of this camera, in pixels
-  // Mirror cameras (all models but equirectangular and dual fisheye):
+  // Mirror cameras and lenses with a vertical axis (all models but equirectangular and dual
+  // fisheye). Radii are those of the ideal image, which is symmetric about the centre:
   PixelPoint centre;             ///< inside the image
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
   double inner_radius_px = 0.0;  ///< nothing is visible within (the camera's own reflection)
@@ -69,6 +72,12 @@ struct Camera {
   /// Equirectangular: position of the forward direction as a fraction of the width from the left
   /// edge, 0 to 1.
   double forward_column = 0.5;
+  /// Map from the ideal image to the picture, for pixels that are not square or a tilted sensor: c,
+  /// d, e of OCamCalib. Offsets from the centre: right + e down, and c down + d right.
+  std::array<double, 3> affine{1.0, 0.0, 0.0};
+  /// Lens distortion of a unified model, before `affine`: k1, k2, p1, p2, k3 of OpenCV, for offsets
+  /// from the centre divided by the focal length.
+  std::array<double, 5> distortion{};
   friend bool operator==(const Camera&, const Camera&) = default;
 };
 
@@ -105,8 +114,8 @@ struct ImageCircle {
   double inner_radius_px = 0.0;  ///< nothing is seen within; 0 for a lens
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
 };
-/// Returns the circle of the mirror, or of lens `lens` of a dual fisheye camera; all zero for an
-/// equirectangular camera.
+/// Returns the circle around the mirror, or of lens `lens` of a dual fisheye camera; all zero for
+/// an equirectangular camera.
 [[nodiscard]] ImageCircle image_circle(const Camera& camera, int lens);
 
 /// A band of elevations, in radians.

@@ -382,4 +382,10 @@ std::optional<MirrorCircle::Agreement> agreement(const MirrorCircle& mirror) {
       deviation([](const MirrorCircle::Circle& rim) { return rim.radius_px; })};
 }
 
+bool is_scattered(const MirrorCircle& mirror) {
+  const auto spread = agreement(mirror);
+  return spread && std::max({spread->centre_u_px, spread->centre_v_px, spread->rim_radius_px}) >
+                       max_rim_scatter * mirror.rim_radius_px;
+}
+
 }  // namespace panonav

@@ -71,4 +71,12 @@ void visit_options(MirrorCircle::SearchOptions& options, OptionVisitor& visitor)
 /// Compares the rims found in single images; nullopt if fewer than two images show one.
 [[nodiscard]] std::optional<MirrorCircle::Agreement> agreement(const MirrorCircle& mirror);
 
+/// Largest standard deviation of the rim's centre and radius over images of one fixed camera, as a
+/// share of the rim's radius: a centre that is off by it turns directions by 1.1 degrees.
+inline constexpr double max_rim_scatter = 0.02;
+
+/// True if the rims in single images deviate by more than `max_rim_scatter`: the camera moved
+/// relative to the mirror, or the circle is no mirror, and a calibration from it is wrong.
+[[nodiscard]] bool is_scattered(const MirrorCircle& mirror);
+
 }  // namespace panonav

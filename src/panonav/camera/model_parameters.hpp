@@ -15,7 +15,17 @@ namespace panonav {
 
 /// Names of the models in files, in the order of the alternatives of CameraModel.
 inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> camera_model_names{
-    "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular", "dual-fisheye"};
+    "hyperboloidal",   "polynomial",   "unified", "equiangular",
+    "equirectangular", "dual-fisheye", "fisheye"};
+
+/// Returns the axis of a unified or fisheye model; null for others. `Model` is CameraModel, const
+/// or not.
+template <class Model>
+[[nodiscard]] auto* find_view_axis(Model& model) {
+  if (auto* fisheye = std::get_if<FisheyeModel>(&model)) return &fisheye->axis;
+  auto* unified = std::get_if<UnifiedModel>(&model);
+  return unified != nullptr ? &unified->axis : nullptr;
+}
 
 /// Names of the values of UnifiedModel::Axis in files, in its order. Files omit the default,
 /// `down`.
@@ -53,6 +63,13 @@ void visit_parameters(Model& model, Visit&& visit) {
         } else if constexpr (std::is_same_v<Kind, UnifiedModel>) {
           visit("xi", m.xi);
           visit("focal_length_px", m.focal_length_px);
+        } else if constexpr (std::is_same_v<Kind, FisheyeModel>) {
+          visit("focal_length_px", m.focal_length_px);
+          visit("k1", m.k1);
+          visit("k2", m.k2);
+          visit("k3", m.k3);
+          visit("k4", m.k4);
+          visit("max_angle_rad", m.max_angle_rad);
         } else if constexpr (std::is_same_v<Kind, EquiangularModel>) {
           visit("elevation_at_inner_rad", m.elevation_at_inner_rad);
           visit("elevation_at_rim_rad", m.elevation_at_rim_rad);

@@ -1,8 +1,10 @@
 #include "panonav/camera/polynomial_model.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <span>
 
 #include "panonav/core/error.hpp"
@@ -110,6 +112,40 @@ std::optional<double> radius_at(const PolynomialModel& model, double elevation_r
     r = next;
   }
   return r;
+}
+
+PolynomialFit fit_polynomial(const std::function<double(double)>& elevation_at,
+                             double rim_radius_px) {
+  constexpr Eigen::Index coefficients = 16;
+  constexpr Eigen::Index samples = 400;
+  constexpr int checks = 1000;
+  // A direction of elevation e at the radius r errs by sin e cos e + f(r) cos^2 e / r, which is
+  // linear in the coefficients of f. Samples are denser near the rim, where polynomials err most.
+  Eigen::MatrixXd matrix(samples, coefficients);
+  Eigen::VectorXd right(samples);
+  for (Eigen::Index i = 0; i < samples; ++i) {
+    const double share =
+        std::sin(0.5 * std::numbers::pi * (static_cast<double>(i) + 0.5) / samples);
+    const double e = elevation_at(share * rim_radius_px);
+    const double weight = std::cos(e) * std::cos(e) / share;
+    for (Eigen::Index k = 0; k < coefficients; ++k) {
+      matrix(i, k) = weight * std::pow(share, static_cast<double>(k));
+    }
+    right(i) = -std::sin(e) * std::cos(e);
+  }
+  const Eigen::VectorXd solved = matrix.colPivHouseholderQr().solve(right);
+  PolynomialFit fit;
+  for (Eigen::Index k = 0; k < coefficients; ++k) {
+    fit.model.coefficients.push_back(solved(k) *
+                                     std::pow(rim_radius_px, 1.0 - static_cast<double>(k)));
+  }
+  for (int i = 1; i <= checks; ++i) {
+    const double radius_px = rim_radius_px * i / checks;
+    const auto fitted = panonav::elevation_at(fit.model, radius_px);
+    const double residual = fitted ? std::abs(*fitted - elevation_at(radius_px)) : std::numbers::pi;
+    fit.residual_rad = std::max(fit.residual_rad, residual);
+  }
+  return fit;
 }
 
 }  // namespace panonav

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -28,5 +29,16 @@ void validate(const PolynomialModel& model, double inner_radius_px, double rim_r
 /// evaluations of the polynomial (bracketed Newton steps).
 [[nodiscard]] std::optional<double> radius_at(const PolynomialModel& model, double elevation_rad,
                                               double inner_radius_px, double rim_radius_px);
+
+/// A polynomial fitted to another model, and how much they differ.
+struct PolynomialFit {
+  PolynomialModel model;      ///< of 16 coefficients
+  double residual_rad = 0.0;  ///< largest difference of elevations up to the rim
+};
+
+/// Fits a polynomial to the elevations that `elevation_at` returns for distances from the centre in
+/// (0, rim_radius_px], by least squares of angles. The result need not be valid.
+[[nodiscard]] PolynomialFit fit_polynomial(const std::function<double(double)>& elevation_at,
+                                           double rim_radius_px);
 
 }  // namespace panonav

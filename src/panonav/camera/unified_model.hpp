@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <optional>
+#include <span>
 
 namespace panonav {
 
@@ -32,5 +34,18 @@ void validate(const UnifiedModel& model);
 /// Returns the distance from the image centre at which an elevation is visible; nullopt outside the
 /// valid domain.
 [[nodiscard]] std::optional<double> radius_at(const UnifiedModel& model, double elevation_rad);
+
+/// A unified model with radial distortion that was fitted to another camera.
+struct UnifiedFit {
+  UnifiedModel model;         ///< its axis is not set
+  std::array<double, 2> k{};  ///< k1 and k2 of `Camera::distortion`
+  double residual_rad = 0.0;  ///< largest difference of angles
+};
+
+/// Fits a unified model with distortion to angles from the axis and the distances from the centre
+/// at which they are imaged, both ascending, by least squares of angles over a grid of xi. Throws
+/// ContractError unless there are at least 8 of each.
+[[nodiscard]] UnifiedFit fit_unified(std::span<const double> angles_rad,
+                                     std::span<const double> radii_px);
 
 }  // namespace panonav

@@ -40,6 +40,19 @@ bool is_secret_parameter(std::string_view name) {
          });
 }
 
+/// Replaces bytes that are not UTF-8 by U+FFFD, as writers of JSON do.
+std::string replace_bad_bytes(std::string_view text) {
+  std::string replaced;
+  while (!text.empty()) {
+    std::size_t size = 1;
+    while (size < std::min<std::size_t>(4, text.size()) && !is_utf8(text.substr(0, size))) ++size;
+    const bool is_character = is_utf8(text.substr(0, size));
+    replaced += is_character ? text.substr(0, size) : "\xEF\xBF\xBD";
+    text.remove_prefix(is_character ? size : 1);
+  }
+  return replaced;
+}
+
 void replace_all(std::string& text, const std::string& from, const std::string& to) {
   if (from.empty() || from == to) return;
   for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) {
@@ -134,6 +147,7 @@ std::string mask_passwords(std::string_view text) {
     for (const auto& [address, mask] : remembered.masks) {
       replace_all(masked_text, address, mask);
       replace_all(masked_text, to_readable_line(address), mask);
+      replace_all(masked_text, replace_bad_bytes(address), mask);
       replace_all(masked_text, escape(address, {{'"', "\\\""}, {'\\', "\\\\"}, {'\t', "\\t"}}),
                   mask);
       replace_all(masked_text, escape(address, {{'\'', "'\\''"}}), mask);

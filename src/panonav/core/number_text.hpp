@@ -43,6 +43,12 @@ template <class Number>
   return std::from_chars(text.data(), text.data() + text.size(), value).ec == std::errc();
 }
 
+/// Formats a number with its noun: "1 image", "0 images". The plural of `noun` must be regular.
+template <class Integer>
+[[nodiscard]] std::string format_count(Integer count, std::string_view noun) {
+  return std::to_string(count).append(" ").append(noun).append(count == 1 ? "" : "s");
+}
+
 /// Splits a text at blanks, tabs and line ends, which are not part of the words.
 [[nodiscard]] std::vector<std::string> split_words(std::string_view text);
 

@@ -73,6 +73,21 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return cost.back().back();
 }
 
+std::string escape_byte(unsigned char byte) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  return {'%', digits[byte >> 4U], digits[byte & 0xFU]};
+}
+
+// Returns the byte for which an escape at the beginning of the text stands: one that is not ASCII,
+// or "%". nullopt if there is no escape.
+std::optional<char> find_escaped_byte(std::string_view text) {
+  std::uint8_t value = 0;
+  const std::string_view digits = text.substr(std::min<std::size_t>(1, text.size()), 2);
+  if (digits.size() != 2 || text.front() != '%' || !read_number(digits, value, 16)) return {};
+  if (escape_byte(value).substr(1) != digits) return {};  // lower case
+  return value >= 0x80U || value == '%' ? std::optional(static_cast<char>(value)) : std::nullopt;
+}
+
 }  // namespace
 
 std::string format_fixed(double value, int digits) {
@@ -149,10 +164,11 @@ std::string to_readable_line(std::string_view text) {
   while (!text.empty()) {
     const std::size_t size = utf8_character_size(text);
     const std::string_view character = text.substr(0, size);
+    const auto bad_byte = static_cast<unsigned char>(text.front());
     text.remove_prefix(std::max<std::size_t>(size, 1));
     const auto first = static_cast<unsigned char>(size == 0 ? '?' : character.front());
     if (size == 0) {
-      line += "\xEF\xBF\xBD";
+      line += escape_byte(bad_byte);
     } else if (first < 0x20U || first == 0x7FU || is_invisible_control(character)) {
       line += ' ';
     } else {
@@ -160,6 +176,61 @@ std::string to_readable_line(std::string_view text) {
     }
   }
   return line;
+}
+
+std::string escape_name(std::string_view name) {
+  std::string escaped;
+  while (!name.empty()) {
+    const std::size_t size = utf8_character_size(name);
+    if (size == 0) {
+      escaped += escape_byte(static_cast<unsigned char>(name.front()));
+    } else if (find_escaped_byte(name)) {
+      escaped += escape_byte('%');
+    } else {
+      escaped += name.substr(0, size);
+    }
+    name.remove_prefix(std::max<std::size_t>(size, 1));
+  }
+  return escaped;
+}
+
+std::string unescape_name(std::string_view escaped) {
+  std::string name;
+  while (!escaped.empty()) {
+    const auto byte = find_escaped_byte(escaped);
+    name += byte.value_or(escaped.front());
+    escaped.remove_prefix(byte ? 3 : 1);
+  }
+  return name;
+}
+
+bool is_naturally_less(std::string_view a, std::string_view b) {
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (digit(a[i]) && digit(b[j])) {
+      std::size_t i_end = i;
+      std::size_t j_end = j;
+      while (i_end < a.size() && digit(a[i_end])) ++i_end;
+      while (j_end < b.size() && digit(b[j_end])) ++j_end;
+      std::size_t i_first = i;
+      std::size_t j_first = j;
+      while (i_first + 1 < i_end && a[i_first] == '0') ++i_first;
+      while (j_first + 1 < j_end && b[j_first] == '0') ++j_first;
+      if (i_end - i_first != j_end - j_first) return i_end - i_first < j_end - j_first;
+      const int order = a.compare(i_first, i_end - i_first, b, j_first, j_end - j_first);
+      if (order != 0) return order < 0;
+      i = i_end;
+      j = j_end;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+    }
+  }
+  if (i == a.size() && j == b.size()) return a < b;  // equal but for leading zeros
+  return i == a.size();
 }
 
 std::string to_csv_field(std::string_view text) {

@@ -18,10 +18,18 @@ namespace panonav {
 [[nodiscard]] std::string format_number(double value, std::string_view unit = {},
                                         int significant = 6);
 
-/// Converts any bytes, such as a file name, to one line of valid UTF-8. Control characters,
+/// Converts any bytes, such as an error message, to one line of valid UTF-8. Control characters,
 /// including those that change the writing direction, become spaces; bytes that are not UTF-8
-/// become the replacement character U+FFFD.
+/// become escapes as in `escape_name`.
 [[nodiscard]] std::string to_readable_line(std::string_view text);
+
+/// Converts a file name to valid UTF-8, from which `unescape_name` restores it: each byte that is
+/// not UTF-8 becomes "%" and two hexadecimal digits (0xFC: "%FC"). A "%" before "25" or before the
+/// digits of such an escape becomes "%25"; all other text is unchanged. Different names stay
+/// different.
+[[nodiscard]] std::string escape_name(std::string_view name);
+/// Restores the bytes of a name that `escape_name` has converted.
+[[nodiscard]] std::string unescape_name(std::string_view escaped);
 
 /// True if the text is valid UTF-8.
 [[nodiscard]] bool is_utf8(std::string_view text);
@@ -32,6 +40,10 @@ namespace panonav {
 
 /// Converts ASCII letters to lower case; all other bytes are unchanged.
 [[nodiscard]] std::string to_lower_case(std::string_view text);
+
+/// Compares file names as people order them: digits as numbers ("view_9" before "view_10"), all
+/// other text byte by byte.
+[[nodiscard]] bool is_naturally_less(std::string_view a, std::string_view b);
 
 /// Quotes a field for a CSV file if it contains a comma, a quote, a `#` or a line break, is empty,
 /// or begins or ends with a blank.

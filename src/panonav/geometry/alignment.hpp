@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "panonav/geometry/pose2.hpp"
+#include "panonav/geometry/pose3.hpp"
 
 namespace panonav {
 
@@ -29,6 +29,32 @@ struct Alignment {
 /// both sets have the same size >= 1. Coincident points align by translation alone.
 [[nodiscard]] Alignment align(std::span<const Point2> from, std::span<const Point2> to,
                               const Alignment::Options& options = {});
+
+/// A similarity transform in space: to ~ scale * rotation * from + translation; if `reflected`, y
+/// of `from` changes its sign first.
+struct Alignment3 {
+  double scale = 1.0;      ///< metres in `to` per unit of length in `from`
+  Rotation3 rotation;      ///< to_from_from
+  Point3 translation;      ///< added after rotation and scale, in the frame of `to`
+  bool reflected = false;  ///< whether y changes its sign first
+  /// False if the points lie on a straight line or in one place: then other rotations align them
+  /// equally well, and `rotation` is the smallest.
+  bool is_unique = true;
+
+  /// Maps a point of the frame of `from` into that of `to`.
+  [[nodiscard]] Point3 apply(Point3 p_in_from) const;
+  /// Maps a pose; a reflection mirrors its orientation.
+  [[nodiscard]] Pose3 apply(const Pose3& pose_in_from) const;
+};
+
+/// Computes the least-squares alignment in space (Umeyama 1991, eq. 34-43). Throws ContractError
+/// unless both sets have the same size >= 1.
+[[nodiscard]] Alignment3 align_in_space(std::span<const Point3> from, std::span<const Point3> to,
+                                        const Alignment::Options& options = {});
+/// Computes the least-squares alignment that rotates only about z, for robots that cannot turn
+/// over. Throws ContractError as `align_in_space`.
+[[nodiscard]] Alignment3 align_in_plane(std::span<const Point3> from, std::span<const Point3> to,
+                                        const Alignment::Options& options = {});
 
 /// Procrustes disparity of two shapes, that is, their remaining difference after the best
 /// translation, rotation and scale. [F11 section 4] uses it as "shape difference" mu without giving

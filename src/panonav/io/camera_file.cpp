@@ -1,7 +1,9 @@
 #include "panonav/io/camera_file.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <string>
 #include <type_traits>
 
@@ -27,21 +29,38 @@ int read_whole_number(TomlFields& fields, std::string_view field) {
   return static_cast<int>(value);
 }
 
-}  // namespace
+/// Reads a list of exactly as many numbers, if the field is present.
+template <std::size_t count>
+void read_fixed_numbers(TomlFields& fields, std::string_view field,
+                        std::array<double, count>& numbers) {
+  const auto found = fields.numbers(field);
+  if (!found) return;
+  if (found->size() != count) {
+    fields.fail(field, std::to_string(found->size()) + " numbers",
+                std::to_string(count) + " numbers");
+  }
+  std::ranges::copy(*found, numbers.begin());
+}
 
-CameraFile read_camera(const std::filesystem::path& path) {
-  const TomlTable table = read_toml(path);
-  TomlFields fields(path, "", table);
-  CameraFile result;
-  Camera& camera = result.camera;
+Image read_mask(const std::filesystem::path& path, ImageSize size) {
+  const Image image = read_image(path);
+  if (image.size() != size) {
+    throw FileError(path.string(), "the mask is " + std::to_string(image.width()) + " x " +
+                                       std::to_string(image.height()) + "; allowed: the camera's " +
+                                       std::to_string(size.width) + " x " +
+                                       std::to_string(size.height));
+  }
+  return to_grey(image.view());
+}
+
+CameraModel read_model(TomlFields& fields) {
   std::string known;
   for (const auto name : camera_model_names)
     known += (known.empty() ? "" : ", ") + std::string(name);
   const std::string name = fields.required_text("model", known);
-  const auto model = make_default_model(name);
+  auto model = make_default_model(name);
   if (!model) fields.fail("model", "\"" + name + "\"", known);
-  camera.model = *model;
-  visit_parameters(camera.model, [&](std::string_view parameter, auto& value) {
+  visit_parameters(*model, [&](std::string_view parameter, auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
       value = fields.required_number(parameter);
     } else {
@@ -50,10 +69,27 @@ CameraFile read_camera(const std::filesystem::path& path) {
       value = *numbers;
     }
   });
-  if (auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
-    unified->axis =
-        static_cast<UnifiedModel::Axis>(fields.choice("axis", view_axis_names).value_or(0));
+  if (auto* axis = find_view_axis(*model)) {
+    *axis = static_cast<UnifiedModel::Axis>(fields.choice("axis", view_axis_names).value_or(0));
   }
+  return *model;
+}
+
+}  // namespace
+
+CameraFile read_camera(const std::filesystem::path& path, CameraMount mount) {
+  constexpr std::size_t max_bytes = 1U << 20U;
+  const auto bytes = read_file(path, max_bytes);
+  const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (const auto format = identify_calibration(content)) {
+    auto calibrated = parse_calibration(path, content, *format, mount);
+    return {calibrated.camera, std::nullopt, calibrated.format};
+  }
+  const TomlTable table = read_toml(path);
+  TomlFields fields(path, "", table);
+  CameraFile result;
+  Camera& camera = result.camera;
+  camera.model = read_model(fields);
   camera.image_size = {read_whole_number(fields, "width_px"),
                        read_whole_number(fields, "height_px")};
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
@@ -63,6 +99,8 @@ CameraFile read_camera(const std::filesystem::path& path) {
     camera.rim_radius_px = fields.required_number("rim_radius_px");
     camera.inner_radius_px = fields.required_number("inner_radius_px");
     camera.forward_angle_rad = radians(fields.number("forward_angle_deg").value_or(0.0));
+    read_fixed_numbers(fields, "affine", camera.affine);
+    read_fixed_numbers(fields, "distortion", camera.distortion);
   }
   if (const auto direction = fields.choice("columns", direction_names)) {
     camera.direction =
@@ -75,18 +113,7 @@ CameraFile read_camera(const std::filesystem::path& path) {
   } catch (const ContractError& error) {
     throw FileError(path.string(), error.what());
   }
-  if (mask) {
-    const auto mask_path = path.parent_path() / *mask;
-    const Image image = read_image(mask_path);
-    if (image.size() != camera.image_size) {
-      throw FileError(mask_path.string(), "the mask is " + std::to_string(image.width()) + " x " +
-                                              std::to_string(image.height()) +
-                                              "; allowed: the camera's " +
-                                              std::to_string(camera.image_size.width) + " x " +
-                                              std::to_string(camera.image_size.height));
-    }
-    result.mask = to_grey(image.view());
-  }
+  if (mask) result.mask = read_mask(path.parent_path() / *mask, camera.image_size);
   return result;
 }
 
@@ -98,21 +125,23 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
   const auto number = [&text](std::string_view field, double value) {
     text += std::string(field) + " = " + to_text(value) + "\n";
   };
+  const auto numbers = [&text](std::string_view field, std::span<const double> values) {
+    text += std::string(field) + " = [";
+    for (std::size_t i = 0; i < values.size(); ++i)
+      text += (i > 0 ? ", " : "") + to_text(values[i]);
+    text += "]\n";
+  };
   text += "model = \"" + std::string(model_name(camera.model)) + "\"\n";
   visit_parameters(camera.model, [&](std::string_view parameter, const auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
       number(parameter, value);
     } else {
-      text += std::string(parameter) + " = [";
-      for (std::size_t i = 0; i < value.size(); ++i)
-        text += (i > 0 ? ", " : "") + to_text(value[i]);
-      text += "]\n";
+      numbers(parameter, value);
     }
   });
-  if (const auto* unified = std::get_if<UnifiedModel>(&camera.model);
-      unified != nullptr && unified->axis != UnifiedModel::Axis::down) {
-    text += "axis = \"" + std::string(view_axis_names[static_cast<std::size_t>(unified->axis)]) +
-            "\"\n";
+  if (const auto* axis = find_view_axis(camera.model);
+      axis != nullptr && *axis != UnifiedModel::Axis::down) {
+    text += "axis = \"" + std::string(view_axis_names[static_cast<std::size_t>(*axis)]) + "\"\n";
   }
   number("width_px", camera.image_size.width);
   number("height_px", camera.image_size.height);
@@ -124,6 +153,8 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
     number("rim_radius_px", camera.rim_radius_px);
     number("inner_radius_px", camera.inner_radius_px);
     number("forward_angle_deg", to_exact_degrees(camera.forward_angle_rad));
+    if (camera.affine != Camera{}.affine) numbers("affine", camera.affine);
+    if (camera.distortion != Camera{}.distortion) numbers("distortion", camera.distortion);
   }
   text += "columns = \"" +
           std::string(direction_names[camera.direction == ColumnDirection::clockwise ? 0 : 1]) +

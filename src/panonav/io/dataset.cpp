@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <string>
 #include <unordered_set>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -16,6 +16,7 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/internal/csv_table.hpp"
 #include "panonav/io/internal/toml_fields.hpp"
+#include "panonav/io/media_kind.hpp"
 
 namespace panonav {
 
@@ -81,13 +82,20 @@ bool is_inside_folder(const std::string& name) {
   return path.is_relative() && *path.lexically_normal().begin() != "..";
 }
 
-void require_picture(const fs::path& table, const DatasetEntry& entry) {
+/// Sets name and path of an entry whose picture a table names, with escapes or by its bytes. Throws
+/// FileError if there is no such file.
+void set_picture(DatasetEntry& entry, const fs::path& table, const fs::path& folder,
+                 const std::string& name) {
   std::error_code error;
-  if (!fs::is_regular_file(entry.path, error)) {
-    throw FileError(table.string(),
-                    "file is '" + entry.file +
-                        "', which does not exist; allowed: an image in the data set's folder");
-  }
+  entry.file = is_utf8(name) ? name : escape_name(name);
+  entry.path = folder / unescape_name(name);
+  if (fs::is_regular_file(entry.path, error)) return;
+  entry.file = escape_name(name);
+  entry.path = folder / name;
+  if (fs::is_regular_file(entry.path, error)) return;
+  throw FileError(table.string(),
+                  "file is '" + entry.file +
+                      "', which does not exist; allowed: an image in the data set's folder");
 }
 
 // True if all of these columns exist, false if none do; throws FileError if only some do.
@@ -108,6 +116,13 @@ bool has_all_or_none(const CsvTable& table, const fs::path& path,
                         "', which belongs to the others; allowed: all of them or none");
   }
   return found == names.size();
+}
+
+/// False if all of these fields of a row are empty: their value is not known for this image.
+bool is_known(const CsvTable& table, std::size_t row,
+              std::initializer_list<std::string_view> columns) {
+  return !std::ranges::all_of(columns,
+                              [&](auto column) { return table.text(row, column).empty(); });
 }
 
 void check_columns(const CsvTable& table, const fs::path& path) {
@@ -141,29 +156,28 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
   std::unordered_set<std::string> seen;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     DatasetEntry entry;
-    entry.file = table.text(row, "file");
-    if (entry.file.empty()) table.fail(row, "file", "empty", "an image in the data set's folder");
-    if (!is_inside_folder(entry.file)) {
-      table.fail(row, "file", "'" + entry.file + "'", "an image in the data set's folder");
+    const std::string& name = table.text(row, "file");
+    if (name.empty()) table.fail(row, "file", "empty", "an image in the data set's folder");
+    if (!is_inside_folder(unescape_name(name)) || !is_inside_folder(name)) {
+      table.fail(row, "file", "'" + name + "'", "an image in the data set's folder");
     }
+    set_picture(entry, path, folder, name);
     if (!seen.insert(entry.file).second) {
       table.fail(row, "file", "'" + entry.file + "' for the second time", "each image once");
     }
-    entry.path = folder / entry.file;
-    require_picture(path, entry);
     if (table.has("stamp_s")) entry.stamp_s = table.number(row, "stamp_s");
-    if (has_position) {
+    if (has_position && is_known(table, row, {"x_m", "y_m"})) {
       entry.pose =
           ReferencePose{table.position(row, "x_m"), table.position(row, "y_m"), std::nullopt};
-      if (table.has("heading_deg")) {
+      if (table.has("heading_deg") && is_known(table, row, {"heading_deg"})) {
         entry.pose->heading_rad = wrap_angle(radians(table.number(row, "heading_deg")));
       }
     }
-    if (has_odometry) {
+    if (has_odometry && is_known(table, row, {"odom_x_m", "odom_y_m", "odom_heading_deg"})) {
       entry.odometry = Pose2{table.position(row, "odom_x_m"), table.position(row, "odom_y_m"),
                              wrap_angle(radians(table.number(row, "odom_heading_deg")))};
     }
-    if (has_tilt) {
+    if (has_tilt && is_known(table, row, {"roll_deg", "pitch_deg"})) {
       const auto angle_rad = [&](std::string_view column) {
         const double angle = radians(table.number(row, column));
         if (!(std::abs(angle) <= max_tilt_rad))
@@ -177,41 +191,6 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
   return entries;
 }
 
-bool is_picture(const fs::path& path) {
-  const std::string extension = to_lower_case(path.extension().string());
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
-}
-
-// Compares digits as numbers, and all other text character by character.
-bool is_naturally_less(const std::string& a, const std::string& b) {
-  const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
-  std::size_t i = 0;
-  std::size_t j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (digit(a[i]) && digit(b[j])) {
-      std::size_t i_end = i;
-      std::size_t j_end = j;
-      while (i_end < a.size() && digit(a[i_end])) ++i_end;
-      while (j_end < b.size() && digit(b[j_end])) ++j_end;
-      std::size_t i_first = i;
-      std::size_t j_first = j;
-      while (i_first + 1 < i_end && a[i_first] == '0') ++i_first;
-      while (j_first + 1 < j_end && b[j_first] == '0') ++j_first;
-      if (i_end - i_first != j_end - j_first) return i_end - i_first < j_end - j_first;
-      const int order = a.compare(i_first, i_end - i_first, b, j_first, j_end - j_first);
-      if (order != 0) return order < 0;
-      i = i_end;
-      j = j_end;
-    } else {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i;
-      ++j;
-    }
-  }
-  if (i == a.size() && j == b.size()) return a < b;  // equal but for leading zeros
-  return i == a.size();
-}
-
 Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recursive) {
   Dataset dataset{folder, std::move(source), {}, {}};
   std::error_code error;
@@ -221,12 +200,12 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
     std::error_code unknown;
     const std::string name = file->path().lexically_relative(folder).string();
     const bool is_folder = file->is_directory(unknown) && !file->is_symlink(unknown);
-    if (is_picture(file->path()) && file->is_regular_file(unknown)) {
+    if (file->is_regular_file(unknown) && is_folder_picture(file->path())) {
       names.push_back(name);
     } else if (!is_folder) {
-      dataset.left_out.push_back(name);
-    } else if (!is_recursive) {
-      dataset.left_out.push_back(name + "/");
+      dataset.left_out.push_back(escape_name(name));
+    } else if (!is_recursive || is_hidden(file->path())) {
+      dataset.left_out.push_back(escape_name(name) + "/");
       file.disable_recursion_pending();
     }
   }
@@ -238,35 +217,36 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
   for (auto& name : names) {
     DatasetEntry entry;
     entry.path = folder / name;
-    entry.file = std::move(name);
+    entry.file = escape_name(name);
     dataset.entries.push_back(std::move(entry));
   }
   return dataset;
 }
 
-/// A value that entries may have, and its first column in the table.
+/// A value that entries may have, and its name in warnings.
 struct EntryField {
-  std::string_view column;
+  std::string_view name;
   bool Dataset::Fields::*shared;
   bool (*has)(const DatasetEntry& entry);
 };
 constexpr std::array<EntryField, 5> entry_fields{{
-    {"stamp_s", &Dataset::Fields::stamps, [](const auto& e) { return e.stamp_s.has_value(); }},
-    {"x_m", &Dataset::Fields::positions, [](const auto& e) { return e.pose.has_value(); }},
-    {"heading_deg", &Dataset::Fields::headings,
+    {"stamp", &Dataset::Fields::stamps, [](const auto& e) { return e.stamp_s.has_value(); }},
+    {"position", &Dataset::Fields::positions, [](const auto& e) { return e.pose.has_value(); }},
+    {"heading", &Dataset::Fields::headings,
      [](const auto& e) { return e.pose && e.pose->heading_rad.has_value(); }},
-    {"odom_x_m", &Dataset::Fields::odometry, [](const auto& e) { return e.odometry.has_value(); }},
-    {"roll_deg", &Dataset::Fields::tilts, [](const auto& e) { return e.tilt.has_value(); }},
+    {"odometry", &Dataset::Fields::odometry, [](const auto& e) { return e.odometry.has_value(); }},
+    {"roll and pitch", &Dataset::Fields::tilts, [](const auto& e) { return e.tilt.has_value(); }},
 }};
 
-/// Throws ContractError if only some of the entries have a field.
-void require_whole_fields(const std::vector<DatasetEntry>& entries) {
-  require(!entries.empty(), "number of images", 0.0, ">= 1");
-  const auto all = static_cast<std::ptrdiff_t>(entries.size());
+/// Warns of fields that only some of the entries have.
+void add_warnings_of_partial_fields(Dataset& dataset) {
+  const std::size_t all = dataset.entries.size();
   for (const EntryField& field : entry_fields) {
-    const auto count = std::ranges::count_if(entries, field.has);
-    require(count == 0 || count == all, "number of images with " + std::string(field.column),
-            static_cast<double>(count), "0 or all " + std::to_string(all));
+    const auto count = static_cast<std::size_t>(std::ranges::count_if(dataset.entries, field.has));
+    if (count == 0 || count == all) continue;
+    dataset.warnings.push_back(to_readable_line(dataset.folder.string()) + ": " +
+                               std::to_string(all - count) + " of " + format_count(all, "image") +
+                               " have no " + std::string(field.name));
   }
 }
 
@@ -284,20 +264,33 @@ std::string format_table(const std::vector<DatasetEntry>& entries, const Dataset
     }
     table += to_csv_field(entry.file);
     const auto add = [&table](double value) { table += "," + to_text(value); };
+    const auto& pose = entry.pose;
+    const auto& odometry = entry.odometry;
+    const auto& tilt = entry.tilt;
     if (columns.stamps) add(*entry.stamp_s);
-    if (columns.positions) {
-      add(entry.pose->x_m);
-      add(entry.pose->y_m);
+    if (columns.positions && pose) {
+      add(pose->x_m);
+      add(pose->y_m);
+    } else if (columns.positions) {
+      table += ",,";
     }
-    if (columns.headings) add(to_exact_degrees(*entry.pose->heading_rad));
-    if (columns.odometry) {
-      add(entry.odometry->x_m);
-      add(entry.odometry->y_m);
-      add(to_exact_degrees(entry.odometry->heading_rad));
+    if (columns.headings && pose && pose->heading_rad) {
+      add(to_exact_degrees(*pose->heading_rad));
+    } else if (columns.headings) {
+      table += ",";
     }
-    if (columns.tilts) {
-      add(to_exact_degrees(entry.tilt->roll_rad));
-      add(to_exact_degrees(entry.tilt->pitch_rad));
+    if (columns.odometry && odometry) {
+      add(odometry->x_m);
+      add(odometry->y_m);
+      add(to_exact_degrees(odometry->heading_rad));
+    } else if (columns.odometry) {
+      table += ",,,";
+    }
+    if (columns.tilts && tilt) {
+      add(to_exact_degrees(tilt->roll_rad));
+      add(to_exact_degrees(tilt->pitch_rad));
+    } else if (columns.tilts) {
+      table += ",,";
     }
     table += "\n";
   }
@@ -352,6 +345,7 @@ Dataset read_dataset(const fs::path& folder) {
     entries.fail("file", "\"" + file + "\"", "a table in the data set's folder");
   }
   dataset.entries = read_entries(folder, folder / file, poses.has_value());
+  add_warnings_of_partial_fields(dataset);
   images->finish();
   entries.finish();
   top.finish();
@@ -431,10 +425,24 @@ Dataset read_single_picture(const fs::path& file, PictureSource source) {
     throw FileError(file.string(), "does not exist; allowed: a PNG or JPEG image");
   Dataset dataset{file.parent_path(), std::move(source), {}, {}};
   DatasetEntry entry;
-  entry.file = file.filename().string();
+  entry.file = escape_name(file.filename().string());
   entry.path = file;
   dataset.entries.push_back(std::move(entry));
   return dataset;
+}
+
+std::string Dataset::Unusable::describe() const {
+  return FileError(path.string(), fault).what();
+}
+
+void require_usable_entries(const Dataset& dataset) {
+  if (!dataset.entries.empty()) return;
+  if (dataset.unusable.size() == 1) {
+    throw FileError(dataset.unusable.front().path.string(), dataset.unusable.front().fault);
+  }
+  throw FileError(dataset.folder.string(),
+                  "contains no image that can be used" +
+                      (dataset.unusable.empty() ? "" : "; " + dataset.unusable.front().describe()));
 }
 
 Dataset::Fields find_shared_fields(const Dataset& dataset) {
@@ -445,21 +453,18 @@ Dataset::Fields find_shared_fields(const Dataset& dataset) {
   return fields;
 }
 
-Dataset::Fields drop_partial_fields(Dataset& dataset) {
-  const Dataset::Fields fields = find_shared_fields(dataset);
-  for (DatasetEntry& entry : dataset.entries) {
-    if (!fields.stamps) entry.stamp_s.reset();
-    if (!fields.positions) entry.pose.reset();
-    if (entry.pose && !fields.headings) entry.pose->heading_rad.reset();
-    if (!fields.odometry) entry.odometry.reset();
-    if (!fields.tilts) entry.tilt.reset();
+Dataset::Fields find_known_fields(const Dataset& dataset) {
+  Dataset::Fields fields = find_shared_fields(dataset);
+  for (const EntryField& field : entry_fields) {
+    if (field.shared == &Dataset::Fields::stamps) continue;
+    fields.*field.shared = std::ranges::any_of(dataset.entries, field.has);
   }
   return fields;
 }
 
 void write_dataset(const Dataset& dataset) {
-  require_whole_fields(dataset.entries);
-  const Dataset::Fields columns = find_shared_fields(dataset);
+  require(!dataset.entries.empty(), "number of images", 0.0, ">= 1");
+  const Dataset::Fields columns = find_known_fields(dataset);
   std::string text = format_images_section(dataset);
   const bool with_poses = columns.positions || columns.odometry;
   const std::string name = with_poses ? "poses.csv" : "images.csv";

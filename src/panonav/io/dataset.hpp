@@ -33,7 +33,8 @@ class PictureStore {
 
 /// One picture of a data set with its stamp, poses and tilt.
 struct DatasetEntry {
-  std::string file;            ///< name relative to the data set's folder; unique
+  /// Name relative to the data set's folder, with escapes (`escape_name`); unique.
+  std::string file;
   std::filesystem::path path;  ///< its own file, or that of all pictures
   /// Time of the image, in seconds on the recording's clock.
   std::optional<double> stamp_s;
@@ -66,7 +67,7 @@ struct Dataset {
     [[nodiscard]] bool has_time_selection() const noexcept { return every_s || from_s || to_s; }
   };
 
-  /// Fields that all pictures of a data set have.
+  /// Fields that pictures of a data set have: all (`find_shared_fields`) or some.
   struct Fields {
     bool stamps = false;     ///< `stamp_s`
     bool positions = false;  ///< `pose`
@@ -80,14 +81,24 @@ struct Dataset {
   std::vector<DatasetEntry> entries;  ///< in the order in which they were taken
   /// Other files and folders (with final "/") in a folder of pictures, which were left out; sorted.
   std::vector<std::string> left_out;
+  /// A picture that cannot be used.
+  struct Unusable {
+    std::string file;            ///< as in `entries`
+    std::filesystem::path path;  ///< its file
+    std::string fault;           ///< for people: value and what is allowed, without the file
+
+    /// Returns the line for people, which begins with the file.
+    [[nodiscard]] std::string describe() const;
+  };
+  std::vector<Unusable> unusable = {};  ///< taken out of `entries`, in order
   /// Warnings of the reader about things left out, guessed or missing, one line each.
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = {};
 };
 
 /// Reads `folder`/dataset.toml and the table that it names (docs/formats.md). Throws FileError with
 /// one line that names file, row or field, value and what is allowed, if a field is wrong or
 /// missing, a number is not finite, a name is repeated, a picture is missing, or there is none at
-/// all.
+/// all. Positions, headings, odometry and tilts may be empty in some rows, with a warning.
 [[nodiscard]] Dataset read_dataset(const std::filesystem::path& folder);
 
 /// Returns the indices of the selected pictures, given the ascending stamps of all. Differences of
@@ -99,8 +110,8 @@ struct Dataset {
 /// a smaller one than the entry before, or if no entry is left.
 void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 
-/// Reads a folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
-/// ("view_9" before "view_10"). Throws FileError if it contains none.
+/// Reads a folder of PNG and JPEG pictures (`is_folder_picture`) without dataset.toml, in natural
+/// order of their names ("view_9" before "view_10"). Throws FileError if it contains none.
 [[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
                                           PictureSource source);
 /// Reads a folder with the images of all folders below it ("morning/view_1"); symbolic links are
@@ -110,16 +121,20 @@ void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 /// Makes a data set of one picture.
 [[nodiscard]] Dataset read_single_picture(const std::filesystem::path& file, PictureSource source);
 
+/// Throws FileError that names the first unusable picture if no entry is left.
+void require_usable_entries(const Dataset& dataset);
+
 /// Returns the fields that all entries have; needs at least one entry.
 [[nodiscard]] Dataset::Fields find_shared_fields(const Dataset& dataset);
-/// Drops fields that only some entries have, so that `write_dataset` accepts them. Returns the
-/// remaining ones.
-Dataset::Fields drop_partial_fields(Dataset& dataset);
+/// Returns the fields that some entries have, of which `write_dataset` writes columns; stamps only
+/// if all have one. Needs at least one entry.
+[[nodiscard]] Dataset::Fields find_known_fields(const Dataset& dataset);
 
 /// Writes dataset.toml, the table (poses.csv, or images.csv if no position is known) and, for
 /// mirror pictures, camera.toml into `dataset.folder`; the caller must write the pictures.
-/// dataset.toml is written last, so that a data set that has one is complete. Throws ContractError
-/// if only some of the entries have a field (`drop_partial_fields`).
+/// dataset.toml is written last, so that a data set that has one is complete. A field is empty in
+/// the rows of entries that do not have it; stamps are only written if all have one. Throws
+/// ContractError without entries.
 void write_dataset(const Dataset& dataset);
 
 }  // namespace panonav

@@ -28,6 +28,11 @@ struct InputOptions {
   Topics topics;                 ///< of a recording of topics; other inputs refuse them
   Dataset::Selection selection;  ///< which of its pictures
   bool recursive = false;        ///< folders: also read those within
+  /// Videos that continue a video, such as its chapters; other inputs refuse them.
+  std::vector<std::filesystem::path> further_videos = {};
+  /// Read pictures as if they had no GPano data (`apply_gpano`), as those whose makers levelled
+  /// them already.
+  bool ignore_gpano = false;
 };
 
 /// A reader of inputs of one kind.

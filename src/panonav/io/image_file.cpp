@@ -53,6 +53,14 @@ ImageSize read_image_size(const std::filesystem::path& path, const ImageLimits& 
                                                        : detail::jpeg_size(bytes, name, limits);
 }
 
+ImageSize check_image(const std::filesystem::path& path, const ImageLimits& limits) {
+  const auto bytes = read_file(path, image_limit_bytes);
+  const std::string name = path.string();
+  return image_format(bytes, name) == ImageFormat::png
+             ? detail::decode_png(bytes, name, limits).size()
+             : detail::check_jpeg(bytes, name, limits);
+}
+
 std::vector<std::uint8_t> encode_png(ImageView image) {
   return detail::encode_png(image);
 }

@@ -46,6 +46,11 @@ enum class ImageFormat {
 [[nodiscard]] ImageSize read_image_size(const std::filesystem::path& path,
                                         const ImageLimits& limits = {});
 
+/// Checks that `read_image` can read a file, and returns the size of the upright picture. Throws
+/// FileError as `read_image`. Cost: decodes the file, a JPEG at an eighth of its size, in about
+/// half of the time.
+ImageSize check_image(const std::filesystem::path& path, const ImageLimits& limits = {});
+
 /// Decodes a PNG or JPEG in memory as `read_image` does; `name` appears in error messages.
 [[nodiscard]] Image decode_image(std::span<const std::uint8_t> bytes, std::string_view name,
                                  const ImageLimits& limits = {});

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <numbers>
 #include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/panorama/hidden_values.hpp"
 
@@ -14,14 +17,12 @@ namespace panonav {
 
 namespace {
 
-// Throws ContractError unless the picture is twice as wide as high, as one of the whole sphere is.
-void require_whole_sphere(ImageSize size) {
-  constexpr double tolerance = 0.02;  // for cropped borders and rounding
-  if (std::abs(size.width - 2.0 * size.height) <= tolerance * size.width) return;
-  throw ContractError("equirectangular image",
-                      std::to_string(size.width) + " x " + std::to_string(size.height) + " px",
-                      "twice as wide as high, with the whole sphere; for a part of the sphere use "
-                      "the kind panorama with an elevation band");
+/// Fills in the bands of an equirectangular source that are not set.
+PictureLayout complete_sphere_layout(PictureLayout layout) {
+  constexpr double pole_rad = std::numbers::pi / 2.0;
+  if (!layout.elevations) layout.elevations = ElevationBand{-pole_rad, pole_rad};
+  if (!layout.kept_elevations) layout.kept_elevations = default_equirectangular_band;
+  return layout;
 }
 
 /// A band extended at both ends by rows of the same height, up to `limit` and at most by
@@ -45,14 +46,17 @@ WiderBand widen_band(const ElevationBand& band, int rows, const ElevationBand& l
 Panorama level_equirectangular(ImageView picture, PictureLayout layout, PanoramaShape shape,
                                const Tilt& tilt) {
   const ElevationBand sphere = layout.elevations.value();
-  const ElevationBand band = layout.kept_elevations.value_or(sphere);
+  const ElevationBand band = layout.kept_elevations.value();
   if (shape.rows == 0) {
     const double share = (band.top_rad - band.bottom_rad) / (sphere.top_rad - sphere.bottom_rad);
     shape.rows = std::max(1, static_cast<int>(std::lround(share * picture.height)));
   }
   const double row_rad = (band.top_rad - band.bottom_rad) / shape.rows;
-  const double margin_rad = std::hypot(tilt.roll_rad, tilt.pitch_rad) + 2.0 * row_rad;
-  const WiderBand wide = widen_band(band, shape.rows, sphere, margin_rad);
+  const double tilt_rad = std::hypot(tilt.roll_rad, tilt.pitch_rad);
+  const WiderBand wide =
+      tilt_rad > max_tilt_rad && is_whole_sphere(sphere)
+          ? WiderBand{static_cast<int>(std::lround(std::numbers::pi / row_rad)), sphere}
+          : widen_band(band, shape.rows, sphere, tilt_rad + 2.0 * row_rad);
   layout.kept_elevations = wide.band;
   return level_panorama(panorama_from_picture(picture, layout, {wide.rows, shape.columns}), tilt,
                         shape.rows, band);
@@ -66,8 +70,36 @@ struct PanoramaReader::Wide {
   std::vector<std::uint8_t> hidden;
 };
 
+void require_picture_size(const PictureSource& source, ImageSize size) {
+  const std::string own = std::to_string(size.width) + " x " + std::to_string(size.height) + " px";
+  if (source.kind == PictureKind::mirror && source.camera && size != source.camera->image_size) {
+    const ImageSize& camera = source.camera->image_size;
+    throw ContractError("image size", own,
+                        std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                            " px, as the camera's images");
+  }
+  if (source.kind != PictureKind::equirectangular) return;
+  constexpr double tolerance = 0.02;  // for cropped borders and rounding
+  const ElevationBand shown = *complete_sphere_layout(source.layout).elevations;
+  const double ratio = 2.0 * std::numbers::pi / (shown.top_rad - shown.bottom_rad);
+  if (std::abs(size.width - ratio * size.height) <= tolerance * size.width) return;
+  if (is_whole_sphere(shown)) {
+    throw ContractError("equirectangular image", own,
+                        "twice as wide as high, with the whole sphere; for a part of the sphere "
+                        "use the kind panorama with an elevation band");
+  }
+  throw ContractError("equirectangular image", own,
+                      format_number(ratio, {}, 4) +
+                          " times as wide as high, with elevations from " +
+                          format_number(degrees(shown.bottom_rad), "deg") + " to " +
+                          format_number(degrees(shown.top_rad), "deg") + " degrees");
+}
+
 PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
     : source_(std::move(source)), shape_(shape) {
+  if (source_.kind == PictureKind::equirectangular) {
+    source_.layout = complete_sphere_layout(source_.layout);
+  }
   if (source_.kind != PictureKind::mirror) return;
   require(source_.camera.has_value(), "camera of mirror images", 0.0, "one camera");
   UnwarperOptions options;
@@ -93,14 +125,14 @@ const PanoramaReader::Wide* PanoramaReader::get_or_create_wide() const {
 }
 
 Panorama PanoramaReader::convert(ImageView picture, const Tilt& tilt) const {
-  validate(tilt);
   const bool is_level = tilt == Tilt{};
   if (source_.kind == PictureKind::equirectangular) {
-    require_whole_sphere(picture.size());
+    require_picture_size(source_, picture.size());
     if (!is_level) return level_equirectangular(picture, source_.layout, shape_, tilt);
   }
   if (!unwarper_)
     return level_panorama(panorama_from_picture(picture, source_.layout, shape_), tilt);
+  validate(tilt);
   const Wide* const more = is_level ? nullptr : get_or_create_wide();
   Panorama panorama = (more == nullptr ? *unwarper_ : *more->unwarper).unwrap(picture);
   const auto& hidden = more == nullptr ? hidden_ : more->hidden;

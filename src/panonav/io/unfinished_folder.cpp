@@ -25,6 +25,10 @@ fs::path resolve_free_target(const fs::path& target) {
 
 UnfinishedFolder::UnfinishedFolder(const fs::path& target) : target_(resolve_free_target(target)) {
   std::error_code error;
+  for (fs::path parent = target_.parent_path(); !parent.empty() && !fs::exists(parent, error);
+       parent = parent.parent_path()) {
+    new_parents_.push_back(parent);
+  }
   fs::create_directories(target_.parent_path(), error);
   if (error) throw FileError(target.string(), "cannot be created: " + error.message());
   mark_.emplace(target_);
@@ -38,6 +42,8 @@ UnfinishedFolder::UnfinishedFolder(const fs::path& target) : target_(resolve_fre
 UnfinishedFolder::~UnfinishedFolder() {
   std::error_code ignored;
   fs::remove_all(path_, ignored);
+  mark_.reset();
+  for (const fs::path& parent : new_parents_) fs::remove(parent, ignored);  // only if empty
 }
 
 void UnfinishedFolder::finish() {

@@ -2,13 +2,14 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "panonav/core/temporary_file.hpp"
 
 namespace panonav {
 
 /// A folder that is filled under a temporary name and renamed when it is complete; otherwise it is
-/// removed.
+/// removed, with the parent folders that were made for it.
 class UnfinishedFolder {
  public:
   /// Makes the folder under a temporary name, and its parent folders. Throws FileError if that
@@ -26,7 +27,8 @@ class UnfinishedFolder {
  private:
   std::filesystem::path target_;
   std::filesystem::path path_;
-  std::optional<TemporaryFile> mark_;  // keeps its temporary name unique
+  std::vector<std::filesystem::path> new_parents_;  // made for the target, the deepest first
+  std::optional<TemporaryFile> mark_;               // keeps its temporary name unique
 };
 
 }  // namespace panonav

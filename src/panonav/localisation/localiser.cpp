@@ -10,6 +10,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/alternative_places.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
 #include "panonav/signature/compass.hpp"
 
@@ -116,17 +117,18 @@ std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) 
 }
 
 // Returns rectangles around the references that may support one of the matches
-// (`NeighbourSupport`).
-std::vector<PositionBounds> bound_supporters(const VisualMemory& memory,
-                                             std::span<const RankedMatch> ranked,
-                                             double spacing_m) {
+// (`NeighbourSupport`) or belong to its layout. `spacing_m`: of the references with headings.
+std::vector<PositionBounds> bound_neighbours(const VisualMemory& memory,
+                                             std::span<const RankedMatch> ranked, double spacing_m,
+                                             double position_spacing_m) {
   std::vector<PositionBounds> boxes;
-  const double radius_m = NeighbourSupport::radius_m(spacing_m);
+  const double radius_m =
+      std::max(NeighbourSupport::radius_m(spacing_m), ReferenceLayout::reach_m(position_spacing_m));
   if (!(radius_m > 0.0)) return boxes;
   for (const RankedMatch& match :
        ranked.first(std::min(ranked.size(), NeighbourSupport::max_examined))) {
     const auto& pose = memory.info(match.match.view).pose;
-    if (!pose || !pose->heading_rad) continue;
+    if (!pose) continue;
     boxes.push_back(
         {pose->x_m - radius_m, pose->x_m + radius_m, pose->y_m - radius_m, pose->y_m + radius_m});
   }
@@ -173,8 +175,9 @@ struct Localiser::ComparedViews {
 
   const VisualMemory* memory;
   ColumnRanking ranking;
-  NeighbourSupport support;  // looks at `ranking`
-  PlaceCriterion criterion;  // looks at `ranking`
+  NeighbourSupport support;               // looks at `ranking`
+  PlaceCriterion criterion;               // looks at `ranking`
+  std::optional<ReferenceLayout> layout;  // set once the spacing of the position model is known
 };
 
 /// The evaluation of one query.
@@ -248,14 +251,13 @@ class Localiser::Query {
     if (compared_ != nullptr) return;
     std::vector<ViewId> views = to_ids(ranked_);
     views.insert(views.end(), mask_.excluded_views.begin(), mask_.excluded_views.end());
-    if (options_.reranked_views > 0) {
-      const auto around =
-          index_.views_within(bound_supporters(*loaded_, ranked_, localiser_.spacing_m_));
-      views.insert(views.end(), around.begin(), around.end());
-    }
+    const auto around = index_.views_within(bound_neighbours(
+        *loaded_, ranked_, localiser_.spacing_m_, localiser_.position_model_.spacing_m));
+    views.insert(views.end(), around.begin(), around.end());
     loaded_.emplace(join_memories(index_.load(views), *localiser_.sampled_));
-    compared_ = &loaded_views_.emplace(*loaded_, options_, std::optional(localiser_.spacing_m_),
-                                       index_.size());
+    loaded_views_.emplace(*loaded_, options_, std::optional(localiser_.spacing_m_), index_.size());
+    loaded_views_->layout.emplace(*loaded_, localiser_.position_model_.spacing_m);
+    compared_ = &*loaded_views_;
   }
 
   void collect_column_evidence() {
@@ -288,6 +290,7 @@ class Localiser::Query {
       }
     }
     place_.known = is_known();
+    place_.probability = place_.known_probability;
   }
   [[nodiscard]] bool is_known() const { return place_.known_probability >= 0.5; }
 
@@ -298,33 +301,67 @@ class Localiser::Query {
         return std::pair(r.match.dissimilarity, r.match.view);
       });
     }
-    const PackedSignature query = mask_rows(view_, mask_.allowed_rows);
-    const VisualMemory& memory = *compared_->memory;
     for (const RankedMatch& r : ranked_) {
       if (static_cast<int>(place_.matches.size()) == options_.top) break;
-      std::optional<CompassReading> reading;
-      if (place_.components >= 2) {
-        reading = compass_near(query, mask_rows(memory.packed(r.match.view), mask_.allowed_rows),
-                               r.columns.heading_rad, compass_window_rad, options_.components);
-      }
-      place_.matches.push_back({memory.info(r.match.view).name, r.match.view, r.match.dissimilarity,
-                                r.columns.difference, r.verified_features,
-                                reading ? std::optional(reading->heading_rad) : std::nullopt});
+      place_.matches.push_back(describe_match(r));
     }
   }
-
-  /// Interpolates between references [M04 footnote 1].
-  void estimate_pose() {
-    const PositionModel& model = localiser_.position_model_;
-    place_.position = interpolate_position(compared_->ranking, model, ranked_);
-    // If only local features recognise the place, the position is no more precise than the
-    // neighbourhood.
-    if (!is_known_by_columns_ && place_.position && place_.position->radius_m) {
-      place_.position->radius_m = std::max(*place_.position->radius_m, model.neighbourhood_m);
+  [[nodiscard]] PlaceMatch describe_match(const RankedMatch& r) const {
+    const VisualMemory& memory = *compared_->memory;
+    std::optional<CompassReading> reading;
+    if (place_.components >= 2) {
+      reading = compass_near(mask_rows(view_, mask_.allowed_rows),
+                             mask_rows(memory.packed(r.match.view), mask_.allowed_rows),
+                             r.columns.heading_rad, compass_window_rad, options_.components);
     }
+    return {memory.info(r.match.view).name,
+            r.match.view,
+            r.match.dissimilarity,
+            r.columns.difference,
+            r.verified_features,
+            reading ? std::optional(reading->heading_rad) : std::nullopt};
+  }
+
+  /// Interpolates between references [M04 footnote 1], and shares the probability with places that
+  /// the image does not exclude.
+  void estimate_pose() {
+    place_.position = interpolate(ranked_);
     place_.heading_rad = estimate_heading(*compared_->memory, place_.matches);
     if (place_.position && options_.reranked_views > 0 && !is_ranked_by_features_) {
       move_nearest_first(*compared_->memory, place_.position->position(), place_.matches);
+    }
+    if (place_.position) find_alternatives();
+  }
+
+  [[nodiscard]] std::optional<PositionEstimate> interpolate(
+      std::span<const RankedMatch> matches) const {
+    const PositionModel& model = localiser_.position_model_;
+    auto found = interpolate_position(compared_->ranking, model, *compared_->layout, matches,
+                                      mask_.excluded_views);
+    // If only local features recognise the place, the position is no more precise than the
+    // neighbourhood.
+    if (is_known_by_columns_ || !found) return found;
+    if (found->radius_m) found->radius_m = std::max(*found->radius_m, model.neighbourhood_m);
+    if (found->along_route) {
+      found->along_route->within_m = std::max(found->along_route->within_m, model.neighbourhood_m);
+    }
+    return found;
+  }
+
+  void find_alternatives() {
+    const std::vector<PlaceShare> places = share_probability(
+        compared_->ranking, compared_->support, localiser_.position_model_,
+        ColumnProfiles(view_, options_.components), ranked_, mask_.excluded_views);
+    place_.probability = places.front().share * place_.known_probability;
+    for (const PlaceShare& place : std::span(places).subspan(1)) {
+      std::vector<PlaceMatch> matches;
+      for (const RankedMatch& match : place.matches) {
+        if (matches.size() == nearest_reference_count) break;
+        matches.push_back(describe_match(match));
+      }
+      const auto heading_rad = estimate_heading(*compared_->memory, matches);
+      place_.alternatives.push_back({matches.front(), place.share * place_.known_probability,
+                                     interpolate(place.matches), heading_rad});
     }
   }
 
@@ -351,9 +388,11 @@ class Localiser::Query {
 Localiser::Localiser(const VisualMemory& memory, const LocaliserOptions& options)
     : options_(options) {
   validate(options);
-  held_ = std::make_shared<const ComparedViews>(memory, options, std::nullopt, 0);
-  place_model_ = learn_place_model(held_->ranking);
-  position_model_ = learn_position_model(held_->ranking);
+  auto compared = std::make_shared<ComparedViews>(memory, options, std::nullopt, 0);
+  place_model_ = learn_place_model(compared->ranking);
+  position_model_ = learn_position_model(compared->ranking);
+  compared->layout.emplace(memory, position_model_.spacing_m);
+  held_ = std::move(compared);
 }
 
 Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
@@ -361,7 +400,9 @@ Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
                      std::optional<double> spacing_m)
     : options_(options), place_model_(place_model), position_model_(position_model) {
   validate(options);
-  held_ = std::make_shared<const ComparedViews>(memory, options, spacing_m, 0);
+  auto compared = std::make_shared<ComparedViews>(memory, options, spacing_m, 0);
+  compared->layout.emplace(memory, position_model_.spacing_m);
+  held_ = std::move(compared);
   require(position_model_.components == options_.components, "components of the position model",
           position_model_.components, to_text(options_.components) + ", as requested");
 }

@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-/// Smallest `known_probability` of a sure localisation; 99 % of sure ones are right
+/// Smallest `probability` of a sure localisation; 99 % of sure ones are right
 /// (docs/decisions.md).
 constexpr double min_sure_probability = 0.9;
 /// Longest travel between an image and its witness, in spacings; over this length odometry errs by
@@ -62,8 +62,8 @@ MemoryUpdate::MemoryUpdate(const ColumnRanking& ranking, const ObservationModel&
 }
 
 std::optional<PoseWitness> MemoryUpdate::Image::witness() const {
-  if (!view.pose || view.known_probability < min_sure_probability) return std::nullopt;
-  return PoseWitness{view.odometry, *view.pose, view.radius_m.value_or(0.0), 0.0};
+  if (!view.pose || view.probability < min_sure_probability) return std::nullopt;
+  return PoseWitness{view.odometry, *view.pose, view.radius_m, 0.0};
 }
 
 void MemoryUpdate::add(MemoryUpdate::LocalisedView view) {
@@ -76,6 +76,7 @@ void MemoryUpdate::add(MemoryUpdate::LocalisedView view) {
     travelled_m = last.travelled_m + step_m;
   }
   images_.push_back({number, travelled_m, std::move(view)});
+  if (images_.back().witness()) ++sure_count_;
   decide_ready_images(false);
 }
 
@@ -187,6 +188,7 @@ bool MemoryUpdate::is_less_useful(ViewId a, ViewId b) const {
 MemoryUpdate::Changes MemoryUpdate::finish() {
   decide_ready_images(true);
   MemoryUpdate::Changes changes;
+  changes.sure = sure_count_;
   changes.certain = certain_count_;
   changes.matched.assign(matched_.begin(), matched_.end());
   for (const ViewId view : matched_) {

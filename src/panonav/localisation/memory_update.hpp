@@ -64,7 +64,7 @@ class MemoryUpdate {
   struct LocalisedView {
     Pose2 odometry;                  ///< absolute, in its own frame
     PackedSignature signature;       ///< of the image, in the memory's shape
-    double known_probability = 0.0;  ///< probability that the place is known, by the localiser
+    double probability = 0.0;        ///< of the localised place (`Place::probability`)
     std::optional<Pose2> pose;       ///< estimated; nullopt if position or heading is unknown
     std::optional<double> radius_m;  ///< contains the true position in 95 % of the cases
   };
@@ -80,6 +80,7 @@ class MemoryUpdate {
     std::vector<ViewId> replaced;   ///< removed for an added one; ascending
     std::vector<ViewId> forgotten;  ///< removed after too many failures; ascending
     std::vector<ViewId> matched;    ///< ascending
+    std::size_t sure = 0;           ///< number of images that were localised surely
     std::size_t certain = 0;        ///< number of images whose pose was certain
     UseStatistics use;              ///< to be stored; without the added views and their number
   };
@@ -123,6 +124,7 @@ class MemoryUpdate {
   std::deque<Image> images_;  // images before `undecided_` only serve as witnesses
   std::size_t undecided_ = 0;
   std::size_t image_count_ = 0;
+  std::size_t sure_count_ = 0;
   std::size_t certain_count_ = 0;
   std::set<ViewId> matched_;
   std::set<ViewId> failed_;

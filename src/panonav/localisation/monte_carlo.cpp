@@ -265,13 +265,25 @@ struct MonteCarloLocaliser::Implementation {
     }
   }
 
-  void fill_estimate(MonteCarloEstimate& estimate, const ParticleModes& found) const {
-    estimate.modes = found.modes;
-    for (PoseMode& mode : estimate.modes) {
+  /// Returns the modes with the covariance of the position error.
+  [[nodiscard]] std::vector<PoseMode> correct_modes(std::vector<PoseMode> modes) const {
+    for (PoseMode& mode : modes) {
       mode.covariance = error.corrected_covariance(mode.covariance, mode.mean.heading_rad,
                                                    odometry.translation_scale_error);
       mode.spread_m = std::sqrt(mode.covariance[0] + mode.covariance[4]);
     }
+    return modes;
+  }
+
+  /// True if the first mode has almost all the weight and is no wider than the references'
+  /// resolution.
+  [[nodiscard]] bool is_certain(const std::vector<PoseMode>& modes) const {
+    return !modes.empty() && modes.front().weight >= min_localised_weight &&
+           modes.front().spread_m <= std::max(model.spacing_m, model.range_m);
+  }
+
+  void fill_estimate(MonteCarloEstimate& estimate, const ParticleModes& found) const {
+    estimate.modes = correct_modes(found.modes);
     estimate.spread_m = position_spread_m(particles);
     estimate.p_inside = p_inside;
     estimate.probability = found.modes.empty() ? 0.0 : p_inside * found.modes.front().weight;
@@ -280,12 +292,20 @@ struct MonteCarloLocaliser::Implementation {
     if (!found.modes.empty() && !is_in_memorised_area(found.modes.front().mean.position())) return;
     estimate.state = LocalisationState::ambiguous;
     if (found.modes.empty()) return;
-    const PoseMode& first = found.modes.front();
-    estimate.pose = first.mean;
-    const double widest_m = std::max(model.spacing_m, model.range_m);
-    if (first.weight >= min_localised_weight && first.spread_m <= widest_m) {
+    estimate.pose = found.modes.front().mean;
+    estimate.position = estimate.pose->position();
+    if (is_certain(estimate.modes)) {
       estimate.state = LocalisationState::localised;
+      return;
     }
+    const ParticleModes places = find_modes(particles, {.cell_m = model.spacing_m, .headings = 1});
+    std::vector<PoseMode> by_position = correct_modes(places.modes);
+    if (!is_certain(by_position)) return;
+    estimate.state = LocalisationState::position_known;
+    estimate.modes = std::move(by_position);
+    estimate.pose.reset();
+    estimate.position = estimate.modes.front().mean.position();
+    estimate.probability = p_inside * estimate.modes.front().weight;
   }
 
   void resample_if_needed(std::size_t occupied_bins) {
@@ -336,6 +356,8 @@ std::string_view to_string(LocalisationState state) {
   switch (state) {
     case LocalisationState::localised:
       return "localised";
+    case LocalisationState::position_known:
+      return "position_known";
     case LocalisationState::ambiguous:
       return "ambiguous";
     case LocalisationState::lost:
@@ -412,6 +434,11 @@ void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
     own.particles.set(i, {x, y, wrap_angle(heading)}, 1.0 / static_cast<double>(count));
   }
   own.restart(true);
+}
+
+void MonteCarloLocaliser::set_odometry_noise(const OdometryNoise& noise) {
+  validate(noise);
+  implementation_->odometry = noise;
 }
 
 void MonteCarloLocaliser::move(const Pose2& step) {

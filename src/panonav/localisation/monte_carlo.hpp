@@ -40,20 +40,26 @@ void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
 /// Certainty of the estimated position.
 enum class LocalisationState {
   localised,  ///< one mode, no wider than the references' resolution, explains the views
+  /// As `localised`, but the heading is not known: the views of the memory have none, or a place
+  /// looks the same in two directions.
+  position_known,
   ambiguous,  ///< the views fit the memory, but at several places or in a large area
   lost,       ///< the views do not fit the memory, or odometry has left its area
 };
-/// Returns "localised", "ambiguous" or "lost".
+/// Returns "localised", "position_known", "ambiguous" or "lost".
 [[nodiscard]] std::string_view to_string(LocalisationState state);
 
 /// Estimate of the filter after an image.
 struct MonteCarloEstimate {
-  LocalisationState state = LocalisationState::lost;  ///< localised, ambiguous or lost
-  /// Modes with at least 1 % of the weight, heaviest first. Covariance and spread are those of the
+  LocalisationState state = LocalisationState::lost;  ///< certainty
+  /// Modes with at least 1 % of the weight, heaviest first. They are separated by position and
+  /// heading; by position alone if the heading is not known. Covariance and spread are those of the
   /// position error. They are larger than the particles', because the filter ignores that errors of
   /// successive views and of travel are correlated (docs/decisions.md).
   std::vector<PoseMode> modes;
-  std::optional<Pose2> pose;         ///< mean of the heaviest mode; nullopt when lost
+  /// Mean of the heaviest mode; nullopt when lost or if the heading is not known.
+  std::optional<Pose2> pose;
+  std::optional<Point2> position;    ///< mean of the heaviest mode; nullopt when lost
   double spread_m = 0.0;             ///< root mean square distance of all particles from their mean
   int particles = 0;                 ///< number of particles, chosen by KLD sampling
   double effective_particles = 0.0;  ///< effective sample size before resampling
@@ -118,6 +124,8 @@ class MonteCarloLocaliser {
   /// Restarts around a known pose. `deviation_m`: standard deviation of x and of y, >= 0.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
+  /// Sets the noise of all later steps. Throws OptionError.
+  void set_odometry_noise(const OdometryNoise& noise);
   /// Moves the particles by a step of the odometry (robot_old_from_robot_new) with its noise. Any
   /// number of steps may come between two images.
   void move(const Pose2& step);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -74,17 +75,47 @@ struct PositionEstimate {
 
   double x_m = 0.0;  ///< in the frame of the memory's positions
   double y_m = 0.0;  ///< in the frame of the memory's positions
-  /// Radius around the estimate within which the true position lies in 95 % of the cases; nullopt
-  /// if it could not be learnt.
+  /// Bound of the position along a line of views, narrower than the radius.
+  struct AlongRoute {
+    double direction_rad = 0.0;  ///< of the line at the estimate, in [-pi/2, pi/2]
+    double within_m = 0.0;       ///< contains the error along the line in 95 % of the cases
+  };
+  /// Radius around the estimate within which the true position lies in 95 % of the cases, also
+  /// beside a line of views (`interpolate_position`); nullopt if errors could not be learnt.
   std::optional<double> radius_m;
+  /// Stated beside the radius where the views form a line, such as a drive.
+  std::optional<AlongRoute> along_route;
   std::vector<Share> shares;                                    ///< nearest first
   [[nodiscard]] Point2 position() const { return {x_m, y_m}; }  ///< The position as a point.
+  /// Standard deviation of a coordinate of which nothing is known, in metres: larger than any
+  /// memorised place.
+  static constexpr double unknown_deviation_m = 1e3;
+  /// Returns the covariance of x and y in m^2 (xx, xy, yy) of a Gaussian with these bounds; on a
+  /// line, the radius bounds the error across it. Its deviation is `unknown_deviation_m` where no
+  /// bound is stated.
+  [[nodiscard]] std::array<double, 3> covariance() const noexcept;
+};
+
+/// A further place of the memory at which the query may have been taken.
+struct AlternativePlace {
+  PlaceMatch match;                          ///< its best match
+  double probability = 0.0;                  ///< that the query was taken there
+  std::optional<PositionEstimate> position;  ///< as `Place::position`
+  std::optional<double> heading_rad;         ///< as `Place::heading_rad`
 };
 
 /// Result of localising one view.
 struct Place {
   PlaceEvidence evidence;          ///< from which `known_probability` was computed
   double known_probability = 0.0;  ///< probability that the place is in the memory
+  /// Probability that the query was taken at the chosen place: `known_probability`, less what the
+  /// alternatives get.
+  double probability = 0.0;
+  /// Other places that the query's image does not exclude, most probable first
+  /// (`share_probability`), such as the opposite side of a symmetric hall. Empty if the place is
+  /// unknown or its views have no positions. Bounds of positions hold if the query was taken at
+  /// that place.
+  std::vector<AlternativePlace> alternatives;
   bool known = false;  ///< `known_probability` is at least 0.5; matches are listed anyway
   /// Matches: the chosen place and its neighbours first, then all others, each group ascending by
   /// `RankedMatch::score`. The one of the first four that is nearest to `position` is moved to the
@@ -92,8 +123,8 @@ struct Place {
   /// instead.
   std::vector<PlaceMatch> matches;
   /// Position interpolated between references; nullopt if the place is unknown or the nearest view
-  /// has no pose. If only local features recognise the place, the radius is at least that of the
-  /// interpolation's neighbourhood (`PositionModel`).
+  /// has no pose. If only local features recognise the place, its bound is at least the radius of
+  /// the interpolation's neighbourhood (`PositionModel`).
   std::optional<PositionEstimate> position;
   /// Heading of the robot in the frame of the positions, in [-pi, pi); nullopt if the place is
   /// unknown or none of the four nearest views has a heading.

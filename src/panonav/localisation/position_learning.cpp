@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -32,6 +34,13 @@ constexpr int searched_match_count = 4 * PositionModel::max_candidates;
 /// Largest distance between a view and its best match, in spacings, at which the match is right: a
 /// grid's neighbours are nearer.
 constexpr double max_right_match_spacings = 2.0;
+/// Limits of the bins of distances, in spacings, in which the changes of views are learnt; each is
+/// about 1.3 times the one before.
+constexpr std::array<double, 11> change_distances = {0.5, 1.2, 1.6, 2.1, 2.6, 3.3,
+                                                     4.3, 5.5, 7.0, 9.0, 12.0};
+static_assert(change_distances.size() == std::tuple_size_v<decltype(PositionModel::changes)> + 1);
+/// Smallest number of pairs of views in a bin: the median's error is then a fifth of the spread.
+constexpr std::size_t min_change_pairs = 20;
 /// Smallest unit of squared differences; avoids a division by 0 if all views are identical.
 constexpr double min_difference_unit = 1e-4;
 
@@ -41,8 +50,9 @@ struct LeftOutViews {
   /// All matches of the search, aliased views included. The interpolation is learnt from these,
   /// since they matter if there are few views.
   std::vector<ResemblingViews> found;
-  /// Matches without aliased views, ranked as for a query; the radius is learnt from these.
+  /// Matches without aliased views, ranked as for a query; bounds are learnt from these.
   std::vector<ResemblingViews> answered;
+  std::vector<LocalLayout> layouts;  ///< of the other views around the best match of `answered`
 
   [[nodiscard]] std::size_t size() const { return true_positions.size(); }
   [[nodiscard]] bool is_found_near(std::size_t i, double spacing_m) const {
@@ -74,8 +84,9 @@ std::vector<ViewId> find_aliased_views(const VisualMemory& memory, Point2 truth,
   return aliased;
 }
 
-void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& support, ViewId view,
-                       double spacing_m, LeftOutViews& left_out) {
+void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& support,
+                       const ReferenceLayout& layout, ViewId view, double spacing_m,
+                       LeftOutViews& left_out) {
   const VisualMemory& memory = ranking.memory();
   const PackedSignature own = memory.packed(view);
   const Point2 truth = memory.info(view).pose->position();
@@ -101,14 +112,19 @@ void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& sup
   if (!begins_posed(ranked) || !begins_posed(all)) return;
   left_out.found.push_back(compare_with_each_other(ranking, all));
   left_out.answered.push_back(compare_with_each_other(ranking, ranked));
+  left_out.layouts.push_back(
+      layout.around(left_out.answered.back().positions[0], std::span(&view, 1)));
   left_out.true_positions.push_back(truth);
 }
 
 LeftOutViews leave_out_in_turn(const ColumnRanking& ranking, std::span<const ViewId> views,
                                double spacing_m) {
   const NeighbourSupport support(ranking);
+  const ReferenceLayout layout(ranking.memory(), spacing_m);
   LeftOutViews left_out;
-  for (const ViewId view : views) add_left_out_view(ranking, support, view, spacing_m, left_out);
+  for (const ViewId view : views) {
+    add_left_out_view(ranking, support, layout, view, spacing_m, left_out);
+  }
   return left_out;
 }
 
@@ -144,21 +160,24 @@ bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
   return std::isfinite(best_sum_m);
 }
 
-/// Errors of the interpolated positions, and their kriging variances.
-struct InterpolationErrors {
-  std::vector<double> errors_m;
-  std::vector<double> variances;
+/// Error of the interpolated position of a view left out.
+struct LeftOutError {
+  Point2 error;
+  double kriging_variance = 0.0;  ///< expected squared error, in the unit of the variogram
+  [[nodiscard]] double length_m() const { return std::hypot(error.x_m, error.y_m); }
 };
 
-InterpolationErrors interpolate_all(const LeftOutViews& left_out, const PositionModel& model) {
-  InterpolationErrors result;
+std::vector<LeftOutError> interpolate_all(const LeftOutViews& left_out,
+                                          const PositionModel& model) {
+  std::vector<LeftOutError> errors;
   for (std::size_t i = 0; i < left_out.size(); ++i) {
-    const KrigedPosition kriged =
+    const KrigedPosition found =
         krige(left_out.answered[i], model.neighbourhood_m, model.exponent, model.difference_unit);
-    result.errors_m.push_back(distance(kriged.position, left_out.true_positions[i]));
-    result.variances.push_back(kriged.variance);
+    const Point2 truth = left_out.true_positions[i];
+    errors.push_back(
+        {{found.position.x_m - truth.x_m, found.position.y_m - truth.y_m}, found.variance});
   }
-  return result;
+  return errors;
 }
 
 // Learns `ambiguous_from`: sorts the views by ratio and takes the longest prefix in which hardly
@@ -186,34 +205,65 @@ void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> error
   model.ambiguous_radius_m = quantile(ambiguous_errors_m, coverage);
 }
 
-// Learns the radii that contain the errors of views found near their place, separately for
-// surrounded views and views at the edge. Returns false if no view was found near its place.
-bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors,
-                 PositionModel& model) {
-  std::vector<double> all;
-  std::vector<double> surrounded;
-  std::vector<double> at_edge;
+// Learns the errors of views found near their place, where the others surround them and where they
+// form a line.
+void learn_errors(const LeftOutViews& left_out, std::span<const LeftOutError> errors,
+                  PositionModel& model) {
+  using Kind = LocalLayout::Kind;
+  std::vector<double> area_ratios;
+  std::vector<double> along_line;
   for (std::size_t i = 0; i < left_out.size(); ++i) {
-    const double variance = errors.variances[i] + min_variance_share * model.variance_unit;
-    if (!(variance > 0.0) || !left_out.is_answered_near(i, model.spacing_m)) continue;
-    all.push_back(errors.errors_m[i] / std::sqrt(variance));
-    (is_surrounded(left_out.answered[i], model.spacing_m) ? surrounded : at_edge)
-        .push_back(all.back());
+    if (!left_out.is_answered_near(i, model.spacing_m)) continue;
+    const LocalLayout& layout = left_out.layouts[i];
+    const Point2 error = errors[i].error;
+    if (layout.kind == Kind::area && errors[i].kriging_variance > 0.0) {
+      area_ratios.push_back(std::pow(errors[i].length_m(), 2.0) / errors[i].kriging_variance);
+    } else if (layout.kind == Kind::line) {
+      along_line.push_back(std::abs(error.x_m * std::cos(layout.direction_rad) +
+                                    error.y_m * std::sin(layout.direction_rad)));
+    }
   }
-  // If no view was found near its place, every answer is ambiguous, and `ambiguous_radius_m`
-  // decides.
-  if (all.empty() && model.ambiguous_from) all.push_back(0.0);
-  if (all.empty()) return false;
-  // Returns the value that a further sample exceeds with at most the probability 1 - `coverage`.
-  // Uses all errors if there are few of this kind.
-  const auto bound = [&](const std::vector<double>& kind) {
-    const auto& of = kind.size() < PositionModel::min_views ? all : kind;
-    const double n = static_cast<double>(of.size());
-    return quantile(of, std::min(1.0, coverage * (n + 1.0) / n));
+  constexpr std::size_t min_count = PositionModel::min_views;
+  if (area_ratios.size() >= min_count) model.area_error_ratio = quantile(area_ratios, coverage);
+  if (along_line.size() >= min_count) model.line_error_m = quantile(along_line, 0.5);
+}
+
+// Learns how views change with distance, from the resembling views of each view left out.
+void learn_changes(const LeftOutViews& left_out, PositionModel& model) {
+  struct Pairs {
+    std::vector<double> distances_m;
+    std::vector<double> squared_differences;
   };
-  model.radius_m_per_deviation = bound(surrounded);
-  model.edge_radius_m_per_deviation = bound(at_edge);
-  return true;
+  std::array<Pairs, change_distances.size() - 1> bins;
+  for (const ResemblingViews& near : left_out.answered) {
+    for (std::size_t i = 0; i < near.views.size(); ++i) {
+      for (std::size_t j = 0; j < near.views.size(); ++j) {
+        const double apart_m = distance(near.positions[i], near.positions[j]);
+        const auto bin = std::ranges::upper_bound(change_distances, apart_m / model.spacing_m) -
+                         change_distances.begin();
+        if (bin == 0 || bin == static_cast<std::ptrdiff_t>(change_distances.size())) continue;
+        Pairs& pairs = bins[static_cast<std::size_t>(bin) - 1];
+        pairs.distances_m.push_back(apart_m);
+        pairs.squared_differences.push_back(near.squared_mutual_differences(
+            static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)));
+      }
+    }
+  }
+  std::size_t learnt = 0;
+  for (const Pairs& pairs : bins) {
+    if (pairs.distances_m.size() < min_change_pairs) continue;
+    const PositionModel::Change before =
+        learnt > 0 ? model.changes[learnt - 1] : PositionModel::Change{};
+    const auto& differences = pairs.squared_differences;
+    model.changes[learnt++] = {
+        quantile(pairs.distances_m, 0.5),
+        std::max(before.squared_difference, quantile(differences, 0.5)),
+        std::max(before.small_squared_difference, quantile(differences, 1.0 - coverage))};
+  }
+  // Empty bins repeat the last change.
+  if (learnt == 0) return;
+  std::fill(model.changes.begin() + static_cast<std::ptrdiff_t>(learnt), model.changes.end(),
+            model.changes[learnt - 1]);
 }
 
 }  // namespace
@@ -232,12 +282,15 @@ PositionModel learn_position_model(const ColumnRanking& ranking, const LearningO
   model.sampled_views = static_cast<int>(left_out.size());
   model.difference_unit = learn_difference_unit(left_out);
   if (!choose_interpolation(left_out, model)) return model;  // [M04 footnote 1]
-  const InterpolationErrors errors = interpolate_all(left_out, model);
-  model.variance_unit = quantile(errors.variances, 0.5);
-  model.median_error_m = quantile(errors.errors_m, 0.5);
-  model.error95_m = quantile(errors.errors_m, coverage);
-  learn_ambiguity(left_out, errors.errors_m, model);
-  model.learnt = learn_radii(left_out, errors, model);
+  const auto errors = interpolate_all(left_out, model);
+  std::vector<double> errors_m;
+  for (const LeftOutError& error : errors) errors_m.push_back(error.length_m());
+  model.median_error_m = quantile(errors_m, 0.5);
+  model.error95_m = quantile(errors_m, coverage);
+  learn_ambiguity(left_out, errors_m, model);
+  learn_errors(left_out, errors, model);
+  learn_changes(left_out, model);
+  model.learnt = true;
   return model;
 }
 

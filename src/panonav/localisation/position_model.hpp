@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 
 #include "panonav/localisation/column_ranking.hpp"
 #include "panonav/localisation/place.hpp"
+#include "panonav/localisation/reference_layout.hpp"
 #include "panonav/localisation/sample.hpp"
 
 namespace panonav {
@@ -28,43 +30,61 @@ struct PositionModel {
   /// difference^(2 exponent).
   double exponent = 1.5;
   double difference_unit = 1.0;  ///< median squared difference to the nearest view
-  double variance_unit = 0.0;    ///< median kriging variance
-  /// Ratio of the 95 % radius to the kriging standard deviation if neighbouring references surround
-  /// the best match, so that no half circle around it is empty.
-  double radius_m_per_deviation = 0.0;
-  /// The same ratio if a half circle is empty: the place may be outside the outermost references.
-  double edge_radius_m_per_deviation = 0.0;
-  double spacing_m = 0.0;  ///< of the posed views
+  double spacing_m = 0.0;        ///< of the posed views
   /// The position may be that of a lookalike if the best match's difference is at least this
   /// share of the difference of the best match elsewhere (more than 3 spacings away). nullopt if
   /// aliased views are rare.
   std::optional<double> ambiguous_from;
-  double ambiguous_radius_m = 0.0;  ///< lower limit of the radius from `ambiguous_from` on
-  double median_error_m = 0.0;      ///< median position error of the views left out
-  double error95_m = 0.0;           ///< 95 % quantile of the errors of the views left out
+  double ambiguous_radius_m = 0.0;  ///< lower limit of all bounds from `ambiguous_from` on
+  /// How views change with distance: squared differences of views that are about `distance_m`
+  /// apart. None is smaller than at a smaller distance.
+  struct Change {
+    double distance_m = 0.0;                ///< distance of the views
+    double squared_difference = 0.0;        ///< median
+    double small_squared_difference = 0.0;  ///< exceeded by 95 % of the views
+    friend bool operator==(const Change&, const Change&) = default;
+  };
+  std::array<Change, 10> changes{};  ///< ascending by distance; all 0: not learnt
+  /// 95 % quantile of squared position error over kriging variance, of the views left out that
+  /// others surround; nullopt if there are fewer than `min_views` of them.
+  std::optional<double> area_error_ratio;
+  /// Median of the errors along the line where the other views form a line; nullopt likewise.
+  std::optional<double> line_error_m;
+  double median_error_m = 0.0;  ///< median position error of the views left out
+  double error95_m = 0.0;       ///< 95 % quantile of the errors of the views left out
   friend bool operator==(const PositionModel&, const PositionModel&) = default;
 };
 
-/// Learns the model by leaving out each sampled view in turn: first the neighbourhood and exponent
-/// with the smallest position errors, then the radius that contains 95 % of the errors of views
-/// found near their true place. If more than 1 of 40 views is found at a lookalike, views that
-/// match hardly better than elsewhere get a larger radius. The radius tends to be too large, as
-/// left-out views are farther from other references than queries are. Throws OptionError. Cost:
-/// `sampled_views` searches and about 1 ms for each.
+/// Learns the model by leaving out each sampled view in turn: the neighbourhood and exponent with
+/// the smallest position errors, how large these are, and how views change with distance. If more
+/// than 1 of 40 views is found at a lookalike, views that match hardly better than elsewhere get
+/// larger bounds. Throws OptionError. Cost: `sampled_views` searches and about 1 ms for each.
 [[nodiscard]] PositionModel learn_position_model(const ColumnRanking& ranking,
                                                  const LearningOptions& options = {
                                                      .sampled_views = 200});
 
+/// Number of terms in the bound of a position.
+inline constexpr int bound_term_count = 3;
+/// Returns the regression terms of the logarithm of a 95 % bound along a line, in spacings: 1 and
+/// the logarithms of two lengths in spacings: the distance at which views differ as much as the
+/// query from its best match (plus 0.1 for noise), and the median error of the views left out (0.02
+/// to 1). `bench/position_bound` learns the coefficients on built-in scenes, because a view left
+/// out is never beside the line (docs/decisions.md). nullopt if the model has no error on lines.
+[[nodiscard]] std::optional<std::array<double, bound_term_count>> bound_terms(
+    const PositionModel& model, double difference);
+
 /// Interpolates the position by ordinary kriging in signature space: returns the weighted mean of
-/// the neighbouring references' positions with the smallest expected squared error. Assumes that
-/// half the mean square distance of two places is proportional to a power of their squared
-/// difference (`ColumnMatch`), with the model's exponent [cf. M04 section 2.2]. If the query is a
-/// memorised view, returns that view's position.
+/// the neighbouring references' positions with the smallest expected squared error, if half the
+/// mean square distance of two places is proportional to a power of their squared difference [cf.
+/// M04 section 2.2]. A memorised view gets its own position.
 ///
-/// `matches`: best first, compared over the model's components; views without a pose or far from
-/// the best one are ignored. nullopt if the best match has no pose. Cost: 240 comparisons of
-/// columns and a dense solution, 0.7 ms.
+/// Radius: where views surround the best match, from the kriging variance (`area_error_ratio`);
+/// elsewhere the distance beyond which 95 % of the views differ more than the query from it.
+/// `layout`: of the memory. `matches`: best first; only posed ones near the first count.
+/// `excluded`: not part of the layout. nullopt if the best match has no pose. Cost: 240 comparisons
+/// of columns, 0.7 ms.
 [[nodiscard]] std::optional<PositionEstimate> interpolate_position(
-    const ColumnRanking& ranking, const PositionModel& model, std::span<const RankedMatch> matches);
+    const ColumnRanking& ranking, const PositionModel& model, const ReferenceLayout& layout,
+    std::span<const RankedMatch> matches, std::span<const ViewId> excluded = {});
 
 }  // namespace panonav

@@ -13,8 +13,9 @@ struct LoopClosureOptions {
   int candidates = 5;  ///< number of candidates for each view, from the memory's search
   /// Shortest path length of a loop; views that are closer along the path are no candidates.
   double min_loop_m = 3.0;
-  /// Largest share of the energy of both views that may be unexplained.
-  double max_residual = 0.2;
+  /// Largest share of the energy of both views that may be unexplained. Of 177 closures in seven
+  /// drives, those up to 0.06 were off by 0.02 m (90 %: 0.09 m), those above 0.12 by 0.7 m (1.8 m).
+  double max_residual = 0.1;
   /// Largest distance between the views in units of R, the distance of the things around; home
   /// vectors between farther views are not reliable.
   double max_length = 0.3;
@@ -33,10 +34,6 @@ struct LoopClosureOptions {
   int sequence = 3;
   /// Shortest path between reported closures: closer ones cost time and add no information.
   double spacing_m = 0.5;
-  /// Largest drift of the odometry in metres per metre since the last closure. The rest of the loop
-  /// adds a fifth of it per metre, and R is added in any case. The heading may be off by twice this
-  /// value, in rad, plus `heading_tolerance_rad`.
-  double max_drift = 0.1;
 };
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
 

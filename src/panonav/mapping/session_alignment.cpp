@@ -69,8 +69,8 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
     nodes.back().view = append(view);
     poses.push_back(second.nodes[i].pose);
     number.push_back(i);
-    for (LoopClosure found :
-         finder.find(nodes, poses, OdometryView(memory.signature(view)), scale_m)) {
+    for (LoopClosure found : finder.find(nodes, poses, OdometryView(memory.signature(view)),
+                                         scale_m, [](const LoopClosure&) { return true; })) {
       if (found.earlier >= first.nodes.size()) continue;
       found.later = number[found.later - first.nodes.size()];
       matches.push_back(found);
@@ -238,7 +238,8 @@ std::optional<SessionAlignment> align_sessions(const VisualMemory& memory,
   validate(options);
   validate(first);
   validate(second);
-  const LoopClosureOptions closure;
+  // Single matches need not be as certain as closures of one drive, since many must agree.
+  const LoopClosureOptions closure{.max_residual = 0.2};
   const double scale_m =
       std::max(estimate_visual_scale_m(memory, first).value_or(VisualOdometryOptions{}.scale_m),
                estimate_visual_scale_m(memory, second).value_or(0.0));

@@ -24,10 +24,10 @@ struct MappingOptions {
   /// its standard deviation is equal to it. For recordings whose images are far apart. 0: a new
   /// connected component begins instead.
   double bridge_m = 0.0;
-  /// Use the motion of the wheels where it is known: length and direction come from the wheels, and
-  /// the turn is the mean of wheels and views, weighted by their inverse variances. The variance of
-  /// the views' turns is learnt from the latest steps: the squared difference to the wheels' turns
-  /// less the variance of the wheels (`OdometryNoise`).
+  /// Use the motion of the wheels where it is known. Once ten loop closures have shown the errors
+  /// of the wheels, turns are the means of wheels and views, weighted by their inverse variances.
+  /// The variance of the views' turns is learnt from the latest steps: the squared difference to
+  /// the wheels' turns less the variance of the wheels.
   bool wheels = true;
   /// Standard deviation of the position after a step from views, in metres per metre of the step.
   double step_deviation = 0.08;
@@ -37,12 +37,13 @@ struct MappingOptions {
 void visit_options(MappingOptions& options, OptionVisitor& visitor);
 
 /// Builds a map from successive views: each becomes a node, connected to the previous node by
-/// visual odometry. A loop closure (`LoopClosureOptions`) moves only the nodes since the last
-/// closure, so that they fit the older map. If a contradiction remains and the map has grown by 1 %
-/// since its last full optimisation, the whole map is optimised as a pose graph; the cost per view
-/// thus stays small in large maps. Where neither views nor wheels give a step and none is assumed
-/// (`bridge_m`), a new connected component with its own frame begins, which a later closure can
-/// join with another one.
+/// visual odometry or wheels. A loop closure (`LoopClosureOptions`) must be one that the path
+/// between its nodes allows (three standard deviations), with the errors of steps that earlier
+/// closures have shown; it moves only the nodes since the last closure. If a contradiction remains
+/// and the map has grown by 1 % since its last full optimisation, the whole map is optimised as a
+/// pose graph. Where neither views nor wheels
+/// give a step and none is assumed (`bridge_m`), a new connected component with its own frame
+/// begins, which a later closure can join with another one.
 class TopologicalMapper {
  public:
   /// The changes of the map by one view.
@@ -67,10 +68,16 @@ class TopologicalMapper {
   [[nodiscard]] bool is_new(const OdometryView& view) const;
 
   /// Adds a node. The view must be the memory's latest; `moved`: motion by the wheels since the
-  /// last node (robot_old_from_robot_new), nullopt without wheels. Throws ContractError on a view
-  /// that is not in the memory or not later than those before, on another shape, and on a step that
-  /// is not finite.
-  Update add(ViewId view, OdometryView image, const std::optional<Pose2>& moved = std::nullopt);
+  /// node that is `moved_nodes` before this one (robot_old_from_robot_new), nullopt without wheels;
+  /// more than 1 if the wheels were not known at the nodes between. Throws ContractError on a view
+  /// that is not in the memory or not later than those before, on another shape, on a step that is
+  /// not finite, and on a node before the first.
+  Update add(ViewId view, OdometryView image, const std::optional<Pose2>& moved = std::nullopt,
+             std::size_t moved_nodes = 1);
+
+  /// Begins a new path: the next view does not follow the last one, and so begins a new connected
+  /// component unless its motion is given. Its turns and speed are learnt again.
+  void begin_path();
 
   /// Optimises the map if it has changed since the last time.
   void finish();
@@ -82,6 +89,8 @@ class TopologicalMapper {
   [[nodiscard]] TopologicalMap map() const;
   /// Metric scale of visual displacements: from the wheels, or else from the visual odometry.
   [[nodiscard]] double scale_m() const;
+  /// True if the scale was measured: by wheels or from the ground.
+  [[nodiscard]] bool is_metric() const;
 
  private:
   class Implementation;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "panonav/geometry/pose2.hpp"
+#include "panonav/geometry/pose3.hpp"
 
 namespace panonav {
 
@@ -14,6 +14,13 @@ struct StampedPose {
   double stamp_s = 0.0;  ///< seconds, on a clock that the trajectory's source defines
   Pose2 pose;            ///< in the trajectory's frame
   friend bool operator==(const StampedPose&, const StampedPose&) = default;
+};
+
+/// A pose in space at a time.
+struct StampedPose3 {
+  double stamp_s = 0.0;  ///< seconds, on a clock that the source defines
+  Pose3 pose;            ///< in a frame that the source defines
+  friend bool operator==(const StampedPose3&, const StampedPose3&) = default;
 };
 
 /// Interpolates between poses: position on the straight line, heading along the shorter rotation.

@@ -174,7 +174,7 @@ std::optional<double> Navigator::Core::direction_to_known_place(const QueryView&
   }
   const HomeVector back = home_vector(
       views.read_coefficients(graph().view(*place.known_node), view.components), view.view);
-  if (back.confidence <= min_vector_confidence) return std::nullopt;
+  if (!back.has_direction()) return std::nullopt;
   return back.direction_rad();
 }
 
@@ -236,7 +236,7 @@ std::optional<double> Navigator::Core::direction_along_edge(std::size_t from, co
   if (!views.holds(next)) return direction;
   const HomeVector to_next =
       home_vector(views.read_coefficients(next, step.view.components), step.view.view);
-  if (to_next.confidence <= min_vector_confidence) return direction;
+  if (!to_next.has_direction()) return direction;
   const double next_rad = to_next.direction_rad();
   const std::optional<double> expected =
       direction || obstruction.is_present ? direction : step.last_direction_rad;

@@ -99,18 +99,25 @@ void interpolate_row(const Panorama& seen, const std::vector<Shift>& nodes, int 
 
 }  // namespace
 
-void validate(const Tilt& tilt) {
+bool is_whole_sphere(const ElevationBand& band) noexcept {
+  constexpr double rounding_rad = 1e-6;
+  return band.top_rad - band.bottom_rad > std::numbers::pi - rounding_rad;
+}
+
+void validate(const Tilt& tilt, const std::optional<ElevationBand>& seen) {
+  const bool is_sphere = seen && is_whole_sphere(*seen);
+  const double limit_rad = is_sphere ? std::numbers::pi : max_tilt_rad;
   for (const auto& [name, angle] :
        {std::pair("roll", tilt.roll_rad), std::pair("pitch", tilt.pitch_rad)}) {
-    if (std::abs(angle) <= max_tilt_rad) continue;
+    if (std::abs(angle) <= limit_rad) continue;
     throw ContractError(name, format_number(degrees(angle), "deg") + " degrees",
-                        "-30 to 30 degrees");
+                        is_sphere ? "-180 to 180 degrees" : "-30 to 30 degrees");
   }
 }
 
 Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
                         const ElevationBand& band) {
-  validate(tilt);
+  validate(tilt, seen.elevations());
   require(seen.elevations().has_value(), "elevations of a tilted panorama", 0.0, "known ones");
   if (tilt == Tilt{} && rows == seen.rows() && band == *seen.elevations()) return seen;
   Panorama level(rows, seen.columns(), band);
@@ -154,7 +161,7 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
 }
 
 Panorama level_panorama(const Panorama& seen, const Tilt& tilt) {
-  validate(tilt);
+  validate(tilt, seen.elevations());
   if (seen.elevations()) return level_panorama(seen, tilt, seen.rows(), *seen.elevations());
   constexpr double tolerated_tilt_rad = 0.5 * std::numbers::pi / 180.0;
   if (std::max(std::abs(tilt.roll_rad), std::abs(tilt.pitch_rad)) <= tolerated_tilt_rad)

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "panonav/panorama/panorama.hpp"
 
 namespace panonav {
@@ -7,8 +9,8 @@ namespace panonav {
 /// Tilt of the camera's axis against the vertical: first about the robot's x axis (positive lowers
 /// the right side), then about its y axis (positive lowers the front), right-handed [REP 103].
 struct Tilt {
-  double roll_rad = 0.0;   ///< about x, at most `max_tilt_rad` either way
-  double pitch_rad = 0.0;  ///< about y, at most `max_tilt_rad` either way
+  double roll_rad = 0.0;   ///< about x, within the range of `validate`
+  double pitch_rad = 0.0;  ///< about y, within the range of `validate`
   friend bool operator==(const Tilt&, const Tilt&) = default;
 };
 
@@ -16,8 +18,12 @@ struct Tilt {
 /// azimuths.
 inline constexpr double max_tilt_rad = 0.5235987755982988;  // 30 degrees
 
-/// Throws ContractError unless both angles are at most `max_tilt_rad`.
-void validate(const Tilt& tilt);
+/// True if the band reaches from pole to pole.
+[[nodiscard]] bool is_whole_sphere(const ElevationBand& band) noexcept;
+
+/// Throws ContractError unless both angles are at most `max_tilt_rad`, or 180 degrees in images
+/// with the elevations `seen` of the whole sphere.
+void validate(const Tilt& tilt, const std::optional<ElevationBand>& seen = std::nullopt);
 
 /// Levels a panorama: computes the view of the robot with its axis vertical, at the same heading
 /// and place. `seen` is rotated by the inverse of the tilt into a panorama of `rows` rows in

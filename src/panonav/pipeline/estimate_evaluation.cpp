@@ -1,34 +1,25 @@
 #include "panonav/pipeline/estimate_evaluation.hpp"
 
 #include <algorithm>
-#include <map>
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/io/trajectory_file.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
 
 namespace {
 
-/// The estimate: a trajectory and, if it comes from a memory file, its map.
-struct Estimate {
-  Trajectory trajectory;
-  std::optional<TopologicalMap> map;
-  std::map<ViewId, double> stamp_s;  // of the map's views
-};
-
-/// Reads a map stored by `Mapper`; the trajectory consists of the poses of its first component.
-Estimate read_map(const std::filesystem::path& path) {
+TrajectoryEstimate read_map(const std::filesystem::path& path) {
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
   auto map = file.map("map");
   if (!map || map->nodes.empty()) {
     throw FileError(path.string(), "contains no map; allowed: a memory file that panonav map made");
   }
   const VisualMemory memory = file.load();
-  Estimate estimate;
-  std::vector<StampedPose> poses;
+  TrajectoryEstimate estimate;
+  estimate.trajectory.format = "map";
+  auto& poses = estimate.trajectory.poses;
   for (const TopologicalMap::Node& node : map->nodes) {
     const auto& stamp_s = memory.info(node.view).stamp_s;
     if (!stamp_s) {
@@ -37,44 +28,65 @@ Estimate read_map(const std::filesystem::path& path) {
                           " has no stamp; allowed: a recording with the column 'stamp_s'");
     }
     estimate.stamp_s.emplace(node.view, *stamp_s);
-    if (node.component == map->nodes.front().component) poses.push_back({*stamp_s, node.pose});
+    if (node.component == map->nodes.front().component) {
+      poses.push_back({*stamp_s, to_pose3(node.pose)});
+    }
   }
-  std::ranges::sort(poses, {}, &StampedPose::stamp_s);
-  estimate.trajectory = Trajectory(poses);
+  std::ranges::sort(poses, {}, &StampedPose3::stamp_s);
   estimate.map = std::move(map);
   return estimate;
 }
 
-std::optional<MapComparison> compare_shapes(const Trajectory& estimate, const Trajectory& truth,
-                                            double max_gap_s) {
+void number_poses(std::vector<StampedPose3>& poses) {
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].stamp_s = static_cast<double>(i);
+}
+
+std::optional<MapComparison> compare_shapes(std::span<const StampedPose3> estimate,
+                                            std::span<const StampedPose3> truth,
+                                            double max_stamp_difference_s) {
   std::vector<Point2> map;
   std::vector<Point2> known;
-  for (const StampedPose& pose : estimate.poses()) {
-    const auto true_pose = truth.at(pose.stamp_s, max_gap_s);
-    if (!true_pose) continue;
-    map.push_back(pose.pose.position());
-    known.push_back(true_pose->position());
+  for (const PosePair& pair : pair_by_stamp(estimate, truth, max_stamp_difference_s)) {
+    map.push_back(to_pose2(estimate[pair.estimate].pose).position());
+    known.push_back(to_pose2(truth[pair.truth].pose).position());
   }
   return compare_positions(map, known);
 }
 
 }  // namespace
 
-std::optional<EstimateEvaluation> evaluate_estimate(const std::filesystem::path& estimate_path,
-                                                    const std::filesystem::path& truth_path,
+TrajectoryEstimate read_estimate(const std::filesystem::path& path) {
+  if (path.extension() == ".panonav") return read_map(path);
+  return {read_trajectory_file(path), {}, {}};
+}
+
+std::optional<EstimateEvaluation> evaluate_estimate(TrajectoryEstimate estimate,
+                                                    TrajectoryFile truth,
                                                     const TrajectoryError::Options& options) {
-  const Estimate estimate = estimate_path.extension() == ".panonav"
-                                ? read_map(estimate_path)
-                                : Estimate{Trajectory(read_trajectory(estimate_path)), {}, {}};
-  const Trajectory truth(read_trajectory(truth_path));
-  const auto error = trajectory_error(estimate.trajectory, truth, options);
+  EstimateEvaluation evaluation;
+  evaluation.paired_by_stamp = estimate.trajectory.has_stamps && truth.has_stamps;
+  auto& poses = estimate.trajectory.poses;
+  if (!evaluation.paired_by_stamp) {
+    require(poses.size() == truth.poses.size(), "number of estimated poses",
+            static_cast<double>(poses.size()),
+            to_text(static_cast<double>(truth.poses.size())) +
+                ", the number of true poses, as poses without stamps are paired by their order");
+    number_poses(poses);
+    number_poses(truth.poses);
+  }
+  auto error = trajectory_error(poses, truth.poses, options);
   if (!error) return std::nullopt;
-  EstimateEvaluation evaluation{
-      *error, compare_shapes(estimate.trajectory, truth, options.max_gap_s), {}};
+  evaluation.trajectory = std::move(*error);
+  const double max_difference_s = options.max_stamp_difference_s;
+  if (is_planar(poses) && is_planar(truth.poses)) {
+    evaluation.map = compare_shapes(poses, truth.poses, max_difference_s);
+  }
   if (estimate.map) {
     evaluation.closures = count_closures(*estimate.map, [&](ViewId view) -> std::optional<Point2> {
-      const auto pose = truth.at(estimate.stamp_s.at(view), options.max_gap_s);
-      return pose ? std::optional(pose->position()) : std::nullopt;
+      const std::vector<StampedPose3> seen{{estimate.stamp_s.at(view), {}}};
+      const auto pair = pair_by_stamp(seen, truth.poses, max_difference_s);
+      if (pair.empty()) return std::nullopt;
+      return to_pose2(truth.poses[pair.front().truth].pose).position();
     });
   }
   return evaluation;

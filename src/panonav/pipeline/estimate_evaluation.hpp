@@ -1,28 +1,42 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 
+#include "panonav/io/trajectory_file.hpp"
 #include "panonav/mapping/map_measures.hpp"
 #include "panonav/motion/trajectory_error.hpp"
 
 namespace panonav {
 
+/// An estimated trajectory and, if it comes from a memory file, its map.
+struct TrajectoryEstimate {
+  TrajectoryFile trajectory;          ///< of a map: the poses of its first component
+  std::optional<TopologicalMap> map;  ///< stored by `Mapper`
+  std::map<ViewId, double> stamp_s;   ///< of the views of the map
+};
+
 /// Errors of an estimated trajectory or map.
 struct EstimateEvaluation {
-  TrajectoryError trajectory;        ///< errors of the poses
-  std::optional<MapComparison> map;  ///< nullopt if `is_comparable` is false
+  TrajectoryError trajectory;   ///< errors of the poses
+  bool paired_by_stamp = true;  ///< false: by the order of the poses, as a file has no stamps
+  /// Agreement of the positions in the plane; nullopt if they are not in one plane or
+  /// `is_comparable` is false.
+  std::optional<MapComparison> map;
   std::optional<MapComparison::Closures>
       closures;  ///< loop closures of a map; nullopt for a trajectory
 };
 
-/// Compares an estimate with a true trajectory (TUM text or CSV). The estimate is a trajectory, or
-/// a memory file (NAME.panonav) with a map stored by `Mapper`, of which only the first component is
-/// compared. Returns nullopt if fewer than two poses have a true pose at their stamp. Throws
-/// FileError, also if a view of the map has no stamp; OptionError. Cost: that of
-/// `compare_positions`.
+/// Reads an estimate: a trajectory file, or a memory file (NAME.panonav) with a map stored by
+/// `Mapper`. Throws FileError, also if a view of the map has no stamp.
+[[nodiscard]] TrajectoryEstimate read_estimate(const std::filesystem::path& path);
+
+/// Compares an estimate with the true poses. If one of them has no stamps, poses are paired by
+/// their order, and ContractError is thrown unless both have equally many. Returns nullopt for
+/// fewer than two pairs. Throws OptionError. Cost: that of `compare_positions`.
 [[nodiscard]] std::optional<EstimateEvaluation> evaluate_estimate(
-    const std::filesystem::path& estimate, const std::filesystem::path& truth,
+    TrajectoryEstimate estimate, TrajectoryFile truth,
     const TrajectoryError::Options& options = {});
 
 }  // namespace panonav

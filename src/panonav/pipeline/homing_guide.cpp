@@ -1,11 +1,11 @@
 #include "panonav/pipeline/homing_guide.hpp"
 
+#include <numbers>
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/view_list.hpp"
-#include "panonav/relative_pose/chance_match.hpp"
+#include "panonav/relative_pose/pair_evidence.hpp"
 
 namespace panonav {
 
@@ -130,16 +130,14 @@ HomingResult HomingGuide::home(const Observation& observation) const {
       throw ContractError("rows", view.rows(),
                           std::to_string(goal_.rows()) + ", as in " + goal_name_);
     }
-    const HomeVector found = home_vector(goal_, view, options_);
-    const ChanceMatch match = compare_with_chance(goal_, view, options_);
-    const bool known = match.is_beyond_chance();
-    return HomingResult{
-        known,
-        known && has_home_direction(found) ? std::optional(found.direction_rad()) : std::nullopt,
-        found.length(),
-        wrap_angle(-found.heading_rad),
-        match.direction_probability(),
-        found};
+    HomingResult result{.evidence = compute_pair_evidence(goal_, view, options_)};
+    // A direction that is not certain within 45 degrees is none.
+    constexpr double max_deviation_rad = std::numbers::pi / 4.0;
+    if (result.evidence && result.evidence->vector.has_direction() &&
+        result.evidence->direction_deviation_rad < max_deviation_rad) {
+      result.direction_rad = result.evidence->vector.direction_rad();
+    }
+    return result;
   });
 }
 

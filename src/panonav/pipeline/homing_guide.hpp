@@ -5,12 +5,14 @@
 #include <string>
 #include <variant>
 
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/pipeline/observation.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/relative_pose/pair_evidence.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -59,32 +61,37 @@ class HomingEncoder {
   bool horizon_;
 };
 
-/// True if the home vector has a reliable direction: its confidence is at least 0.5, so its length
-/// exceeds what its residual alone would produce.
-[[nodiscard]] inline bool has_home_direction(const HomeVector& found) noexcept {
-  return found.length() > 0.0 && found.confidence >= 0.5;
-}
-
 /// Result of comparing an observation with a homing goal.
 struct HomingResult {
-  /// True if observation and goal match better than by chance (`chance_match`); false for noise and
-  /// other places. If false, there is no direction, and distance and turn are meaningless.
-  bool known = false;
+  /// Displacement, turn and probability. nullopt for noise and other places: observation and goal
+  /// are no more similar than views of two buildings, and there is no answer.
+  std::optional<PairEvidence> evidence;
   /// Direction of the goal in the robot's current frame, counter-clockwise from straight ahead.
-  /// nullopt if `known` is false, and at the goal itself (`has_home_direction`).
+  /// nullopt without evidence, and at the goal itself: if the vector is not longer than its error
+  /// (`HomeVector::has_direction`), or its direction is uncertain by 45 degrees or more.
   std::optional<double> direction_rad;
-  double distance_r = 0.0;  ///< in units of R, the typical distance of objects around
-  double turn_rad = 0.0;    ///< rotation of the robot since it was at the goal
-  /// Probability that the error of the direction is at most 45 degrees
-  /// (`ChanceMatch::direction_probability`).
-  double probability = 0.0;
-  HomeVector vector;  ///< the whole result, also if `known` is false
+
+  /// True if there is evidence.
+  [[nodiscard]] bool known() const noexcept { return evidence.has_value(); }
+  /// Probability that the error of the direction is at most 45 degrees; 0 without evidence.
+  [[nodiscard]] double probability() const noexcept {
+    return evidence ? evidence->probability : 0.0;
+  }
+  /// Distance of the goal in units of R, the typical distance of objects around; 0 without
+  /// evidence.
+  [[nodiscard]] double distance_r() const noexcept {
+    return evidence ? evidence->vector.length() : 0.0;
+  }
+  /// Rotation of the robot since it was at the goal; 0 without evidence.
+  [[nodiscard]] double turn_rad() const noexcept {
+    return evidence ? wrap_angle(-evidence->vector.heading_rad) : 0.0;
+  }
 };
 
 /// Computes the direction back to a goal from one observation. The goal is a view of a memory or an
 /// observation taken at the goal. Headings need not be known. Several threads may use one object
-/// concurrently. Cost: that of the encoding, of `home_vector`, and some milliseconds for
-/// `chance_match`.
+/// concurrently. Cost: that of the encoding and of `compute_pair_evidence`, some
+/// milliseconds.
 class HomingGuide {
  public:
   /// `goal`: name or id of a view of the memory file. Pictures come from the memory's own camera.

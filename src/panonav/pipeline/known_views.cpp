@@ -56,7 +56,8 @@ bool is_known_recording(const MemoryFile& memory, const std::string& mark) {
 
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
-                       const std::function<void(std::size_t)>& compared) {
+                       const std::function<void(std::size_t)>& compared,
+                       const std::function<void(const DatasetEntry&, const Error&)>& unread) {
   const VisualMemory views = memory.load();
   std::vector<const DatasetEntry*> known;
   for (const auto& entry : recording.entries) {
@@ -76,11 +77,21 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
   for (std::size_t begin = 0; begin < known.size(); begin += batch) {
     const std::size_t count = std::min(batch, known.size() - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
+    std::vector<std::optional<FileError>> failures(count);
     parallel_for(executor, count, [&](std::size_t i) {
-      signatures[i] = encoder.packed(read_observation(*known[begin + i]));
+      try {
+        signatures[i] = encoder.packed(read_observation(*known[begin + i]));
+      } catch (const FileError& error) {
+        failures[i] = error;
+      }
     });
     for (std::size_t i = 0; i < count; ++i) {
       const auto& entry = *known[begin + i];
+      if (failures[i]) {
+        if (!unread) throw *failures[i];
+        unread(entry, *failures[i]);
+        continue;
+      }
       if (!is_same_picture(*signatures[i], views.packed(*views.find(entry.file)))) {
         throw_different_view(memory.path(), entry.file, "another image under the name");
       }

@@ -16,12 +16,13 @@ namespace panonav {
 /// recordings with the same file names are not mixed. Compares the poses and stamps of all such
 /// (known) views. Also compares their images, unless names, poses, sizes and modification times of
 /// all files equal those of a recording memorised before. Throws FileError at the first view that
-/// differs or whose image cannot be read. Cost: a query of the size and modification time of each
-/// file; for a changed or copied recording, encoding the known views. `compared` receives the
-/// number of images compared since its last call.
+/// differs or whose image cannot be read; with `unread`, passes the latter to it instead. Cost: a
+/// query of the size and modification time of each file; for a changed or copied recording,
+/// encoding the known views. `compared` receives the number of images compared since its last call.
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
-                       const std::function<void(std::size_t)>& compared = {});
+                       const std::function<void(std::size_t)>& compared = {},
+                       const std::function<void(const DatasetEntry&, const Error&)>& unread = {});
 
 /// Stores in the memory that its views with names of this recording come from this recording, so
 /// that `check_known_views` need not compare images.

@@ -19,7 +19,7 @@ namespace {
 constexpr const char* parameter_name = "learnt models";
 /// Version of the learning method; raised when its results change, so that older models are
 /// ignored.
-constexpr std::string_view learning_version = "4";
+constexpr std::string_view learning_version = "6";
 
 // Visits the members of each model in the order in which they are stored.
 template <class Model, class Visit>
@@ -32,9 +32,13 @@ template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, PositionModel>
 void visit_members(Model& m, const Visit& visit) {
   visit(m.learnt), visit(m.components), visit(m.sampled_views), visit(m.neighbourhood_m);
-  visit(m.exponent), visit(m.difference_unit), visit(m.variance_unit);
-  visit(m.radius_m_per_deviation), visit(m.edge_radius_m_per_deviation), visit(m.spacing_m);
-  visit(m.ambiguous_from), visit(m.ambiguous_radius_m), visit(m.median_error_m), visit(m.error95_m);
+  visit(m.exponent), visit(m.difference_unit), visit(m.spacing_m), visit(m.ambiguous_from);
+  visit(m.ambiguous_radius_m), visit(m.median_error_m), visit(m.error95_m);
+  visit(m.area_error_ratio), visit(m.line_error_m);
+  for (auto& change : m.changes) {
+    visit(change.distance_m), visit(change.squared_difference);
+    visit(change.small_squared_difference);
+  }
 }
 template <class Model, class Visit>
 requires std::same_as<std::remove_const_t<Model>, ObservationModel>

@@ -21,6 +21,9 @@ struct RouteSource {
   /// unknown elevations.
   std::optional<std::pair<int, int>> horizon_rows;
   bool from_odometry = false;  ///< true: poses are in the odometry's frame, not the data set's
+  /// Metres of a unit of the poses if things around are as far away as assumed; the poses were then
+  /// computed from images alone and are in view steps. nullopt: poses are in metres.
+  std::optional<double> assumed_unit_m = std::nullopt;
   friend bool operator==(const RouteSource&, const RouteSource&) = default;
 };
 

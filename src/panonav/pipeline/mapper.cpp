@@ -69,29 +69,37 @@ bool Mapper::add(EncodedView encoded) {
   const auto known = file_.find(added.info.name);
   const ViewId id = known ? *known : file_.append(added);
   std::optional<Pose2> moved;
-  if (last_node_odometry_ && encoded.odometry)
-    moved = inverse(*last_node_odometry_) * *encoded.odometry;
+  ++nodes_since_odometry_;
+  if (last_odometry_ && encoded.odometry) moved = inverse(*last_odometry_) * *encoded.odometry;
   start = Clock::now();
   try {
     node_views_.append_with_id(id, added.signature, added.info);
-    static_cast<void>(mapper_.add(id, std::move(view), moved));
+    static_cast<void>(mapper_.add(id, std::move(view), moved, nodes_since_odometry_));
   } catch (const ContractError& error) {
     throw FileError(file_.path().string(), added.info.name + ": " + error.what());
   }
   result_.mapping_s += seconds_since(start);
   result_.observations.push_back(number);
-  last_node_odometry_ = encoded.odometry;
+  if (encoded.odometry) {
+    last_odometry_ = encoded.odometry;
+    nodes_since_odometry_ = 0;
+  }
   return true;
 }
 
 Mapper::Result Mapper::map(const Dataset& recording, Executor& executor,
-                           const std::function<void()>& mapped) {
+                           const std::function<void()>& mapped, const SkipImage& skipped) {
   process_in_order(
       recording.entries.size(), executor,
       [&](std::size_t i) { return encode(read_observation(recording.entries[i])); },
       [&](std::size_t, EncodedView&& encoded) {
         add(std::move(encoded));
         if (mapped) mapped();
+      },
+      [&](std::size_t i, const std::exception_ptr& failure) {
+        if (!skipped) std::rethrow_exception(failure);
+        skipped(i, failure);
+        skip();
       });
   return finish();
 }
@@ -101,22 +109,23 @@ Mapper::Result Mapper::finish() {
   mapper_.finish();
   result_.mapping_s += seconds_since(start);
   result_.map = mapper_.map();
-  result_.scale_m = mapper_.scale_m();
   result_.wheels = options_.mapping.wheels && has_all_odometry_;
+  result_.unit = result_.wheels || mapper_.is_metric() || options_.is_scale_known
+                     ? LengthUnit::metres
+                     : LengthUnit::view_steps;
+  result_.scale_m.reset();
+  if (result_.unit == LengthUnit::metres) result_.scale_m = mapper_.scale_m();
+  if (!has_any_pose_) {
+    store_map(file_, result_.map, result_.unit);
+    if (const auto stored = file_.map(map_name)) result_.map = *stored;
+    return result_;
+  }
   std::vector<Link> links;
   for (const TopologicalMap::Edge& edge : result_.map.edges)
     links.push_back({edge.a, edge.b, edge.kind});
   file_.change([&] {
     file_.link(links);
     file_.save_map(map_name, result_.map);
-    if (!has_any_pose_) {
-      const std::size_t component = find_largest_component(result_.map);
-      for (const TopologicalMap::Node& node : result_.map.nodes) {
-        if (node.component != component) continue;
-        file_.set_pose(node.view,
-                       ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
-      }
-    }
     learn_and_store_models(file_);
   });
   return result_;

@@ -10,14 +10,13 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/mapping/topological_mapper.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/observation.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
-
-/// Name under which a memory file stores the map of a `Mapper`.
-inline constexpr const char* map_name = "map";
 
 /// Options for making a map of observations.
 struct MapperOptions {
@@ -26,13 +25,16 @@ struct MapperOptions {
   LoopClosureOptions closure;      ///< which loop closures are accepted
   PoseGraphOptions graph;          ///< how the pose graph is optimised
   bool thumbnails = true;          ///< keep small pictures of the views
+  /// True: `odometry.scale_m` is known, so that lengths by it are in metres.
+  bool is_scale_known = false;
 };
 
 /// Maps observations in the order in which they were taken: appends the views that become nodes to
 /// a memory file, and stores the map there as "map". Does not append views whose names the file
 /// already has; their ids must ascend in the order of the observations. Appended views remain even
-/// if a later call fails. `docs/equations.md` and `TopologicalMapper` describe the method. Only
-/// `encode` may be called from several threads concurrently.
+/// if a later call fails. A node without odometry is joined by its view; the next odometry then
+/// joins the nodes before and after. `docs/equations.md` and `TopologicalMapper` describe the
+/// method. Only `encode` may be called from several threads concurrently.
 class Mapper {
  public:
   /// Result of mapping.
@@ -40,7 +42,9 @@ class Mapper {
     TopologicalMap map;                     ///< all nodes and edges
     std::vector<std::size_t> observations;  ///< for each node, the index of its observation
     std::size_t skipped = 0;                ///< number of observations too similar to a node
-    double scale_m = 0.0;                   ///< metres per unit of visual displacement
+    /// Metres per unit of visual displacement; nullopt if it is not known (`unit`).
+    std::optional<double> scale_m;
+    LengthUnit unit = LengthUnit::metres;  ///< of the map in the file and of `map`
     bool wheels = false;     ///< true: motions come from odometry, which all observations had
     double mapping_s = 0.0;  ///< time of the mapping alone, without decoding and file access
   };
@@ -71,14 +75,17 @@ class Mapper {
   /// Encodes and adds the next observation.
   bool add(const Observation& observation) { return add(encode(observation)); }
 
-  /// Adds all observations of a recording and finishes. Calls `mapped` after each picture.
-  /// Throws as `add`, and FileError on a picture that cannot be read.
-  Result map(const Dataset& recording, Executor& executor,
-             const std::function<void()>& mapped = {});
+  /// Counts an observation that cannot be used, so that `Result::observations` are as before.
+  void skip() noexcept { ++observation_count_; }
+
+  /// Adds all observations of a recording and finishes. Calls `mapped` after each picture, and
+  /// `skipped` for one that cannot be used; without it, throws FileError then. Throws as `add`.
+  Result map(const Dataset& recording, Executor& executor, const std::function<void()>& mapped = {},
+             const SkipImage& skipped = {});
 
   /// Optimises the nodes that are not optimised yet, and stores the map and a link for each of its
-  /// edges. If no observation had a pose, the views of the largest component get the poses of the
-  /// map. More observations may follow. Throws FileError.
+  /// edges. If no observation had a pose, the views get the poses of the map (`store_map`). More
+  /// observations may follow. Throws FileError.
   Result finish();
 
   /// Returns a copy of the present map, for display; `finish` will still move nodes.
@@ -96,7 +103,8 @@ class Mapper {
   TopologicalMapper mapper_;
   Result result_;
   std::size_t observation_count_ = 0;
-  std::optional<Pose2> last_node_odometry_;
+  std::optional<Pose2> last_odometry_;  // of the last node that has one
+  std::size_t nodes_since_odometry_ = 0;
   bool has_all_odometry_ = true;
   bool has_any_pose_ = false;
 };

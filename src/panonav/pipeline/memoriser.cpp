@@ -84,9 +84,13 @@ MemoryHeader make_header_from_recording(const Dataset& recording, const Signatur
                                         const PreprocessingOptions& preprocessing,
                                         Executor& executor) {
   const std::size_t count = std::min(Memoriser::scale_views, recording.entries.size());
-  std::vector<Observation> first(count, Observation(Image(1, 1)));
-  parallel_for(executor, count,
-               [&](std::size_t i) { first[i] = read_observation(recording.entries[i]); });
+  std::vector<Observation> first;
+  std::exception_ptr failure;
+  process_in_order(
+      count, executor, [&](std::size_t i) { return read_observation(recording.entries[i]); },
+      [&](std::size_t, Observation&& observation) { first.push_back(std::move(observation)); },
+      [&](std::size_t, const std::exception_ptr& error) { failure = error; });
+  if (first.empty() && failure) std::rethrow_exception(failure);
   return make_memory_header(first, recording.source, signature, preprocessing, executor);
 }
 
@@ -170,6 +174,7 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
     try {
+      recall(observations[i].name, observations[i].odometry);
       if (failures[i]) {
         try {
           std::rethrow_exception(failures[i]);
@@ -188,6 +193,7 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
       append();
       throw;
     }
+    if (observations[i].pose) remove_positions_from_map(*file_);
     unknown.push_back(std::move(views[i]));
   }
   append();
@@ -212,8 +218,16 @@ Memoriser::Counts Memoriser::finish() {
   return finish(alone);
 }
 
-Memoriser::Counts Memoriser::finish(Executor& executor) {
+void Memoriser::recall(const std::string& name, const std::optional<Pose2>& odometry) {
+  if (odometry) odometry_.insert_or_assign(name, *odometry);
+}
+
+Memoriser::Counts Memoriser::finish(Executor& executor, const std::function<void()>& mapped) {
   if (!file_) make_file(executor);
+  counts_.map = describe_map(*file_);
+  if (options_.map && (counts_.appended > 0 || !counts_.map)) {
+    counts_.map = map_views(*file_, odometry_, executor, 0.0, mapped);
+  }
   learn_and_store_models(*file_);
   return counts_;
 }

@@ -3,12 +3,15 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -24,6 +27,8 @@ struct MemoriserOptions {
   /// Store local features (about 4 kB for each view), which distinguish places 1 to 2 m apart. Not
   /// stored if elevations are unknown.
   bool features = true;
+  /// Make a map of views that have no positions from a data set (`map_views`).
+  bool map = true;
   /// Callback for each observation that is left out because its image does not fit the others, for
   /// example in size; empty: `add` throws instead.
   std::function<void(const Observation&, const Error&)> left_out;
@@ -74,12 +79,18 @@ class Memoriser {
   struct Counts {
     std::size_t appended = 0;      ///< views added to the file
     std::size_t known_before = 0;  ///< observations that were in the file already
+    std::optional<MemoryMap> map;  ///< from which the views have their positions
   };
-  /// Writes observations that wait for a new file's full scale, and learns and stores the models
-  /// (`learn_and_store_models`). More observations may be added afterwards. Throws FileError;
-  /// ContractError if a new file got no observation.
+  /// Writes observations that wait for a new file's full scale, makes or extends the map
+  /// (`map_views`), and learns and stores the models (`learn_and_store_models`). More observations
+  /// may be added afterwards. Throws FileError; ContractError if a new file got no observation.
   Counts finish();
-  Counts finish(Executor& executor);  ///< Finishes on all threads.
+  /// Finishes on all threads. Calls `mapped` after each view of the map.
+  Counts finish(Executor& executor, const std::function<void()>& mapped = {});
+
+  /// Reports an observation that the file already has, without its image: its odometry is used for
+  /// the map.
+  void recall(const std::string& name, const std::optional<Pose2>& odometry);
 
   /// Returns the file; null while a new file waits for its full scale.
   [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
@@ -101,6 +112,7 @@ class Memoriser {
   std::optional<MemoryFile> file_;
   std::optional<ViewEncoder> encoder_;
   Counts counts_;
+  std::map<std::string, Pose2> odometry_;  // by the name of the view
 };
 
 }  // namespace panonav

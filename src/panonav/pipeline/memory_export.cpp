@@ -130,6 +130,8 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   MemoryExport done{.views = views.size()};
   done.enlarged = thumbnail_columns(header) < header.panorama_columns;
 
+  // Positions of a data set are in metres.
+  const LengthUnit unit = read_length_unit(memory);
   Dataset dataset;
   dataset.folder = out;
   dataset.source.layout = {.forward_column = picture_forward_column(header.panorama_columns),
@@ -142,12 +144,14 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
     const auto& [view, info, links, thumbnail, component] = views[i];
     ids.push_back(view);
     if (const auto panorama = large_enough ? panorama_from_thumbnail(memory, view) : std::nullopt) {
-      const fs::path path = out / files[i];
+      const fs::path path = out / unescape_name(files[i]);
       std::error_code error;
       fs::create_directories(path.parent_path(), error);
       const Image enlarged = to_picture(*panorama);
       write_png(path, enlarged.view());
-      dataset.entries.push_back({files[i], path, info.stamp_s, info.pose, std::nullopt});
+      dataset.entries.push_back({files[i], path, info.stamp_s,
+                                 unit == LengthUnit::metres ? info.pose : std::nullopt,
+                                 std::nullopt});
       if (files[i] != info.name) ++done.renamed;
     } else {
       files[i].clear();
@@ -156,7 +160,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   }
   done.pictures = dataset.entries.size();
 
-  write_file(out / "views.csv", std::string_view(format_view_table(views, files)));
+  write_file(out / "views.csv", std::string_view(format_view_table(views, unit, files)));
   write_file(out / "signatures.npy", make_npy_array(memory.load(ids)));
   OptionText options;
   options.text = "[signature]\ncomponents = ";  // rows and columns come from the pictures
@@ -167,10 +171,10 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
     write_camera(out / "camera.toml", {*header.source.camera, header.source.mask});
   }
   if (done.pictures > 0) {
-    const Dataset::Fields shared = drop_partial_fields(dataset);
-    done.positions = shared.positions;
-    done.headings = shared.headings;
-    done.stamps = shared.stamps;
+    const Dataset::Fields known = find_known_fields(dataset);
+    done.positions = known.positions;
+    done.headings = known.headings;
+    done.stamps = known.stamps;
     write_dataset(dataset);
   }
   unfinished.finish();

@@ -15,11 +15,9 @@ struct MemoryExport {
   std::size_t pictures = 0;
   /// Number of exported images with other names than their views, which cannot be file names.
   std::size_t renamed = 0;
-  /// True if the data set has positions, that is, if each exported view has a position. Otherwise
-  /// positions are only in the file views.csv.
-  bool positions = false;
-  bool headings = false;  ///< like `positions`; false without them
-  bool stamps = false;    ///< like `positions`
+  bool positions = false;  ///< the data set has positions: an exported view has one
+  bool headings = false;   ///< like `positions`
+  bool stamps = false;     ///< all exported views have a stamp; otherwise only views.csv has them
   bool enlarged =
       false;  ///< true: thumbnails are smaller than the panoramas of the memory and were enlarged
 };

@@ -16,7 +16,9 @@
 #include "panonav/core/temporary_file.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/mapper.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_address.hpp"
 
@@ -193,12 +195,38 @@ class UnfinishedMemory {
   fs::path path_;
 };
 
+bool is_in_view_steps(const MemoryFile& file) {
+  return read_length_unit(file) == LengthUnit::view_steps;
+}
+
+/// True if all positions of two memories come from maps.
+bool are_positions_from_maps(const MemoryFile& first, const MemoryFile& second) {
+  const auto has_no_others = [](const MemoryFile& file) {
+    return has_positions_from_map(file) || file.info().views_with_position == 0;
+  };
+  return has_no_others(first) && has_no_others(second) &&
+         (has_positions_from_map(first) || has_positions_from_map(second));
+}
+
+/// Throws FileError if one of two memories has positions in metres and the other in view steps.
+void require_same_unit(const MemoryFile& first, const MemoryFile& second) {
+  if (is_in_view_steps(first) == is_in_view_steps(second)) return;
+  const MemoryFile& unscaled = is_in_view_steps(first) ? first : second;
+  const MemoryFile& other = is_in_view_steps(first) ? second : first;
+  if (other.info().views_with_position == 0) return;
+  throw FileError(unscaled.path().string(),
+                  "has positions in view steps, those of " + other.path().string() +
+                      " are in metres; first scale it to metres, by the known distance between two "
+                      "of its views");
+}
+
 class Merge {
  public:
   Merge(const MemoryFile& first, const MemoryFile& second, const SessionAlignmentOptions& alignment,
         const PoseGraphOptions& graph)
       : files_{&first, &second},
         views_{first.load(), second.load()},
+        positions_from_maps_(are_positions_from_maps(first, second)),
         alignment_(alignment),
         graph_(graph) {}
 
@@ -207,8 +235,18 @@ class Merge {
     const VisualMemory all = file.load();
     TopologicalMap map = join_maps(all);
     add_links(file);
-    if (!map.nodes.empty()) file.save_map(map_name, map);
-    set_poses(file, map);
+    if (positions_from_maps_) {
+      const bool is_unscaled = is_in_view_steps(*files_[0]) || is_in_view_steps(*files_[1]);
+      store_map(file, map, is_unscaled ? LengthUnit::view_steps : LengthUnit::metres);
+      const double unit_m = read_assumed_unit_m(file);
+      if (result_.alignment) {
+        result_.alignment->first_from_second.x_m /= unit_m;
+        result_.alignment->first_from_second.y_m /= unit_m;
+      }
+    } else {
+      if (!map.nodes.empty()) file.save_map(map_name, map);
+      set_poses(file, map);
+    }
     for (std::size_t i = 0; i < 2; ++i) add_routes(file, i);
     result_.views = all.size();
     result_.connected_components = count_components(map);
@@ -255,8 +293,9 @@ class Merge {
   }
 
   TopologicalMap join_maps(const VisualMemory& all) {
-    const std::array own{read_or_make_map(*files_[0], views_[0]),
-                         read_or_make_map(*files_[1], views_[1])};
+    std::array own{read_or_make_map(*files_[0], views_[0]),
+                   read_or_make_map(*files_[1], views_[1])};
+    for (std::size_t i = 0; i < 2; ++i) scale_lengths(own[i], read_assumed_unit_m(*files_[i]));
     const std::array maps{replace_ids(own[0], ids_[0]), replace_ids(own[1], ids_[1])};
     const std::array largest{select_components(maps[0], true), select_components(maps[1], true)};
     result_.alignment = align_sessions(all, largest[0], largest[1], alignment_);
@@ -311,12 +350,17 @@ class Merge {
   void add_routes(MemoryFile& file, std::size_t from) {
     for (const std::string& name : files_[from]->route_names()) {
       RoutePanorama route = files_[from]->route(name).value();
-      if (from == 1 && result_.alignment) {
-        RoutePanorama moved(route.columns());
-        for (std::size_t i = 0; i < route.size(); ++i) {
-          moved.append(result_.alignment->first_from_second * route.poses()[i], route.line(i));
-        }
-        route = std::move(moved);
+      RouteSource source = read_route_source(*files_[from], name, route.columns());
+      const double unit_m = source.assumed_unit_m ? read_assumed_unit_m(file) : 1.0;
+      const double factor = source.assumed_unit_m.value_or(1.0) / unit_m;
+      if (source.assumed_unit_m) source.assumed_unit_m = unit_m;
+      RoutePanorama moved(route.columns());
+      for (std::size_t i = 0; i < route.size(); ++i) {
+        Pose2 pose = route.poses()[i];
+        pose.x_m *= factor;
+        pose.y_m *= factor;
+        if (from == 1 && result_.alignment) pose = result_.alignment->first_from_second * pose;
+        moved.append(pose, route.line(i));
       }
       const auto used_names = file.route_names();
       const std::string new_name =
@@ -324,12 +368,14 @@ class Merge {
             return std::ranges::find(used_names, other) != used_names.end();
           });
       if (new_name != name) ++result_.renamed;
-      file.append_route(new_name, route);
+      file.append_route(new_name, moved);
+      store_route_source(file, new_name, source);
     }
   }
 
   std::array<const MemoryFile*, 2> files_;
   std::array<VisualMemory, 2> views_;
+  bool positions_from_maps_;
   const SessionAlignmentOptions& alignment_;
   const PoseGraphOptions& graph_;
   std::array<NewIds, 2> ids_;
@@ -345,6 +391,7 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
   const MemoryFile a = MemoryFile::open(first, Access::read_only);
   const MemoryFile b = MemoryFile::open(second, Access::read_only);
   require_same_settings(a, b);
+  require_same_unit(a, b);
   if (memory_exists(memory)) {
     throw FileError(mask_passwords(memory.string()),
                     "already exists; a merged memory is a new one");

@@ -68,8 +68,8 @@ ObservationModel load_or_learn_model(const MemoryFile& file, const ColumnRanking
   });
   if (oriented < ObservationModel::min_views) {
     throw FileError(file.path().string(),
-                    "holds " + std::to_string(oriented) +
-                        " views with position and heading; allowed where views are updated: " +
+                    "holds " + format_count(oriented, "view") +
+                        " with position and heading; allowed where views are updated: " +
                         std::to_string(ObservationModel::min_views) + " or more");
   }
   const auto models = load_stored_models(file, memory);
@@ -123,7 +123,7 @@ void MemoryUpdater::observe(const Observation& observation, const Panorama& pano
   view.info.stamp_s = observation.stamp_s;
   view.signature = self.encoder.packed(panorama);
   MemoryUpdate::LocalisedView answered{
-      *observation.odometry, view.signature, place.known_probability, {}, {}};
+      *observation.odometry, view.signature, place.probability, {}, {}};
   if (place.position && place.heading_rad) {
     answered.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
     answered.radius_m = place.position->radius_m;
@@ -147,8 +147,10 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
   self.require_unfinished();
   self.finished = true;
   MemoryUpdate::Changes planned = self.update.finish();
-  Changes changes{
-      .observations = self.observations, .certain = planned.certain, .views = self.memory.size()};
+  Changes changes{.observations = self.observations,
+                  .sure = planned.sure,
+                  .certain = planned.certain,
+                  .views = self.memory.size()};
   if (planned.certain == 0) return changes;
   changes.reinforced = planned.matched.size();
   changes.added = planned.added.size();
@@ -184,8 +186,24 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
   return changes;
 }
 
+std::string explain_uncertainty(const MemoryUpdater::Changes& changes) {
+  if (changes.certain > 0) return {};
+  if (changes.observations == 0) {
+    return "no image has odometry, by which the images of a run confirm each other";
+  }
+  if (changes.sure == 0) {
+    return "no image was localised with a probability of 0.9 or more, as images of another place, "
+           "camera or light are";
+  }
+  return "a place is certain if at least three other images, taken within eight view spacings of "
+         "it and two apart, were localised with a probability of 0.9 or more and agree with it "
+         "by odometry; " +
+         std::to_string(changes.sure) + " of " + format_count(changes.observations, "image") +
+         " were localised so";
+}
+
 std::string summarise(const MemoryUpdater::Changes& changes) {
-  return std::to_string(changes.added) + " views added, " + std::to_string(changes.replaced) +
+  return format_count(changes.added, "view") + " added, " + std::to_string(changes.replaced) +
          " replaced, " + std::to_string(changes.forgotten) + " forgotten, " +
          std::to_string(changes.reinforced) + " reinforced";
 }

@@ -41,6 +41,7 @@ class MemoryUpdater {
   /// Changes that a run made to its memory.
   struct Changes {
     std::size_t observations = 0;  ///< observations with odometry
+    std::size_t sure = 0;          ///< observations localised with a probability of 0.9 or more
     std::size_t certain =
         0;  ///< observations whose place was certain, without repeated ones at one place
     std::size_t reinforced = 0;  ///< views of the memory that matched an observation at their place
@@ -58,6 +59,8 @@ class MemoryUpdater {
   std::unique_ptr<Implementation> implementation_;
 };
 
+/// Explains for people why no place was certain, so that the memory is unchanged; empty if one was.
+[[nodiscard]] std::string explain_uncertainty(const MemoryUpdater::Changes& changes);
 /// Returns "12 views added, 3 replaced, 1 forgotten, 40 reinforced".
 [[nodiscard]] std::string summarise(const MemoryUpdater::Changes& changes);
 

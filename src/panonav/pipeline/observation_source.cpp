@@ -5,6 +5,8 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/pose2.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/io/panorama_reader.hpp"
 #include "panonav/motion/path.hpp"
 
 namespace panonav {
@@ -32,13 +34,78 @@ std::vector<Pose2> dataset_poses(const Dataset& dataset) {
   return estimate_headings(positions_of(poses));
 }
 
-std::vector<Pose2> odometry_poses(const Dataset& dataset) {
-  std::vector<Pose2> poses;
-  for (const auto& entry : dataset.entries) {
-    if (!entry.odometry) return {};
-    poses.push_back(*entry.odometry);
+bool has_odometry(const Dataset& dataset) {
+  return std::ranges::any_of(dataset.entries,
+                             [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
+}
+
+bool is_motion_by_images(std::span<const DatasetEntry> entries, std::size_t index) {
+  const std::size_t first = index - std::min<std::size_t>(index, 1);
+  const std::size_t count = std::min(index + 2, entries.size()) - first;
+  return std::ranges::any_of(entries.subspan(first, count),
+                             [](const DatasetEntry& entry) { return !entry.odometry; });
+}
+
+namespace {
+
+/// Checks the picture of an entry and returns its size; otherwise sets `fault`.
+ImageSize check_picture(const DatasetEntry& entry, const PictureSource& source, bool head_only,
+                        std::string& fault) {
+  try {
+    const ImageSize size = head_only ? read_image_size(entry.path) : check_image(entry.path);
+    require_picture_size(source, size);
+    return size;
+  } catch (const FileError& error) {
+    const std::string prefix = entry.path.string() + ": ";
+    fault = error.what();
+    if (fault.starts_with(prefix)) fault.erase(0, prefix.size());
+  } catch (const ContractError& error) {
+    fault = error.what();
   }
-  return poses;
+  return {};
+}
+
+/// Returns the size that most pictures have, the first of these if there are several; 0 is no size.
+ImageSize find_most_frequent_size(const std::vector<ImageSize>& sizes) {
+  const auto count = [&](const ImageSize& size) {
+    return size == ImageSize{} ? 0 : std::ranges::count(sizes, size);
+  };
+  std::vector<ImageSize> different;
+  for (const ImageSize& size : sizes) {
+    if (std::ranges::find(different, size) == different.end()) different.push_back(size);
+  }
+  return *std::ranges::max_element(different, {}, count);
+}
+
+}  // namespace
+
+void leave_out_unusable_pictures(Dataset& dataset, Executor& executor, bool heads_only) {
+  auto& entries = dataset.entries;
+  if (entries.size() < 2 || entries.front().store) return;
+  std::vector<std::string> faults(entries.size());
+  std::vector<ImageSize> sizes(entries.size());
+  executor.for_each_chunk(entries.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+    sizes[i] = check_picture(entries[i], dataset.source, heads_only, faults[i]);
+  });
+  if (dataset.source.kind == PictureKind::panorama) {
+    const ImageSize usual = find_most_frequent_size(sizes);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      if (!faults[i].empty() || sizes[i] == usual) continue;
+      faults[i] = "size is " + std::to_string(sizes[i].width) + " x " +
+                  std::to_string(sizes[i].height) + " px; allowed: " + std::to_string(usual.width) +
+                  " x " + std::to_string(usual.height) + " px, as most of the images";
+    }
+  }
+  std::vector<DatasetEntry> usable;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (faults[i].empty()) {
+      usable.push_back(std::move(entries[i]));
+    } else {
+      dataset.unusable.push_back({entries[i].file, entries[i].path, faults[i]});
+    }
+  }
+  entries = std::move(usable);
+  require_usable_entries(dataset);
 }
 
 DatasetObservations::DatasetObservations(Dataset dataset, Executor& executor)

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <exception>
+#include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -21,13 +23,25 @@ namespace panonav {
 /// computes them from the path, as the tangent fitted to the positions within 0.3 m of path on each
 /// side. Empty if an entry has no position.
 [[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
-/// Returns the odometry of all entries; empty if an entry has none.
-[[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
+/// True if an entry has odometry.
+[[nodiscard]] bool has_odometry(const Dataset& dataset);
+/// True if the image of an entry is needed to read a motion that odometry does not give: it, the
+/// entry before or the entry after it has no odometry.
+[[nodiscard]] bool is_motion_by_images(std::span<const DatasetEntry> entries, std::size_t index);
+
+/// Takes entries whose pictures cannot be used out of a data set, and lists them in `unusable`:
+/// those that cannot be decoded, and those of another size than the layout demands; of panoramas,
+/// those of another size than most. A picture of its own and pictures of a store, such as a video,
+/// stay. Throws FileError if no entry is left. Cost: `check_image` for each file, on all threads.
+/// With `heads_only` files whose pixels are damaged stay, too, for callers that skip them when they
+/// read them; the cost is that of reading the files.
+void leave_out_unusable_pictures(Dataset& dataset, Executor& executor, bool heads_only = false);
 
 /// Calls `make(i)` for 0 .. count - 1 on all threads, and `use(i, result)` in ascending order on
-/// the calling thread. Rethrows an `Error` of `make` after all earlier results were used.
-template <class Make, class Use>
-void process_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
+/// the calling thread; for an `Error` of `make` `skip(i, exception_ptr)`.
+template <class Make, class Use, class Skip>
+void process_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use,
+                      const Skip& skip) {
   constexpr std::size_t batch = 32;
   for (std::size_t begin = 0; begin < count; begin += batch) {
     const std::size_t some = std::min(batch, count - begin);
@@ -41,11 +55,23 @@ void process_in_order(std::size_t count, Executor& executor, const Make& make, c
       }
     });
     for (std::size_t i = 0; i < some; ++i) {
-      if (failures[i]) std::rethrow_exception(failures[i]);
-      use(begin + i, std::move(*made[i]));
+      if (failures[i]) {
+        skip(begin + i, failures[i]);
+      } else {
+        use(begin + i, std::move(*made[i]));
+      }
     }
   }
 }
+/// The same; rethrows an `Error` of `make` after all earlier results were used.
+template <class Make, class Use>
+void process_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
+  process_in_order(count, executor, make, use, [](std::size_t, const std::exception_ptr& failure) {
+    std::rethrow_exception(failure);
+  });
+}
+/// Called with the index of an image that cannot be used and with its error, which it may rethrow.
+using SkipImage = std::function<void(std::size_t, const std::exception_ptr&)>;
 
 /// Source of a robot's observations in the order in which they were taken: a data set, folder,
 /// video or camera.

@@ -10,7 +10,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/gpano.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/media_kind.hpp"
 
 namespace panonav {
 
@@ -33,16 +35,26 @@ std::string join_names(const std::vector<std::string>& names) {
 
 void add_warning_of_skipped_files(Dataset& opened) {
   std::vector<std::string> files;
+  std::vector<std::string> hidden;
   std::vector<std::string> folders;
+  std::vector<std::string> foreign;
   for (const std::string& name : opened.left_out) {
-    (name.ends_with('/') ? folders : files).push_back(name);
+    const bool is_foreign = identify_media_file(opened.folder / name) == MediaKind::foreign_picture;
+    (name.ends_with('/') ? folders
+     : is_hidden(name)   ? hidden
+     : is_foreign        ? foreign
+                         : files)
+        .push_back(name);
   }
-  if (!files.empty()) {
-    opened.warnings.push_back("left out, no PNG or JPEG by name: " + join_names(files));
-  }
-  if (!folders.empty()) {
-    opened.warnings.push_back("left out, folders within: " + join_names(folders));
-  }
+  const auto warn = [&](const std::vector<std::string>& names, const std::string& why) {
+    if (names.empty()) return;
+    const std::string count = names.size() > 1 ? " (" + std::to_string(names.size()) + ")" : "";
+    opened.warnings.push_back("left out, " + why + count + ": " + join_names(names));
+  };
+  warn(files, "no PNG or JPEG");
+  warn(foreign, "WebP, HEIC or AVIF (convert them to PNG or JPEG)");
+  warn(hidden, "hidden");
+  warn(folders, "folders within");
 }
 
 /// Returns the size of the first image; nullopt if it cannot be read. The error is reported later,
@@ -101,29 +113,29 @@ void reject_topics(const fs::path& path, const InputOptions::Topics& topics) {
   }
 }
 
-/// Throws FileError on a recording or video for which this program has no reader.
+/// Throws FileError on a recording or video for which this program has no reader, or that its
+/// reader does not recognise.
 void reject_unregistered_kind(const fs::path& path) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kinds{{
-      {".mcap", "recording"},
-      {".bag", "recording"},
-      {".db3", "recording"},
-      {".mp4", "video"},
-      {".m4v", "video"},
-      {".mov", "video"},
-      {".mkv", "video"},
-      {".webm", "video"},
-      {".avi", "video"},
-  }};
+  constexpr std::array<std::string_view, 3> recordings{".mcap", ".bag", ".db3"};
   std::error_code ignored;
-  const bool is_rosbag2 = fs::exists(path / "metadata.yaml", ignored);
   const std::string extension = to_lower_case(path.extension().string());
-  for (const auto& [ending, name] : kinds) {
-    if (extension != ending && !(is_rosbag2 && name == "recording")) continue;
-    if (has_dataset_reader(std::string(name))) continue;
-    throw FileError(path.string(), "is a " + std::string(name) + ", and this program reads no " +
-                                       std::string(name) +
-                                       "s: no reader of that kind is registered");
+  std::string name;
+  if (fs::exists(path / "metadata.yaml", ignored) ||
+      std::ranges::find(recordings, extension) != recordings.end()) {
+    name = "recording";
+  } else if (identify_media_file(path) == MediaKind::video) {
+    name = "video";
   }
+  if (name.empty()) return;
+  if (has_dataset_reader(name)) {
+    if (name != "recording" || fs::is_directory(path, ignored)) return;
+    const bool is_empty = fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) == 0;
+    throw FileError(path.string(), is_empty ? "is empty (0 bytes); it was probably not written or "
+                                              "copied completely"
+                                            : "is no recording, although its name says so");
+  }
+  throw FileError(path.string(), "is a " + name + ", and this program reads no " + name +
+                                     "s: no reader of that kind is registered");
 }
 
 const PictureSource& choose_source(const fs::path& path, const InputOptions& options,
@@ -133,9 +145,16 @@ const PictureSource& choose_source(const fs::path& path, const InputOptions& opt
   throw FileError(path.string(), std::string(why) + " with 'source' (a PictureSource)");
 }
 
+void reject_further_videos(const fs::path& path, const InputOptions& options) {
+  if (options.further_videos.empty()) return;
+  throw OptionError(path.string() + " is no video, so " + options.further_videos.front().string() +
+                    " cannot continue it; allowed: one input, or several videos");
+}
+
 Dataset open_with_reader(const fs::path& path, const DatasetReader& reader,
                          const InputOptions& options) {
   if (!reader.has_topics) reject_topics(path, options.topics);
+  if (reader.name != "video") reject_further_videos(path, options);
   if (options.topics.odometry && options.topics.odometry_frames) {
     throw OptionError(
         "the option odometry_topic and the option odometry_frames cannot be combined");
@@ -146,7 +165,9 @@ Dataset open_with_reader(const fs::path& path, const DatasetReader& reader,
     throw OptionError(path.string() + " is a " + reader.name + "; leave out the option recursive");
   }
   Dataset opened = reader.read(path, source, options);
-  for (std::string& warning : opened.warnings) warning = path.string() + ": " + warning;
+  const std::string of_input = path.string() + ": ";
+  for (std::string& warning : opened.warnings)
+    if (!warning.starts_with(of_input)) warning = of_input + warning;
   if (options.source) add_warning_of_wrong_kind(opened);
   return opened;
 }
@@ -207,9 +228,11 @@ Dataset open_input(const fs::path& path, const InputOptions& options) {
     throw FileError(path.string(), "there is no such file or folder");
   }
   reject_topics(path, options.topics);
+  reject_further_videos(path, options);
   Dataset opened =
       has_dataset_file(path) ? open_dataset_folder(path, options) : open_pictures(path, options);
   select_pictures(opened, options.selection);
+  if (!options.ignore_gpano) apply_gpano(opened);
   return opened;
 }
 

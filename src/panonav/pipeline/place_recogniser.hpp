@@ -40,10 +40,10 @@ struct PlaceRecogniserOptions {
 /// Computes from one picture where it was taken, by a memory file:
 ///   panonav::PlaceRecogniser recogniser("office.panonav");
 ///   auto place = recogniser.localise(panonav::read_image("view.jpg"));
-///   if (place.known) std::cout << place.position->x_m << ' ' << place.position->y_m << '\n';
-/// (`position` is empty only for memories whose views have no poses.) If the stored models are
-/// not those of the present views (`learn_and_store_models`), learns new ones, which takes seconds
-/// for a large memory. Several threads may use one object concurrently.
+///   if (place.known) std::cout << place.matches.front().name << '\n';
+///   if (place.position) std::cout << place.position->x_m << ' ' << place.position->y_m << '\n';
+/// If the stored models are not those of the present views (`learn_and_store_models`), learns new
+/// ones, which takes seconds for a large memory. Several threads may use one object concurrently.
 ///
 /// Holds the whole memory, or an index of a large memory on a server: the results are the same
 /// except `bytes_read`. A memory that is not held and has more than

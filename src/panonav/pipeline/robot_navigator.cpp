@@ -24,8 +24,9 @@ std::optional<NavigationGraph> load_graph(RobotNavigatorOptions::GraphOrigin ori
   const MemoryFile& file = source.file();
   switch (origin) {
     case RobotNavigatorOptions::GraphOrigin::map: {
-      const auto map = file.map(map_name);
+      auto map = file.map(map_name);
       if (!map) return std::nullopt;
+      scale_lengths(*map, read_assumed_unit_m(file));
       std::vector<ViewId> views;
       for (const TopologicalMap::Node& node : map->nodes) views.push_back(node.view);
       return make_graph_from_map_and_neighbours(*map, file.load(views), executor);
@@ -77,6 +78,11 @@ KnownRoute load_known_route(const MemoryFileViews& source, const std::string& na
     for (const auto& known : file.route_names()) all += (all.empty() ? "" : ", ") + known;
     throw FileError(path, "contains no route '" + name + "'; allowed for the option route: " +
                               (all.empty() ? "none, because no route was recorded" : all));
+  }
+  if (read_length_unit(file) != LengthUnit::metres) {
+    throw FileError(path,
+                    "has positions in view steps; first scale it to metres, by the known distance "
+                    "between two of its views");
   }
   const RoutePanorama route = load_route_to_follow(file, name);
   if (read_route_source(file, name, route.columns()).from_odometry) {
@@ -172,7 +178,11 @@ RobotNavigator::Step RobotNavigator::step(const Observation& observation, RobotR
   const Pose2 moved = odometry_ && observation.odometry
                           ? inverse(*odometry_) * *observation.odometry
                           : integrate_velocity(last_step_.velocity, base.period_s);
-  odometry_ = observation.odometry;
+  if (observation.odometry) {
+    odometry_ = observation.odometry;
+  } else if (odometry_) {  // continued by the commands until the next odometry
+    odometry_ = *odometry_ * moved;
+  }
   moved_ = moved_ * moved;
   target_ = inverse(moved) * target_;
   time_left_s_ -= base.period_s;

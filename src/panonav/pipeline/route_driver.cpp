@@ -18,6 +18,12 @@ RouteDriver::RouteDriver(const MemoryFile& memory, const std::optional<PictureSo
                          const RouteDriverOptions& options)
     : options_(options), follower_(memory, source, options.follower) {
   validate(options_.base);
+  if (follower_.source().assumed_unit_m) {
+    throw FileError(memory.path().string(), "route '" + follower_.name() +
+                                                "' is in view steps; first scale the memory to "
+                                                "metres, by the known distance between two of its "
+                                                "views");
+  }
   for (std::size_t i = 1; i < poses().size(); ++i) {
     length_m_ += distance(poses()[i - 1].position(), poses()[i].position());
   }

@@ -6,6 +6,15 @@
 
 namespace panonav {
 
+namespace {
+
+RouteFitOptions scale_fit(RouteFitOptions fit, const RouteSource& source) {
+  fit.metre = 1.0 / source.assumed_unit_m.value_or(1.0);
+  return fit;
+}
+
+}  // namespace
+
 RouteFollower::RouteFollower(const std::filesystem::path& memory,
                              const RouteFollowerOptions& options)
     : RouteFollower(MemoryFile::open(memory, Access::read_only), std::nullopt, options) {}
@@ -15,19 +24,23 @@ RouteFollower::RouteFollower(const MemoryFile& memory, const std::optional<Pictu
     : options_(options),
       name_(find_route_name(memory, options.name)),
       source_(read_route_source(memory, name_, memory.route(name_).value().columns())),
+      views_(memory.header(), source.value_or(memory.header().source)),
       encoder_(source.value_or(memory.header().source), source_),
-      tracker_(load_route_to_follow(memory, name_), options.tracker, options.fit),
+      tracker_(load_route_to_follow(memory, name_), options.tracker,
+               scale_fit(options.fit, source_)),
       changes_(tracker_.lines().poses()) {}
 
 RouteFollower::Step RouteFollower::step(std::vector<float> line,
                                         const std::optional<Pose2>& odometry) {
   RouteFollower::Step step{std::move(line), std::nullopt, {}};
-  if (options_.use_odometry && odometry) {
+  // Odometry is in metres, which a route in view steps does not have.
+  if (options_.use_odometry && odometry && !source_.assumed_unit_m) {
     step.fix = tracker_.track(step.line, inverse(odometry_.value_or(*odometry)) * *odometry);
   } else {
     step.fix = tracker_.search(step.line);
   }
-  odometry_ = odometry;
+  // A fix without odometry is where the next motion begins; otherwise the last odometry is.
+  if (odometry || step.fix) odometry_ = odometry;
   if (step.fix) {
     step.changed = changes_.add(*step.fix);
   } else {

@@ -7,6 +7,7 @@
 
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/observation.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/route/route_changes.hpp"
 #include "panonav/route/route_tracker.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -18,8 +19,8 @@ struct RouteFollowerOptions {
   std::optional<std::string> name;  ///< name of the route; nullopt: the only one
   RouteTrackerOptions tracker;      ///< search range, and thresholds for accepting a fit
   RouteFitOptions fit;              ///< how lines are fitted
-  bool use_odometry =
-      true;  ///< use odometry if available; false: each observation is located separately
+  bool use_odometry = true;  ///< use odometry if available and the route is in metres; false: each
+                             ///< observation is located separately
 };
 
 /// Locates a robot relative to a recorded route [Y03], observation by observation. Predicts its
@@ -44,8 +45,9 @@ class RouteFollower {
                 const RouteFollowerOptions& options = {});
 
   /// Encodes an observation for `step`; several threads may encode the next observations
-  /// concurrently. Throws as `LineEncoder::line`.
+  /// concurrently. Throws as `LineEncoder::line`, and as `ViewEncoder::require_fit`.
   [[nodiscard]] std::vector<float> encode(const Observation& observation) const {
+    views_.require_fit(observation);
     return encoder_.line(observation);
   }
   /// Locates the robot by the next line (made by `encode`) and by the odometry of its observation,
@@ -68,6 +70,7 @@ class RouteFollower {
   RouteFollowerOptions options_;
   std::string name_;
   RouteSource source_;
+  ViewEncoder views_;
   LineEncoder encoder_;
   RouteTracker tracker_;
   RouteChanges changes_;

@@ -1,8 +1,17 @@
 #include "panonav/pipeline/route_recorder.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/pipeline/mapper.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/pipeline/visual_motion.hpp"
 #include "panonav/route/route_panorama.hpp"
 
 namespace panonav {
@@ -23,7 +32,8 @@ RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& op
   require(options.every_m >= 0.0, "every_m", options.every_m, ">= 0");
   RouteSource source{.line = options.line.value_or(HorizonScanlineOptions{}),
                      .horizon_rows = options.horizon_rows,
-                     .from_odometry = options.odometry};
+                     .from_odometry = options.odometry,
+                     .assumed_unit_m = options.assumed_unit_m};
   const auto known = file.route(options.name);
   if (!known) return source;
   const RouteSource before = read_route_source(file, options.name, known->columns());
@@ -34,6 +44,11 @@ RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& op
         describe_route(file, options.name) +
         " was recorded with another value of the option columns, the option half_band_rad or the "
         "option horizon_rows; leave them out or choose another name");
+  }
+  if (source.assumed_unit_m != before.assumed_unit_m) {
+    throw ContractError(describe_route(file, options.name) + " is in " +
+                        (before.assumed_unit_m ? "view steps" : "metres") +
+                        ", these poses are in another unit; choose another name");
   }
   if (source.from_odometry != before.from_odometry) {
     throw ContractError(describe_route(file, options.name) + " is in the frame of " +
@@ -49,7 +64,164 @@ std::optional<Pose2> find_route_end(const MemoryFile& file, const std::string& n
   return known->poses().back();
 }
 
+bool has_position(const DatasetEntry& entry) {
+  return entry.pose.has_value();
+}
+bool has_odometry_pose(const DatasetEntry& entry) {
+  return entry.odometry.has_value();
+}
+
+Dataset keep_entries(Dataset drive, bool (*is_kept)(const DatasetEntry&)) {
+  std::erase_if(drive.entries, [&](const DatasetEntry& entry) { return !is_kept(entry); });
+  return drive;
+}
+
+/// Keeps the images of a drive that have a pose. Throws FileError if more than a tenth have none;
+/// `cause` says why.
+DrivePoses keep_posed_images(const Dataset& drive, const std::vector<std::optional<Pose2>>& poses,
+                             const std::string& cause) {
+  DrivePoses found;
+  found.drive = drive;
+  found.drive.entries.clear();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (!poses[i]) continue;
+    found.drive.entries.push_back(drive.entries[i]);
+    found.poses.push_back(*poses[i]);
+  }
+  if (10 * found.poses.size() < 9 * poses.size()) {
+    throw FileError(drive.folder.string(),
+                    "has neither positions nor odometry, and only " +
+                        std::to_string(found.poses.size()) + " of " +
+                        format_count(poses.size(), "image") + " " + cause +
+                        "; for a route, take an image every 20 to 50 cm, or a video");
+  }
+  return found;
+}
+
+/// Poses of the images that are views of the memory and in the largest component of its map; empty
+/// if one is not a view of the memory or there is no map.
+std::vector<std::optional<Pose2>> find_poses_in_map(const Dataset& drive,
+                                                    const MemoryFile& memory) {
+  const auto map = has_positions_from_map(memory) ? memory.map(map_name) : std::nullopt;
+  if (!map) return {};
+  const std::size_t component = find_largest_component(*map);
+  std::vector<std::optional<Pose2>> poses;
+  for (const DatasetEntry& entry : drive.entries) {
+    const auto view = memory.find(entry.file);
+    if (!view) return {};
+    const auto node = std::ranges::lower_bound(map->nodes, *view, {}, &TopologicalMap::Node::view);
+    const bool is_in = node != map->nodes.end() && node->view == *view;
+    poses.push_back(is_in && node->component == component ? std::optional(node->pose)
+                                                          : std::nullopt);
+  }
+  return poses;
+}
+
+/// Computes the motion between the images. An image that the others are not connected with has no
+/// pose. Sets `median_step` to the median length of a step.
+std::vector<std::optional<Pose2>> compute_poses_from_images(const Dataset& drive,
+                                                            const ViewEncoder& encoder,
+                                                            VisualOdometry odometry,
+                                                            Executor& executor,
+                                                            double& median_step) {
+  std::vector<Pose2> poses;
+  std::vector<std::size_t> component;
+  std::vector<double> lengths;
+  std::size_t component_count = 0;
+  process_in_order(
+      drive.entries.size(), executor,
+      [&](std::size_t i) {
+        return OdometryView(encoder.signature(read_observation(drive.entries[i])));
+      },
+      [&](std::size_t i, OdometryView&& view) {
+        const auto step = odometry.add(std::move(view));
+        component.push_back(step ? component[i - static_cast<std::size_t>(step->views)]
+                                 : component_count++);
+        poses.push_back(odometry.pose());
+        if (!step) return;
+        const double length = std::hypot(step->before_from_after.x_m, step->before_from_after.y_m);
+        if (length > 0.0) lengths.push_back(length);
+      });
+  median_step = lengths.empty() ? 1.0 : upper_median_in_place(std::span(lengths));
+  std::vector<std::size_t> sizes(component_count, 0);
+  for (const std::size_t one : component) ++sizes[one];
+  const auto largest = static_cast<std::size_t>(std::ranges::max_element(sizes) - sizes.begin());
+  std::vector<std::optional<Pose2>> known(poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (component[i] == largest) known[i] = poses[i];
+  }
+  return known;
+}
+
+DrivePoses find_poses_by_images(const Dataset& drive, const MemoryFile& memory,
+                                Executor& executor) {
+  const ViewEncoder encoder(memory.header(), drive.source);
+  const auto info = memory.info();
+  double median_step = 1.0;
+  // Uses the unit of the memory's positions if there are some.
+  const bool has_unit = info.views_with_position > 1;
+  const auto poses = compute_poses_from_images(
+      drive, encoder, has_unit ? visual_odometry(memory.load()) : VisualOdometry(), executor,
+      median_step);
+  DrivePoses found = keep_posed_images(drive, poses, "show the motion from one to the next");
+  found.origin = RoutePoseOrigin::images;
+  if (!has_unit) {
+    for (Pose2& pose : found.poses) {
+      pose.x_m /= median_step;
+      pose.y_m /= median_step;
+    }
+    found.assumed_unit_m = median_step;
+  } else if (read_length_unit(memory) == LengthUnit::view_steps) {
+    found.assumed_unit_m = read_assumed_unit_m(memory);
+  }
+  return found;
+}
+
 }  // namespace
+
+DrivePoses find_drive_poses(const Dataset& drive, const MemoryFile& memory,
+                            const std::string& route, bool only_odometry, Executor& executor) {
+  const std::size_t images = drive.entries.size();
+  Dataset moved = keep_entries(drive, has_odometry_pose);
+  if (!only_odometry) {
+    Dataset posed = keep_entries(drive, has_position);
+    const std::size_t count = posed.entries.size();
+    auto poses = dataset_poses(posed);
+    if (!poses.empty() && 2 * count >= images && 10 * count >= 9 * moved.entries.size()) {
+      return {std::move(posed), std::move(poses), RoutePoseOrigin::data_set, std::nullopt};
+    }
+  }
+  const bool has_enough = only_odometry ? moved.entries.size() >= std::min<std::size_t>(2, images)
+                                        : 2 * moved.entries.size() >= images;
+  if (has_enough && !moved.entries.empty()) {
+    std::vector<Pose2> poses;
+    for (const DatasetEntry& entry : moved.entries) poses.push_back(*entry.odometry);
+    return {std::move(moved), std::move(poses), RoutePoseOrigin::odometry, std::nullopt};
+  }
+  if (only_odometry) {
+    const std::string some = "has odometry for " + std::to_string(moved.entries.size()) + " of " +
+                             format_count(images, "image") + "; allowed with odometry: 2 or more";
+    throw FileError(drive.folder.string(),
+                    moved.entries.empty() ? "has no odometry for its images" : some);
+  }
+  const auto mapped = find_poses_in_map(drive, memory);
+  if (!mapped.empty()) {
+    DrivePoses found =
+        keep_posed_images(drive, mapped, "are in the largest part of the memory's map");
+    found.origin = RoutePoseOrigin::map;
+    if (read_length_unit(memory) == LengthUnit::view_steps) {
+      found.assumed_unit_m = read_assumed_unit_m(memory);
+    }
+    return found;
+  }
+  if (memory.route(route)) {
+    throw FileError(memory.path().string(),
+                    "already contains the route '" + route +
+                        "', and the motion of this drive can only be computed from its images, "
+                        "in another frame; choose another name");
+  }
+  return find_poses_by_images(drive, memory, executor);
+}
 
 double RouteRecorder::Recorded::bytes_per_km() const {
   const double length_m = route.length_m();
@@ -65,6 +237,7 @@ RouteRecorder::RouteRecorder(MemoryFile memory, const std::optional<PictureSourc
     : options_(options),
       file_(std::move(memory)),
       source_(choose_source(file_, options)),
+      views_(file_.header(), source.value_or(file_.header().source)),
       encoder_(source.value_or(file_.header().source), source_),
       route_end_(find_route_end(file_, options.name)) {}
 
@@ -95,29 +268,38 @@ bool RouteRecorder::is_due(const std::optional<Pose2>& last, const Pose2& next, 
   return !last || distance(last->position(), next.position()) >= 0.999 * every_m;
 }
 
-Pose2 RouteRecorder::pose_of(const Observation& observation) const {
-  if (source_.from_odometry && observation.odometry) return *observation.odometry;
+std::optional<Pose2> RouteRecorder::pose_of(const Observation& observation) const {
+  if (source_.from_odometry) return observation.odometry;
   const auto& known = observation.pose;
-  if (!source_.from_odometry && known && known->heading_rad) {
-    return {known->x_m, known->y_m, *known->heading_rad};
-  }
-  throw ContractError(
-      source_.from_odometry ? "odometry of the observation" : "pose of the observation", "unknown",
-      "known, with a heading, for each line of a route");
+  if (!known || !known->heading_rad) return std::nullopt;
+  return Pose2{known->x_m, known->y_m, *known->heading_rad};
+}
+
+double RouteRecorder::interval() const {
+  return options_.every_m / source_.assumed_unit_m.value_or(1.0);
 }
 
 RouteRecorder::EncodedLine RouteRecorder::encode(const Observation& observation) const {
-  return {pose_of(observation), encoder_.line(observation)};
+  const auto pose = pose_of(observation);
+  if (!pose) {
+    throw ContractError(
+        source_.from_odometry ? "odometry of the observation" : "pose of the observation",
+        "unknown", "known, with a heading, for each line of a route");
+  }
+  views_.require_fit(observation);
+  return {*pose, encoder_.line(observation)};
 }
 
 void RouteRecorder::add(EncodedLine line) {
   if (!last_ && route_end_) {
     const double gap_m = distance(route_end_->position(), line.pose.position());
-    if (gap_m > max_gap_m) {
-      throw FileError(file_.path().string(), "the first line lies " + format_number(gap_m) +
-                                                 " m from the end of the route '" + options_.name +
-                                                 "'; allowed: at most " + format_number(max_gap_m) +
-                                                 " m, or another name");
+    const double unit_m = source_.assumed_unit_m.value_or(1.0);
+    if (unit_m * gap_m > max_gap_m) {
+      const std::string unit = source_.assumed_unit_m ? " view steps" : " m";
+      throw FileError(file_.path().string(),
+                      "the first line lies " + format_number(gap_m) + unit +
+                          " from the end of the route '" + options_.name + "'; allowed: at most " +
+                          format_number(max_gap_m / unit_m) + unit + ", or another name");
     }
   }
   last_ = line.pose;
@@ -126,7 +308,8 @@ void RouteRecorder::add(EncodedLine line) {
 }
 
 bool RouteRecorder::add(const Observation& observation) {
-  if (!is_due(last_, pose_of(observation), options_.every_m)) return false;
+  const auto pose = pose_of(observation);
+  if (!pose || !is_due(last_, *pose, interval())) return false;
   add(encode(observation));
   return true;
 }
@@ -152,7 +335,7 @@ RouteRecorder::Recorded RouteRecorder::record(
   std::vector<Pose2> due_poses;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (!is_due(due_poses.empty() ? std::nullopt : std::optional(due_poses.back()), poses[i],
-                options_.every_m)) {
+                interval())) {
       continue;
     }
     chosen.push_back(i);
@@ -164,8 +347,11 @@ RouteRecorder::Recorded RouteRecorder::record(
       [&](std::size_t i) {
         Observation observation = read_observation(drive.entries[chosen[first + i]]);
         const Pose2& pose = due_poses[first + i];
-        if (!options_.odometry)
+        if (options_.odometry) {
+          observation.odometry = pose;
+        } else {
           observation.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+        }
         return encode(observation);
       },
       [&](std::size_t, EncodedLine&& line) {

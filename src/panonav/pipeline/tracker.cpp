@@ -1,15 +1,20 @@
 #include "panonav/pipeline/tracker.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/position_bound.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/sample.hpp"
 #include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
+#include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/visual_motion.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_scheme.hpp"
 
@@ -21,10 +26,10 @@ void require_positions(const MemoryFile& file, const VisualMemory& memory) {
   const std::size_t posed = HeldViewIndex(memory).posed_views().size();
   if (posed >= static_cast<std::size_t>(ObservationModel::min_views)) return;
   throw FileError(file.path().string(),
-                  "holds " + std::to_string(posed) + " views with a position; allowed: " +
-                      std::to_string(ObservationModel::min_views) +
-                      " or more; memorise a data set whose table has the columns "
-                      "'x_m' and 'y_m'");
+                  "holds " + format_count(posed, "view") +
+                      " with a position; allowed: " + std::to_string(ObservationModel::min_views) +
+                      " or more; memorise images taken every 20 to 50 cm, or a data set whose "
+                      "table has the columns 'x_m' and 'y_m'");
 }
 
 // True if the filter's seed, which is also the seed of learning, is the default one with which
@@ -41,13 +46,18 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& m
     if (can_use_stored_models(options)) {
       if (const auto models = load_stored_models(file, memory); models && models->observation) {
         return {std::make_shared<const ColumnRanking>(memory), *models->observation, options.filter,
-                options.odometry};
+                options.odometry.value_or(OdometryNoise{})};
       }
     }
-    return MonteCarloLocaliser(memory, options.filter, options.odometry);
+    return MonteCarloLocaliser(memory, options.filter, options.odometry.value_or(OdometryNoise{}));
   } catch (const ContractError& error) {  // the views are all in one place
     throw FileError(file.path().string(), error.what());
   }
+}
+
+/// Loads at most `max_views` of the views, from whole areas.
+VisualMemory load_sample(ViewIndex& index, std::span<const ViewId> views, std::size_t max_views) {
+  return load_learning_sample(index, views, sample_reference_views(views), max_views);
 }
 
 /// Returns the model of a memory that is not held. A small memory uses the current stored model or
@@ -64,10 +74,7 @@ ObservationModel load_or_learn_model(const MemoryFile& file, const IndexedMemory
     const auto models = is_small ? load_stored_models(file, *sample) : load_stored_models(file);
     if (models && models->observation) return *models->observation;
   }
-  if (!sample) {
-    sample.emplace(load_learning_sample(*index, views, sample_reference_views(views),
-                                        options.max_learnt_views));
-  }
+  if (!sample) sample.emplace(load_sample(*index, views, options.max_learnt_views));
   return learn_observation_model(ColumnRanking(*sample), {.seed = options.filter.seed});
 }
 
@@ -76,7 +83,8 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const IndexedMemory& 
   validate(options.filter);
   try {
     return {[&memory] { return memory.index(); }, file.header().shape,
-            load_or_learn_model(file, memory, options), options.filter, options.odometry};
+            load_or_learn_model(file, memory, options), options.filter,
+            options.odometry.value_or(OdometryNoise{})};
   } catch (const ContractError& error) {  // too few views with positions, or all in one place
     throw FileError(file.path().string(), error.what());
   }
@@ -88,12 +96,18 @@ struct Tracker::Implementation {
   Implementation(const MemoryFile& file, const TrackerOptions& options)
       : memory(file.load()),
         encoder(file.header(), options.source.value_or(file.header().source)),
-        localiser(make_localiser(file, *memory, options)) {}
+        localiser(make_localiser(file, *memory, options)),
+        noise(options.odometry),
+        max_learnt_views(options.max_learnt_views),
+        unit(read_length_unit(file)) {}
   Implementation(std::unique_ptr<IndexedMemory> index, const MemoryFile& file,
                  const TrackerOptions& options)
       : indexed(std::move(index)),
         encoder(file.header(), options.source.value_or(file.header().source)),
-        localiser(make_localiser(file, *indexed, options)) {}
+        localiser(make_localiser(file, *indexed, options)),
+        noise(options.odometry),
+        max_learnt_views(options.max_learnt_views),
+        unit(read_length_unit(file)) {}
   /// Holds the memory if it is a file or small enough.
   static std::unique_ptr<Implementation> make(const std::filesystem::path& memory,
                                               const TrackerOptions& options) {
@@ -103,11 +117,67 @@ struct Tracker::Implementation {
                  : std::make_unique<Implementation>(file, options);
   }
 
+  /// Makes visual odometry with the scale of the memory.
+  [[nodiscard]] VisualOdometry make_visual_odometry() const {
+    if (memory) return panonav::visual_odometry(*memory);
+    const std::vector<ViewId> views = indexed->views();
+    return panonav::visual_odometry(load_sample(*indexed->index(), views, max_learnt_views));
+  }
+
   std::optional<VisualMemory> memory;      // nullopt: not held
   std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
   MonteCarloLocaliser localiser;
-  std::optional<Pose2> odometry;  ///< of the last call of `move_to`
+  std::optional<OdometryNoise> noise;  // of the options
+  std::size_t max_learnt_views;
+  LengthUnit unit;  // of the positions
+  /// Metres per unit of visual length by the latest images with odometry; nullopt if these are too
+  /// few or show no motion.
+  [[nodiscard]] std::optional<double> measure_scale_m() const {
+    std::vector<KnownLength> known;
+    for (std::size_t i = 1; i < latest.size(); ++i) {
+      const auto step = visual_step(OdometryView(latest[i - 1].view), OdometryView(latest[i].view));
+      const double length_m =
+          distance(latest[i - 1].odometry.position(), latest[i].odometry.position());
+      if (step) known.push_back({step->length_in_views, length_m});
+    }
+    return known.size() < min_gap_scale_steps ? std::nullopt : length_scale_m(known);
+  }
+
+  /// Moves the particles by the motion from the last view to this one, and returns the motion.
+  Pose2 step_to(const FourierSignature& view) {
+    OdometryView seen(view);
+    if (!visual_odometry) {
+      visual_odometry = make_visual_odometry();
+      is_last_by_image = false;
+    }
+    if (!is_last_by_image) {
+      if (const auto scale_m = measure_scale_m()) visual_odometry->set_scale_m(*scale_m);
+      visual_odometry->restart(last_view ? std::optional<OdometryView>(*last_view) : std::nullopt);
+    }
+    localiser.set_odometry_noise(noise.value_or(visual_odometry_noise()));
+    const bool is_first = !visual_odometry->last();
+    const Pose2 before = visual_odometry->pose();
+    visual_odometry->add(std::move(seen));
+    if (is_first) return {};
+    const Pose2 motion = inverse(before) * visual_odometry->pose();
+    localiser.move(motion);
+    return motion;
+  }
+
+  /// Pose of the last image, measured or continued by images; nullopt before the first odometry.
+  std::optional<Pose2> odometry;
+  std::optional<FourierSignature> last_view;  // of an image with odometry, if it is known
+  struct PosedView {
+    FourierSignature view;
+    Pose2 odometry;
+  };
+  /// The latest consecutive images with odometry and known view, which give the scale of the motion
+  /// that is read from images where odometry ends: that of the memory's views may differ by half.
+  std::vector<PosedView> latest;
+  bool is_last_by_image = false;                  // the last motion was read from images
+  bool is_moved = false;                          // since the last view was observed
+  std::optional<VisualOdometry> visual_odometry;  // nullopt: no motion was read from images
 };
 
 Tracker::Tracker(const std::filesystem::path& memory, const TrackerOptions& options)
@@ -130,20 +200,90 @@ void Tracker::start_at(const Pose2& pose, double deviation_m, double heading_dev
 }
 
 MonteCarloEstimate Tracker::observe(const Observation& observation) {
-  if (observation.odometry) move_to(*observation.odometry);
-  return observe(implementation_->encoder.packed(observation));
+  const ViewEncoder& encoder = implementation_->encoder;
+  const FourierSignature view = encoder.signature(observation);
+  Implementation& own = *implementation_;
+  const bool has_odometry = observation.odometry && own.unit == LengthUnit::metres;
+  if (has_odometry || !own.is_moved) {
+    move(observation.odometry, &view);
+  } else if (!own.is_last_by_image) {
+    own.last_view = view;
+  }
+  return observe(pack(view, encoder.header().full_scale));
 }
 
 MonteCarloEstimate Tracker::observe(const PackedSignature& view) {
+  implementation_->is_moved = false;
   return implementation_->localiser.observe(view);
 }
 
-void Tracker::move_to(const Pose2& odometry) {
+void Tracker::move(const std::optional<Pose2>& odometry, const FourierSignature* view) {
+  if (odometry && implementation_->unit == LengthUnit::metres) return move_to(*odometry, view);
+  if (view == nullptr) throw ContractError("view", "unknown", "known for images without odometry");
+  move_by_image(*view);
+}
+
+void Tracker::bridge_pauses(Dataset& run, Executor& executor) const {
+  const std::span<DatasetEntry> part = find_odometry_part(run);
+  const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
+  if (implementation_->unit != LengthUnit::metres || std::ranges::all_of(part, has_odometry))
+    return;
+  bridge_odometry_pauses(part, implementation_->make_visual_odometry(), implementation_->encoder,
+                         executor);
+}
+
+bool Tracker::needs_view(std::span<const DatasetEntry> entries, std::size_t index) const {
+  const auto next = entries.subspan(index, std::min(gap_scale_images, entries.size() - index));
+  return implementation_->unit != LengthUnit::metres || is_motion_by_images(entries, index) ||
+         std::ranges::any_of(next, [](const DatasetEntry& entry) { return !entry.odometry; });
+}
+
+void Tracker::move_to(const Pose2& odometry, const FourierSignature* view) {
   require(is_position(odometry.x_m), "x_m of the odometry", odometry.x_m, position_range);
   require(is_position(odometry.y_m), "y_m of the odometry", odometry.y_m, position_range);
-  auto& last = implementation_->odometry;
-  if (last) implementation_->localiser.move(inverse(*last) * odometry);
-  last = odometry;
+  Implementation& own = *implementation_;
+  if (own.unit != LengthUnit::metres) {
+    throw ContractError("odometry", 1.0,
+                        "none, as the positions of the memory are in view steps, not metres");
+  }
+  if (!own.odometry && own.is_last_by_image && view != nullptr) {
+    own.step_to(*view);
+  } else if (own.odometry) {
+    // After images, the difference contains the error of their motion, and keeps its noise.
+    if (!own.is_last_by_image)
+      own.localiser.set_odometry_noise(own.noise.value_or(OdometryNoise{}));
+    own.localiser.move(inverse(*own.odometry) * odometry);
+  }
+  own.odometry = odometry;
+  own.last_view = view == nullptr ? std::nullopt : std::optional(*view);
+  if (view == nullptr) own.latest.clear();
+  if (own.latest.size() > gap_scale_images) own.latest.erase(own.latest.begin());
+  if (view != nullptr) own.latest.push_back({*view, odometry});
+  own.is_last_by_image = false;
+  own.is_moved = true;
+}
+
+void Tracker::move_by_image(const FourierSignature& view) {
+  Implementation& own = *implementation_;
+  const Pose2 motion = own.step_to(view);
+  if (own.odometry) own.odometry = *own.odometry * motion;
+  own.last_view.reset();
+  own.latest.clear();
+  own.is_last_by_image = true;
+  own.is_moved = true;
+}
+
+const std::optional<Pose2>& Tracker::odometry() const noexcept {
+  return implementation_->odometry;
+}
+
+LengthUnit Tracker::length_unit() const noexcept {
+  return implementation_->unit;
+}
+
+const VisualOdometry* Tracker::visual_odometry() const noexcept {
+  const auto& odometry = implementation_->visual_odometry;
+  return odometry ? &*odometry : nullptr;
 }
 
 bool Tracker::refresh() {

@@ -4,9 +4,13 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 
+#include "panonav/io/dataset.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/memory/view_index.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -15,7 +19,9 @@ namespace panonav {
 /// Options for tracking a robot.
 struct TrackerOptions {
   MonteCarloOptions filter;  ///< how particles are sampled and weighted
-  OdometryNoise odometry;    ///< errors of the wheel odometry
+  /// Errors of the motion; nullopt: `OdometryNoise{}` for odometry of wheels, and
+  /// `visual_odometry_noise()` for motion that is read from the pictures.
+  std::optional<OdometryNoise> odometry;
   /// Layout of the pictures; nullopt: that of the memory.
   std::optional<PictureSource> source;
   /// Largest number of views of a memory on a server that is held in RAM; a larger one is searched
@@ -30,6 +36,8 @@ struct TrackerOptions {
 ///   panonav::Tracker tracker("office.panonav");
 ///   const auto estimate = tracker.observe(observation);
 ///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
+/// The motion to an observation without odometry is read from the pictures (`VisualOdometry`); the
+/// next odometry, which is a cumulative pose, corrects it.
 /// Uses the settings of the memory for signatures, and its stored observation model
 /// (`learn_and_store_models`), or learns a new one if the views have changed since. Holds the whole
 /// memory in RAM, unless it is on a server and larger than `max_held_views`; a file is not read
@@ -54,15 +62,43 @@ class Tracker {
   /// Starts around a known pose, in the frame of the memory's positions.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
-  /// Moves the particles by the odometry, if the observation has any, and updates the estimate by
-  /// the image. Throws like `ViewEncoder::panorama`, after the motion was applied.
+  /// Moves the particles (`move`) and updates the estimate by the image. An observation without
+  /// odometry causes no motion if they were moved since the last image. Throws like `move` and
+  /// `ViewEncoder::panorama`.
   MonteCarloEstimate observe(const Observation& observation);
-  /// Updates the estimate by an image without odometry. Another thread may have encoded the image
+  /// Updates the estimate by an image, without motion. Another thread may have encoded the image
   /// with `encoder()`.
   MonteCarloEstimate observe(const PackedSignature& view);
-  /// Moves the particles by the difference from the last odometry; the first call only stores it.
-  /// `odometry`: absolute, in its own frame. Throws ContractError beyond `max_position_m`.
-  void move_to(const Pose2& odometry);
+  /// Moves the particles to the next image: by its odometry (`move_to`), or, without it or if
+  /// positions are in view steps, by its view (`move_by_image`). Throws like these, and
+  /// ContractError if the view is needed (`needs_view`) but null.
+  void move(const std::optional<Pose2>& odometry, const FourierSignature* view);
+  /// Fills pauses of odometry in a recorded run by its images (`bridge_odometry_pauses`), before it
+  /// is tracked: then both ends of a pause are known. Nothing is filled if positions are in view
+  /// steps. Throws as `ViewEncoder::signature`.
+  void bridge_pauses(Dataset& run, Executor& executor) const;
+  /// True if `move` to an entry needs its view.
+  [[nodiscard]] bool needs_view(std::span<const DatasetEntry> entries, std::size_t index) const;
+  /// Moves the particles by the difference from the last odometry, and from the motion read from
+  /// images since then. The first call stores it, and moves them by the view if there is one and
+  /// images came before. `odometry`: absolute, in its own frame. `view`: of the same image, from
+  /// which `move_by_image` may then continue; null: unknown. Throws ContractError beyond
+  /// `max_position_m`, and if the memory's positions are in view steps.
+  void move_to(const Pose2& odometry, const FourierSignature* view = nullptr);
+  /// Moves the particles by the motion from the last image to this one, read from both; only stores
+  /// it if the last view is not known. Call it before `observe` for images that were encoded with
+  /// `encoder()`. The first call computes the metric scale from views with known positions; from a
+  /// memory that is not held, it loads at most `max_learnt_views` for this. Throws ContractError
+  /// unless the signature has three components or more; FileError if the server cannot be reached.
+  /// Cost: that of `visual_step`; of the first call, linear in the views.
+  void move_by_image(const FourierSignature& view);
+  /// Returns the pose of the last image in the frame of the odometry, measured or continued by the
+  /// images; nullopt before the first odometry.
+  [[nodiscard]] const std::optional<Pose2>& odometry() const noexcept;
+  /// Returns the unit of all positions, of the memory and of the estimates.
+  [[nodiscard]] LengthUnit length_unit() const noexcept;
+  /// Returns the motion that was read from the images; null if none was.
+  [[nodiscard]] const VisualOdometry* visual_odometry() const noexcept;
 
   /// Reads changes that other programs made to a memory that is not held; keeps the particles.
   /// Returns true if anything changed; always false if the memory is held. Throws FileError,

@@ -55,10 +55,15 @@ int compute_thumbnail_step(int columns) {
   return (columns + max_columns - 1) / max_columns;
 }
 
-void require_same(std::string_view field, int value, int remembered) {
-  if (value != remembered) {
-    throw ContractError(field, value, std::to_string(remembered) + std::string(as_remembered));
-  }
+std::string format_size(const PanoramaShape& shape) {
+  return std::to_string(shape.columns) + " x " + std::to_string(shape.rows);
+}
+
+void require_same_size(const PanoramaShape& shape, const PanoramaShape& remembered) {
+  if (shape == remembered) return;
+  throw ContractError("size", format_size(shape),
+                      format_size(remembered) + std::string(as_remembered) +
+                          "; store images of another size in a memory of their own");
 }
 
 }  // namespace
@@ -109,18 +114,39 @@ ViewEncoder::ViewEncoder(ViewEncoder&&) noexcept = default;
 ViewEncoder& ViewEncoder::operator=(ViewEncoder&&) noexcept = default;
 
 Panorama ViewEncoder::panorama(ImageView picture, const Tilt& tilt) const {
-  if (picture_shape_) {
-    require_same("rows", picture.height, picture_shape_->rows);
-    require_same("columns", picture.width, picture_shape_->columns);
-  }
+  if (picture_shape_) require_same_size({picture.height, picture.width}, *picture_shape_);
   return check_panorama(reader_.convert(picture, tilt));
 }
 
 Panorama ViewEncoder::check_panorama(Panorama panorama) const {
-  require_same("rows", panorama.rows(), header_.shape.rows);
-  require_same("columns", panorama.columns(), header_.panorama_columns);
-  check_band(panorama.elevations());
+  require_fit(panorama);
   return panorama;
+}
+
+void ViewEncoder::require_fit(const Panorama& panorama) const {
+  require_same_size({panorama.rows(), panorama.columns()},
+                    {header_.shape.rows, header_.panorama_columns});
+  check_band(panorama.elevations());
+}
+
+void ViewEncoder::require_fit(const Observation& observation) const {
+  rethrow_with_file_name(observation, [&] {
+    if (const auto* const ready = std::get_if<Panorama>(&observation.picture)) {
+      return require_fit(*ready);
+    }
+    const ImageSize size = std::get<Image>(observation.picture).size();
+    const PictureSource& source = reader_.source();
+    require_picture_size(source, size);
+    if (is_ready_made(header_, source)) {
+      require_same_size(
+          {size.height, size.width},
+          picture_shape_.value_or(PanoramaShape{header_.shape.rows, header_.panorama_columns}));
+    }
+    const Unwarper* const unwarper = reader_.unwarper();
+    check_band(source.kind == PictureKind::panorama ? source.layout.elevations
+               : unwarper != nullptr                ? unwarper->elevations()
+                                                    : source.layout.kept_elevations);
+  });
 }
 
 void ViewEncoder::check_band(const std::optional<ElevationBand>& band) const {
@@ -162,9 +188,7 @@ FourierSignature ViewEncoder::signature(ImageView picture) const {
 }
 
 FourierSignature ViewEncoder::signature(const Panorama& panorama) const {
-  require_same("rows", panorama.rows(), header_.shape.rows);
-  require_same("columns", panorama.columns(), header_.panorama_columns);
-  check_band(panorama.elevations());
+  require_fit(panorama);
   Workspaces::Borrowed workspace(*workspaces_);
   return extractor_.signature(panorama, *workspace);
 }

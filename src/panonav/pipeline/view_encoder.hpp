@@ -53,6 +53,10 @@ class ViewEncoder {
   /// missing, damaged or of another size than the memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
 
+  /// Throws like `panorama` if the size or the elevation band of an observation differs from the
+  /// memory's, but computes no panorama.
+  void require_fit(const Observation& observation) const;
+
   /// Computes the signature of an observation. The result is the same, bit for bit, for an image
   /// and its panorama. Mirror images of a level robot are processed by the fused
   /// `SignatureExtractor`, without computing a panorama. Throws like `panorama`.
@@ -74,6 +78,7 @@ class ViewEncoder {
 
  private:
   [[nodiscard]] Panorama check_panorama(Panorama panorama) const;
+  void require_fit(const Panorama& panorama) const;
   void check_band(const std::optional<ElevationBand>& band) const;
 
   class Workspaces;

@@ -47,11 +47,12 @@ std::vector<ViewRecord> list_views(const MemoryFile& file) {
   return views;
 }
 
-std::string format_view_table(std::span<const ViewRecord> views,
+std::string format_view_table(std::span<const ViewRecord> views, LengthUnit unit,
                               std::span<const std::string> pictures) {
   require(pictures.empty() || pictures.size() == views.size(), "pictures",
           static_cast<double>(pictures.size()), "none, or as many as views");
-  std::string table = "id,name,x_m,y_m,heading_deg,stamp_s,links,component,thumbnail";
+  std::string table = unit == LengthUnit::metres ? "id,name,x_m,y_m" : "id,name,x_steps,y_steps";
+  table += ",heading_deg,stamp_s,links,component,thumbnail";
   table += pictures.empty() ? "\n" : ",picture\n";
   const auto add = [&table](const std::string& field) {
     table += ',';
@@ -75,13 +76,24 @@ std::string format_view_table(std::span<const ViewRecord> views,
   return table;
 }
 
+std::optional<ViewId> find_view_by_name(const MemoryFile& file, const std::string& name) {
+  const auto found = file.find(name);
+  return found ? found : file.find(escape_name(name));
+}
+
 ViewId find_view_by_name_or_id(const MemoryFile& file, const std::string& name_or_id) {
-  if (const auto named = file.find(name_or_id)) return *named;
+  if (const auto named = find_view_by_name(file, name_or_id)) return *named;
   std::uint32_t id = 0;
   if (read_number(name_or_id, id) && std::ranges::binary_search(file.views(), ViewId{id})) {
     return ViewId{id};
   }
-  throw FileError(file.path().string(), "has no view of the name or id '" + name_or_id + "'");
+  const auto names = file.names();
+  const auto similar = std::ranges::find_if(
+      names, [&](const std::string& name) { return name.starts_with(name_or_id); });
+  throw FileError(file.path().string(),
+                  "has no view of the name or id '" + name_or_id + "'" +
+                      (similar == names.end() ? "; panonav list prints the names and ids"
+                                              : "; did you mean '" + *similar + "'?"));
 }
 
 }  // namespace panonav

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -28,12 +29,17 @@ struct ViewRecord {
 
 /// Returns the table of views as CSV (docs/formats.md, section "Tables of views"): a header and one
 /// line for each view. `pictures`: empty, or the name of each view's image file (empty string: no
-/// image).
-[[nodiscard]] std::string format_view_table(std::span<const ViewRecord> views,
+/// image). `unit`: of the positions (`read_length_unit`); in view steps the columns are "x_steps"
+/// and "y_steps".
+[[nodiscard]] std::string format_view_table(std::span<const ViewRecord> views, LengthUnit unit,
                                             std::span<const std::string> pictures = {});
 
-/// Returns the view with this name, or else with this id. Throws FileError if there is no such
-/// view.
+/// Returns the view with this name, as it is printed or by the bytes for which escapes stand
+/// (`escape_name`); nullopt if there is none.
+[[nodiscard]] std::optional<ViewId> find_view_by_name(const MemoryFile& file,
+                                                      const std::string& name);
+/// Returns the view with this name (`find_view_by_name`), or else with this id. Throws FileError if
+/// there is no such view.
 [[nodiscard]] ViewId find_view_by_name_or_id(const MemoryFile& file, const std::string& name_or_id);
 
 }  // namespace panonav

@@ -5,8 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/topological_mapper.hpp"
+#include "panonav/motion/trajectory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 
 namespace panonav {
@@ -40,6 +43,105 @@ double compute_scale(const VisualMemory& memory, const VisualOdometryOptions& op
   return length_scale_m(known).value_or(options.scale_m);
 }
 
+/// True if an entry near this one has no odometry, so that its image gives motion or scale.
+bool is_near_gap(std::span<const DatasetEntry> entries, std::size_t index) {
+  const std::size_t first = index - std::min(index, gap_scale_images);
+  const std::size_t count = std::min(index + gap_scale_images + 1, entries.size()) - first;
+  return std::ranges::any_of(entries.subspan(first, count),
+                             [](const DatasetEntry& entry) { return !entry.odometry; });
+}
+
+/// Motion read from the images of a run.
+struct MotionByImages {
+  std::vector<Pose2> poses;  ///< by the scale of the memory; changes only near gaps of odometry
+  double scale_m = 1.0;      ///< that scale
+  /// Steps to an entry from the one before it whose length is known by odometry.
+  std::vector<std::optional<KnownLength>> known;
+
+  /// Factor by which lengths in the gap of odometry `begin` .. `end` - 1 differ from `poses`.
+  [[nodiscard]] double compute_length_factor(std::size_t begin, std::size_t end) const {
+    std::vector<KnownLength> steps;
+    const std::size_t last = std::min(end + gap_scale_images + 1, known.size());
+    for (std::size_t i = begin - std::min(begin, gap_scale_images); i < last; ++i)
+      if (known[i]) steps.push_back(*known[i]);
+    return steps.size() < min_gap_scale_steps ? 1.0
+                                              : length_scale_m(steps).value_or(scale_m) / scale_m;
+  }
+};
+
+/// Sets the odometry of the entries that have none.
+void fill_missing_odometry(std::span<DatasetEntry> entries, const MotionByImages& motion) {
+  const std::vector<Pose2>& visual = motion.poses;
+  const auto move_from = [&](std::size_t known, std::size_t i, double length_factor) {
+    Pose2 moved = inverse(visual[known]) * visual[i];
+    moved.x_m *= length_factor;
+    moved.y_m *= length_factor;
+    return *entries[known].odometry * moved;
+  };
+  const std::size_t none = entries.size();
+  std::size_t before = none;
+  for (std::size_t begin = 0; begin < entries.size(); ++begin) {
+    if (entries[begin].odometry) {
+      before = begin;
+      continue;
+    }
+    std::size_t end = begin;
+    while (end < entries.size() && !entries[end].odometry) ++end;
+    const bool is_pause = before != none && end != none;
+    const double factor = motion.compute_length_factor(begin, end);
+    std::vector<Pose2> filled;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double share =
+          static_cast<double>(i + 1 - begin) / static_cast<double>(end + 1 - begin);
+      if (before == none && end == none) {
+        filled.push_back(visual[i]);
+      } else if (!is_pause) {
+        filled.push_back(move_from(std::min(before, end), i, factor));
+      } else {
+        filled.push_back(
+            interpolate(move_from(before, i, factor), move_from(end, i, factor), share));
+      }
+    }
+    for (std::size_t i = begin; i < end; ++i) entries[i].odometry = filled[i - begin];
+    begin = end - 1;
+  }
+}
+
+/// Sets the odometry of the entries that have none by their images. An image that cannot be read
+/// gives no step, if `skip_unreadable`; else throws FileError.
+void add_motion_by_images(std::span<DatasetEntry> entries, VisualOdometry& odometry,
+                          const ViewEncoder& encoder, bool skip_unreadable, Executor& executor) {
+  MotionByImages motion{std::vector<Pose2>(entries.size()), odometry.scale_m(), {}};
+  motion.known.resize(entries.size());
+  std::optional<OdometryView> before;
+  process_in_order(
+      entries.size(), executor,
+      [&](std::size_t i) -> std::optional<OdometryView> {
+        if (!is_near_gap(entries, i)) return std::nullopt;
+        return OdometryView(encoder.signature(read_observation(entries[i])));
+      },
+      [&](std::size_t i, std::optional<OdometryView>&& view) {
+        if (i > 0 && entries[i - 1].odometry && entries[i].odometry) {
+          odometry.restart(view);
+          const auto step = before && view ? visual_step(*before, *view) : std::nullopt;
+          if (step) {
+            motion.known[i] = {step->length_in_views, distance(entries[i - 1].odometry->position(),
+                                                               entries[i].odometry->position())};
+          }
+        } else if (view) {
+          odometry.add(*view);
+        }
+        before = std::move(view);
+        motion.poses[i] = odometry.pose();
+      },
+      [&](std::size_t i, const std::exception_ptr& failure) {
+        if (!skip_unreadable) std::rethrow_exception(failure);
+        before.reset();
+        motion.poses[i] = odometry.pose();
+      });
+  fill_missing_odometry(entries, motion);
+}
+
 }  // namespace
 
 OdometryNoise visual_odometry_noise() {
@@ -52,24 +154,32 @@ OdometryNoise visual_odometry_noise() {
 VisualOdometry visual_odometry(const VisualMemory& memory) {
   VisualOdometryOptions options;
   options.scale_m = compute_scale(memory, options);
+  options.steady_speed = false;  // the memory knows the lengths
   return VisualOdometry(options);
+}
+
+std::string describe_visual_motion(const VisualOdometry& odometry) {
+  return std::to_string(odometry.breaks()) + " of " + format_count(odometry.tried_steps(), "step") +
+         " unread";
 }
 
 std::string add_visual_odometry(Dataset& run, const VisualMemory& memory,
                                 const ViewEncoder& encoder, Executor& executor) {
   VisualOdometry odometry = visual_odometry(memory);
-  process_in_order(
-      run.entries.size(), executor,
-      [&](std::size_t i) {
-        return OdometryView(encoder.signature(read_observation(run.entries[i])));
-      },
-      [&](std::size_t i, OdometryView&& view) {
-        odometry.add(std::move(view));
-        run.entries[i].odometry = odometry.pose();
-      });
-  return std::to_string(odometry.breaks()) + " of " + std::to_string(run.entries.size() - 1) +
-         " steps unread; one unit of the views is " + format_number(odometry.scale_m()) +
-         " m, as in the memory";
+  add_motion_by_images(run.entries, odometry, encoder, false, executor);
+  return describe_visual_motion(odometry);
+}
+
+std::span<DatasetEntry> find_odometry_part(Dataset& run) {
+  const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
+  const auto first = std::ranges::find_if(run.entries, has_odometry);
+  const auto last = std::find_if(run.entries.rbegin(), run.entries.rend(), has_odometry).base();
+  return first == run.entries.end() ? std::span<DatasetEntry>() : std::span(first, last);
+}
+
+void bridge_odometry_pauses(std::span<DatasetEntry> entries, VisualOdometry odometry,
+                            const ViewEncoder& encoder, Executor& executor) {
+  add_motion_by_images(entries, odometry, encoder, true, executor);
 }
 
 }  // namespace panonav

@@ -74,6 +74,7 @@ class PairOfViews {
   }
   void rotate_home(double turn_rad);
   void set_weights();
+  [[nodiscard]] double sum_component_weights() const;
   void average_views();
   void differentiate_rows();
   void sum_equations();
@@ -99,8 +100,7 @@ class PairOfViews {
   std::vector<float> approach_, tangent_;
   std::vector<float> row_weights_;  // empty: equal weights
   PairEquations normal_;
-  PairSolution best_;      // of the present iteration
-  double variance_ = 0.0;  // of its displacement
+  PairSolution best_;  // of the present iteration
   HomeVector vector_;
 };
 
@@ -181,10 +181,11 @@ std::span<const float> PairOfViews::find_headings(int iteration) {
 
 void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
   best_ = {};
-  variance_ = 0.0;
   vector_.heading_rad = 0.0;
   vector_.residual = 1.0;
-  double best_residual = 2.0;  // above all
+  // Logarithm of the likelihood of the residual against unrelated views, to a factor. Residuals
+  // alone cannot be compared: at a wrong heading only the few frequencies that match have weight.
+  double best_evidence = -1.0;  // below all
   for (std::size_t i = 0; i < headings.size(); ++i) {
     const float turn = headings[i];
     // Skips headings at which the views correlate less than half as well, as these do not explain
@@ -195,14 +196,13 @@ void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
     const double unexplained = std::max(0.0, normal_.energy - solution.explained);
     const double residual =
         normal_.energy_of_views > 0.0 ? unexplained / normal_.energy_of_views : 1.0;
-    if (residual >= best_residual) continue;
-    best_residual = residual;
+    const double evidence = -sum_component_weights() * std::log(std::clamp(residual, 1e-12, 1.0));
+    if (evidence <= best_evidence) continue;
+    best_evidence = evidence;
     set_best(turn, solution, residual);
   }
   vector_.xi += best_.xi;
   vector_.eta += best_.eta;
-  const double square = vector_.xi * vector_.xi + vector_.eta * vector_.eta;
-  vector_.confidence = square > 0.0 ? square / (square + variance_) : 0.0;
 }
 
 void PairOfViews::rotate_home(double turn_rad) {
@@ -226,6 +226,12 @@ void PairOfViews::set_weights() {
   }
   component_weights_ = compute_component_weights(c_, highest_, rows_);
   if (rows_ > 1) row_weights_ = compute_row_weights(c_, highest_, rows_, component_weights_);
+}
+
+double PairOfViews::sum_component_weights() const {
+  double sum = 0.0;
+  for (int k = 1; k <= highest_; ++k) sum += component_weights_[static_cast<std::size_t>(k)];
+  return sum;
 }
 
 // Sets the view whose derivatives are used: the mean of both views, or the current one [S06 eq.
@@ -307,16 +313,16 @@ void PairOfViews::set_best(float turn_rad, const PairSolution& solution, double 
   vector_.residual = std::min(1.0, residual);
   const double max_correlation = std::sqrt(home_energy_) * std::sqrt(current_energy_);
   vector_.correlation = std::clamp(correlation_at(turn_rad) / max_correlation, -1.0, 1.0);
-  vector_.frequencies = 0.0;
-  for (int k = 1; k <= highest_; ++k) {
-    vector_.frequencies += component_weights_[static_cast<std::size_t>(k)];
-  }
+  vector_.frequencies = sum_component_weights();
   // Coefficients have four digits at best, by the noise of pixels and the rounding of phases.
   constexpr double min_noise = 1e-8;
   const double unexplained = std::max(0.0, normal_.energy - solution.explained);
   const double noise = std::max(unexplained, min_noise * normal_.energy_of_views);
   const double equations = 2.0 * vector_.frequencies * static_cast<double>(rows_);
-  variance_ = noise / std::max(1.0, equations - 3.0) * solution.variance;
+  const double variance = noise / std::max(1.0, equations - 3.0);
+  const auto& s = solution.covariance;
+  vector_.covariance = {s[3], s[4], s[1], s[4], s[5], s[2], s[1], s[2], s[0]};
+  for (double& entry : vector_.covariance) entry *= variance;
 }
 
 // Moves the view: a_k + a_k^x xi + a_k^y eta -> a_k, by its own slopes [S06 eq. 23-26].
@@ -399,6 +405,18 @@ double HomeVector::length() const noexcept {
 
 double HomeVector::direction_rad() const noexcept {
   return std::atan2(eta, xi);
+}
+
+double HomeVector::direction_deviation_rad() const noexcept {
+  const double square = xi * xi + eta * eta;
+  if (!(square > 0.0)) return std::numbers::pi;
+  const double across =
+      eta * eta * covariance[0] - 2.0 * xi * eta * covariance[1] + xi * xi * covariance[4];
+  return std::min(std::sqrt(std::max(0.0, across)) / square, std::numbers::pi);
+}
+
+bool HomeVector::has_direction() const noexcept {
+  return xi * xi + eta * eta > covariance[0] + covariance[4];
 }
 
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {

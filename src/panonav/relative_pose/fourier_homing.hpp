@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <optional>
+
 #include "panonav/core/options.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
@@ -19,14 +22,20 @@ struct HomeVector {
   double correlation = 0.0;
   /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1.
   double residual = 1.0;
-  /// Confidence of the vector, 0 .. 1: its squared length over the sum of squared length and
-  /// variance, which follows from the residual. Near 0 at home, where there is no direction.
-  double confidence = 0.0;
+  /// Covariance of xi, eta and the heading, row-major, in units of R^2, R rad and rad^2, from the
+  /// residual of the least squares: valid if the vector is right, and says nothing of whether it
+  /// is.
+  std::array<double, 9> covariance{};
   /// Effective number of frequencies: the sum of their weights.
   double frequencies = 0.0;
 
   [[nodiscard]] double length() const noexcept;         ///< in units of R
   [[nodiscard]] double direction_rad() const noexcept;  ///< in the current robot frame
+  /// Standard deviation of the direction by the least squares; at most pi, as at home.
+  [[nodiscard]] double direction_deviation_rad() const noexcept;
+  /// True if the vector is longer than its standard deviation. False at home, where there is no
+  /// direction.
+  [[nodiscard]] bool has_direction() const noexcept;
 };
 
 /// Largest value of `FourierHomingOptions::starting_estimates`.
@@ -85,7 +94,7 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 /// Computes the home vector by Fourier homing [S06 section 2.3, eq. 16-30; see docs/equations.md]:
 /// the heading first, then displacement and a correction of the heading in least squares over the
 /// components of all rows. Iterations move the current view by the result and solve again.
-/// Identical views give the zero vector with confidence 0. Views without structure, or a `window`
+/// Identical views give the zero vector. Views without structure, or a `window`
 /// without a local maximum of the correlation, give all zeros and residual 1. Throws OptionError;
 /// ContractError if the views differ in rows or share fewer than K + 2 components, and for a window
 /// unless 0 < half_width_rad <= pi and the turn estimate is global. Cost: O(rows K), below a

@@ -87,8 +87,8 @@ class RouteLines::FitProblem {
         pose_(pose),
         settled_tolerance_(&level == &route.levels_.back()
                                ? 3e-4
-                               : 0.05 * typical_distance_m * level.sigma * 2.0 * std::numbers::pi /
-                                     route.columns_) {}
+                               : 0.05 * typical_distance_m * route_.options_.metre * level.sigma *
+                                     2.0 * std::numbers::pi / route.columns_) {}
 
   /// Returns the equations at the present pose.
   [[nodiscard]] std::optional<Linearised> compute_equations() {
@@ -102,8 +102,9 @@ class RouteLines::FitProblem {
   }
   bool move(const Equations::Vector& change) {
     const double length_m = std::hypot(change[0], change[1]);
-    const double scale = std::min({1.0, max_step_m / std::max(1e-12, length_m),
-                                   max_step_rad / std::max(1e-12, std::abs(change[2]))});
+    const double scale =
+        std::min({1.0, max_step_m * route_.options_.metre / std::max(1e-12, length_m),
+                  max_step_rad / std::max(1e-12, std::abs(change[2]))});
     pose_.x_m += scale * change[0];
     pose_.y_m += scale * change[1];
     pose_.heading_rad = wrap_angle(pose_.heading_rad + scale * change[2]);
@@ -130,6 +131,7 @@ void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
       option<&T::reach_m>(
           "largest distance from the predicted position at which lines are compared", 0.1, 1000),
       option<&T::robust>("reduce the weight of changed parts of the scene"),
+      no_option<&T::metre>("set by the unit of the route"),
   };
   table.visit(options, visitor);
 }
@@ -150,8 +152,8 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
       level.sigma = options.coarse_deg * columns_ / 360.0 / std::pow(3.0, i);
     }
     const double sigma_rad = level.sigma * 2.0 * std::numbers::pi / columns_;
-    level.half_slope =
-        static_cast<std::size_t>(std::lround(typical_distance_m * sigma_rad / (2.0 * spacing_m)));
+    level.half_slope = static_cast<std::size_t>(
+        std::lround(typical_distance_m * options_.metre * sigma_rad / (2.0 * spacing_m)));
     // Two columns per standard deviation of the smoothing preserve all remaining structure.
     while (2.0 * static_cast<double>(2 * level.stride) <= level.sigma &&
            static_cast<std::size_t>(columns_) % (2 * level.stride) == 0) {
@@ -173,7 +175,9 @@ std::optional<RouteLines::Window> RouteLines::find_window(Point2 position) const
   const auto distance_m = [&](const Pose2& pose) { return distance(pose.position(), position); };
   const auto nearest =
       static_cast<std::size_t>(std::ranges::min_element(poses_, {}, distance_m) - poses_.begin());
-  const auto is_in_reach = [&](std::size_t i) { return distance_m(poses_[i]) < options_.reach_m; };
+  const auto is_in_reach = [&](std::size_t i) {
+    return distance_m(poses_[i]) < options_.reach_m * options_.metre;
+  };
   if (!is_in_reach(nearest)) return std::nullopt;
   Window found{nearest, nearest + 1};
   while (found.begin > 0 && is_in_reach(found.begin - 1)) --found.begin;
@@ -389,7 +393,7 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   if (!coarse_levels.empty() &&
       std::ranges::all_of(coarse_levels, [&](const Level& l) { return minimise_at(l, coarse); })) {
     // Below these differences both fits would end at the same pose.
-    constexpr double same_m = 0.01;
+    const double same_m = 0.01 * options_.metre;
     constexpr double same_rad = 0.01;
     const bool is_same =
         best && distance(coarse.position(), pose.position()) < same_m &&

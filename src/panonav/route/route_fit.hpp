@@ -19,6 +19,9 @@ struct RouteFitOptions {
   int max_steps = 8;        ///< Gauss-Newton steps at each level
   double reach_m = 6.0;     ///< lines farther from the prediction are not compared
   bool robust = true;       ///< changed parts of the scene have less weight
+  /// Length of a metre in the unit of the route's poses, by which options and constants in metres
+  /// are multiplied. Other than 1 only for routes in view steps; > 0. Not an option of users.
+  double metre = 1.0;
   friend bool operator==(const RouteFitOptions&, const RouteFitOptions&) = default;
 };
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor);
@@ -32,7 +35,8 @@ struct RouteFix {
     search,      ///< found on the whole route
   };
   Pose2 pose;  ///< in the route's frame
-  /// Covariance of x, y and heading in metres and radians, row-major, by the noise of the lines.
+  /// Covariance of x, y and heading in metres and radians, row-major: of `RouteLines::fit` by the
+  /// noise of the lines alone; of `RouteTracker` with the errors learnt from the route.
   std::array<double, 9> covariance{};
   /// Robust root mean square of the residuals over the standard deviation of the expected line.
   double residual = 1.0;

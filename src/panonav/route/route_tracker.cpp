@@ -1,6 +1,7 @@
 #include "panonav/route/route_tracker.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -12,6 +13,74 @@
 #include "panonav/route/route_position.hpp"
 
 namespace panonav {
+
+namespace {
+
+/// Share of the errors within the stated covariance's ellipse.
+constexpr double coverage = 0.95;
+/// Squared standard deviations that contain this share of a Gaussian in one and two dimensions.
+constexpr double square_of_coordinate = 3.841;
+constexpr double square_of_position = 5.991;
+/// Smallest number of fits from which anything is learnt.
+constexpr std::size_t min_fits = 3;
+
+/// Error of a fit, with the covariance by the noise of the lines.
+struct FitError {
+  Point2 position;
+  double heading_rad = 0.0;
+  std::array<double, 9> covariance{};
+
+  /// Returns the variance of x and of y that must be added so that the error lies on the ellipse of
+  /// 95 %; 0 if it lies within it.
+  [[nodiscard]] double missing_variance_m2() const {
+    const auto is_within = [&](double added_m2) {
+      const double xx = covariance[0] + added_m2;
+      const double xy = covariance[1];
+      const double yy = covariance[4] + added_m2;
+      return yy * position.x_m * position.x_m - 2.0 * xy * position.x_m * position.y_m +
+                 xx * position.y_m * position.y_m <=
+             square_of_position * (xx * yy - xy * xy);
+    };
+    if (is_within(0.0)) return 0.0;
+    double low = 0.0;
+    double high = (position.x_m * position.x_m + position.y_m * position.y_m) / square_of_position;
+    constexpr int halvings = 40;
+    for (int i = 0; i < halvings; ++i) {
+      const double middle = 0.5 * (low + high);
+      (is_within(middle) ? high : low) = middle;
+    }
+    return high;
+  }
+  [[nodiscard]] double missing_variance_rad2() const {
+    return std::max(0.0, heading_rad * heading_rad / square_of_coordinate - covariance[8]);
+  }
+};
+
+}  // namespace
+
+struct RouteTracker::TestRoute {
+  TestRoute(const RoutePanorama& route, const RouteFitOptions& options)
+      : lines(make_half(route), options) {
+    constexpr std::size_t samples = 40;
+    for (std::size_t s = 0; s < samples; ++s) {
+      // Lines of odd numbers, spread over the route.
+      const std::size_t i = (s * route.size() / samples) | 1U;
+      if (i >= route.size()) break;
+      if (!poses.empty() && poses.back() == route.poses()[i]) continue;
+      poses.push_back(route.poses()[i]);
+      values.push_back(line_values(route, i));
+    }
+  }
+  static RoutePanorama make_half(const RoutePanorama& route) {
+    RoutePanorama half(route.columns());
+    for (std::size_t i = 0; i < route.size(); i += 2) half.append(route.poses()[i], route.line(i));
+    return half;
+  }
+
+  RouteLines lines;
+  std::vector<Pose2> poses;                // of the other lines
+  std::vector<std::vector<float>> values;  // of these
+};
 
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
   using T = RouteTrackerOptions;
@@ -33,33 +102,33 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
 
 RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options,
                            const RouteFitOptions& fit)
-    : options_(options), lines_(route, fit) {
+    : options_(options), metre_(fit.metre), lines_(route, fit) {
   validate(options);
   min_correlation_ = options.min_correlation;
-  if (min_correlation_ == 0.0) min_correlation_ = learn_min_correlation(route, fit);
-}
-
-double RouteTracker::learn_min_correlation(const RoutePanorama& route,
-                                           const RouteFitOptions& options) const {
+  constexpr std::size_t min_lines = 6;
   // Threshold if nothing can be learnt: half of the variance is explained.
   constexpr double default_correlation = 0.7071;
-  constexpr std::size_t samples = 40;
-  if (route.size() < 6) return default_correlation;
-  RoutePanorama half(route.columns());
-  for (std::size_t i = 0; i < route.size(); i += 2) half.append(route.poses()[i], route.line(i));
-  const RouteLines others(half, options);
+  if (route.size() < min_lines) {
+    if (min_correlation_ == 0.0) min_correlation_ = default_correlation;
+    return;
+  }
+  const TestRoute test(route, fit);
+  if (min_correlation_ == 0.0) {
+    min_correlation_ = learn_min_correlation(test).value_or(default_correlation);
+  }
+  learn_model_errors(test);
+}
+
+std::optional<double> RouteTracker::learn_min_correlation(const TestRoute& test) const {
   std::vector<double> right;
   std::vector<double> wrong;
-  for (std::size_t s = 0; s < samples; ++s) {
-    // Lines of odd numbers, spread over the route.
-    const std::size_t i = (s * route.size() / samples) | 1U;
-    if (i >= route.size()) break;
-    auto line = line_values(route, i);
-    if (const auto fix = others.fit(line, route.poses()[i])) right.push_back(fix->correlation);
+  for (std::size_t i = 0; i < test.poses.size(); ++i) {
+    auto line = test.values[i];
+    if (const auto fix = test.lines.fit(line, test.poses[i])) right.push_back(fix->correlation);
     std::ranges::reverse(line);
     if (const auto fix = find_best_on_route(line)) wrong.push_back(fix->correlation);
   }
-  if (right.size() < 3 || wrong.size() < 3) return default_correlation;
+  if (right.size() < min_fits || wrong.size() < min_fits) return std::nullopt;
   const double low = std::max(0.0, order_statistic(std::move(wrong), 0.95));
   const double high = order_statistic(std::move(right), 0.05);
   // Puts the limit nearer to the wrong fits, as a line taken off the path or in a changed scene
@@ -67,9 +136,32 @@ double RouteTracker::learn_min_correlation(const RoutePanorama& route,
   return low + std::max(0.0, high - low) / 3.0;
 }
 
+void RouteTracker::learn_model_errors(const TestRoute& test) {
+  std::vector<double> variances_m2;
+  std::vector<double> variances_rad2;
+  for (std::size_t i = 0; i < test.poses.size(); ++i) {
+    const Pose2& truth = test.poses[i];
+    // To the left and right in turn.
+    const double lateral_m = (i % 2 == 0 ? 1.0 : -1.0) * options_.surprise_m * metre_;
+    const auto fix = test.lines.fit(test.values[i], truth * Pose2{0.0, lateral_m, 0.0});
+    if (!fix || fix->correlation < min_correlation_) continue;
+    const FitError error{{fix->pose.x_m - truth.x_m, fix->pose.y_m - truth.y_m},
+                         angle_difference(fix->pose.heading_rad, truth.heading_rad),
+                         fix->covariance};
+    variances_m2.push_back(error.missing_variance_m2());
+    variances_rad2.push_back(error.missing_variance_rad2());
+  }
+  if (variances_m2.size() < min_fits) return;
+  model_variance_m2_ = order_statistic(std::move(variances_m2), coverage);
+  model_variance_rad2_ = order_statistic(std::move(variances_rad2), coverage);
+}
+
 RouteFix RouteTracker::add_route_position(RouteFix fix, RouteFix::Origin origin) const {
   const RoutePosition position = project_onto_route(lines_.poses(), fix.pose.position());
   fix.origin = origin;
+  fix.covariance[0] += model_variance_m2_;
+  fix.covariance[4] += model_variance_m2_;
+  fix.covariance[8] += model_variance_rad2_;
   fix.along_m = position.along_m;
   fix.lateral_m = position.lateral_m;
   return fix;
@@ -83,7 +175,7 @@ std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
   constexpr int directions = 8;
   for (int ring = 0; ring <= rings; ++ring) {
     for (int k = 0; k < (ring == 0 ? 1 : directions); ++k) {
-      const double off = options_.recovery_m * ring / rings;
+      const double off = options_.recovery_m * metre_ * ring / rings;
       const double angle = 2.0 * std::numbers::pi * k / directions;
       const auto found = lines_.find_candidate(
           coarse, {predicted.x_m + off * std::cos(angle), predicted.y_m + off * std::sin(angle)});
@@ -101,7 +193,7 @@ std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> 
   double since = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < path.size(); ++i) {
     if (i > 0) since += distance(path[i - 1].position(), path[i].position());
-    if (since < options_.search_step_m) continue;
+    if (since < options_.search_step_m * metre_) continue;
     since = 0.0;
     const Pose2& before = path[i == 0 ? 0 : i - 1];
     const Pose2& after = path[std::min(i + 1, path.size() - 1)];
@@ -109,7 +201,7 @@ std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> 
     const double nx = -(after.y_m - before.y_m) / length;
     const double ny = (after.x_m - before.x_m) / length;
     for (int side = -options_.search_sides; side <= options_.search_sides; ++side) {
-      const double off = side * options_.search_lateral_m;
+      const double off = side * options_.search_lateral_m * metre_;
       const auto candidate =
           lines_.find_candidate(coarse, {path[i].x_m + off * nx, path[i].y_m + off * ny});
       if (candidate) found.push_back(*candidate);
@@ -122,7 +214,7 @@ std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> 
     if (tried.size() >= static_cast<std::size_t>(options_.max_candidates)) break;
     // Skips positions near a tested one, from which a fit would converge to the same pose.
     const bool near = std::ranges::any_of(tried, [&](Point2 other) {
-      return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m;
+      return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m * metre_;
     });
     if (near) continue;
     tried.push_back(candidate.pose.position());
@@ -152,7 +244,7 @@ std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const P
     };
     const auto is_acceptable = [&](const std::optional<RouteFix>& fix) {
       return fix && fix->correlation >= min_correlation_ &&
-             off_m(*fix) <= 1.5 * options_.recovery_m;
+             off_m(*fix) <= 1.5 * options_.recovery_m * metre_;
     };
     auto fix = lines_.fit(line, predicted);
     if (is_acceptable(fix)) {
@@ -163,8 +255,8 @@ std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const P
         found = add_route_position(*std::move(fix), RouteFix::Origin::recovery);
     }
     // Odometry errs by centimetres from one line to the next.
-    if (found && is_followed_ && off_m(*found) > options_.surprise_m &&
-        !agrees(*found, options_.surprise_m)) {
+    if (found && is_followed_ && off_m(*found) > options_.surprise_m * metre_ &&
+        !agrees(*found, options_.surprise_m * metre_)) {
       unconfirmed_ = found->pose;
       return std::nullopt;
     }
@@ -172,7 +264,7 @@ std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const P
   if (!found) {
     auto anywhere = search(line);
     // A followed robot is seldom kidnapped; a wrong match of one line is more likely.
-    if (anywhere && (!pose_ || agrees(*anywhere, options_.recovery_m))) {
+    if (anywhere && (!pose_ || agrees(*anywhere, options_.recovery_m * metre_))) {
       found = std::move(anywhere);
     } else {
       unconfirmed_ = anywhere ? std::optional(anywhere->pose) : std::nullopt;

@@ -30,11 +30,16 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 /// continues like the original.
 class RouteTracker {
  public:
-  /// Learns the smallest correlation of an accepted fit from the route. Half of the lines make a
-  /// test route. Right fits are those of the other lines into it; wrong fits are those of mirrored
-  /// lines, which show a place that does not exist. The limit is above the 95 % quantile of the
-  /// wrong correlations by a third of the distance to the 5 % quantile of the right ones. Throws
-  /// OptionError, and ContractError on a route of fewer than two lines. Cost: 40 searches.
+  /// Learns from lines left out of a test route of every second line:
+  /// - the smallest correlation of an accepted fit: above the 95 % quantile of mirrored lines,
+  /// which
+  ///   show a place that does not exist, by a third of the distance to the 5 % quantile of the
+  ///   lines;
+  /// - the variance of errors beyond the noise of the lines, which makes 95 % of the fits that
+  /// start
+  ///   `surprise_m` beside the truth lie within the 95 % ellipse.
+  ///
+  /// Throws OptionError, and ContractError on a route of fewer than two lines. Cost: 40 searches.
   explicit RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options = {},
                         const RouteFitOptions& fit = {});
 
@@ -67,16 +72,22 @@ class RouteTracker {
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
 
  private:
-  [[nodiscard]] double learn_min_correlation(const RoutePanorama& route,
-                                             const RouteFitOptions& options) const;
+  /// Half of the lines as a route, and lines of the other half.
+  struct TestRoute;
+  /// Returns nullopt if there are too few fits.
+  [[nodiscard]] std::optional<double> learn_min_correlation(const TestRoute& test) const;
+  void learn_model_errors(const TestRoute& test);
   [[nodiscard]] std::optional<RouteFix> find_best_on_route(std::span<const float> line) const;
   [[nodiscard]] std::optional<RouteFix> recover(std::span<const float> line,
                                                 const Pose2& predicted) const;
   [[nodiscard]] RouteFix add_route_position(RouteFix fix, RouteFix::Origin origin) const;
 
   RouteTrackerOptions options_;
+  double metre_;  // `RouteFitOptions::metre`
   RouteLines lines_;
   double min_correlation_ = 0.0;
+  double model_variance_m2_ = 0.0;    // of x and of y, beyond the noise of the lines
+  double model_variance_rad2_ = 0.0;  // of the heading, likewise
   std::optional<Pose2> pose_;
   std::optional<Pose2> unconfirmed_;  // unexpected pose by the last line
   bool is_followed_ = false;          // a line has located the robot

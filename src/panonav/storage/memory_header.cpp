@@ -125,6 +125,11 @@ class SettingsWriter final : public OptionFields<SettingsWriter> {
                                  Enum value, Enum default_value) {
     if (value != default_value) choice(key, names, value);
   }
+  template <std::size_t count>
+  void visit_numbers_with_default(const std::string& key, const std::array<double, count>& value,
+                                  const std::array<double, count>& default_value) {
+    if (value != default_value) put(key, to_bytes({value.begin(), value.end()}));
+  }
   void band(const std::string& prefix, const std::optional<ElevationBand>& band) {
     if (!band) return;
     put(prefix + "bottom_rad", band->bottom_rad);
@@ -181,6 +186,16 @@ class SettingsReader final : public OptionFields<SettingsReader> {
                                  Enum& value, Enum default_value) {
     value = default_value;
     if (settings_.contains(key)) choice(key, names, value);
+  }
+  template <std::size_t count>
+  void visit_numbers_with_default(const std::string& key, std::array<double, count>& value,
+                                  const std::array<double, count>& default_value) {
+    value = default_value;
+    if (!settings_.contains(key)) return;
+    const auto numbers = to_doubles(get<std::vector<std::uint8_t>>(key));
+    require(numbers.size() == count, key, static_cast<double>(numbers.size()),
+            std::to_string(count) + " numbers");
+    std::ranges::copy(numbers, value.begin());
   }
   void band(const std::string& prefix, std::optional<ElevationBand>& band) {
     const auto* bottom = find<double>(prefix + "bottom_rad");
@@ -243,10 +258,12 @@ void visit_camera(Fields& fields, AnyCamera& camera) {
   visit_parameters(camera.model, [&](const std::string& name, auto& value) {
     fields.field(prefix + name, value);
   });
-  if (auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
-    fields.visit_choice_with_default(prefix + "axis", view_axis_names, unified->axis,
+  if (auto* axis = find_view_axis(camera.model)) {
+    fields.visit_choice_with_default(prefix + "axis", view_axis_names, *axis,
                                      UnifiedModel::Axis::down);
   }
+  fields.visit_numbers_with_default(prefix + "affine", camera.affine, Camera{}.affine);
+  fields.visit_numbers_with_default(prefix + "distortion", camera.distortion, Camera{}.distortion);
   fields.field(prefix + "width_px", camera.image_size.width);
   fields.field(prefix + "height_px", camera.image_size.height);
   fields.field(prefix + "centre_u_px", camera.centre.u_px);

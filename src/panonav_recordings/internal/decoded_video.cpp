@@ -25,7 +25,7 @@ std::unique_ptr<ChildProcess> start_ffmpeg(const std::vector<std::string>& argum
 
 DecodedVideo::DecodedVideo(const std::vector<std::string>& input,
                            const std::string& select_expression, std::string about,
-                           const ImageLimits& limits)
+                           const ImageLimits& limits, const DecodedTracks& tracks)
     : about_(std::move(about)), limits_(limits) {
   std::vector<std::string> arguments{"ffmpeg",   "-nostdin",  "-hide_banner",
                                      "-nostats", "-loglevel", "level+info"};
@@ -35,10 +35,19 @@ DecodedVideo::DecodedVideo(const std::vector<std::string>& input,
   const std::string filter =
       (select_expression.empty() ? "" : "select='" + select_expression + "',") +
       std::string("format=rgb24,showinfo=checksum=0");
-  for (const char* word : {"-map", "0:v:0", "-fps_mode", "passthrough", "-vf", filter.c_str(), "-f",
-                           "rawvideo", "pipe:1"}) {
-    arguments.emplace_back(word);
+  const std::string left = "0:v:" + std::to_string(tracks.track);
+  if (tracks.right_track < 0) {
+    arguments.insert(arguments.end(), {"-map", left, "-vf", filter});
+  } else {
+    const std::string right =
+        std::to_string(tracks.right_input) + ":v:" + std::to_string(tracks.right_track);
+    arguments.insert(
+        arguments.end(),
+        {"-filter_complex",
+         "[" + left + "][" + right + "]hstack,settb=expr=" + tracks.unit + "," + filter + "[both]",
+         "-map", "[both]"});
   }
+  arguments.insert(arguments.end(), {"-fps_mode", "passthrough", "-f", "rawvideo", "pipe:1"});
   child_ = start_ffmpeg(arguments, about_);
 }
 

@@ -20,6 +20,14 @@ struct DecodedFrame {
   Image picture;
 };
 
+/// Tracks to decode, by their numbers among those with pictures.
+struct DecodedTracks {
+  int track = 0;
+  int right_track = -1;  ///< set to the right of `track`; -1: none
+  int right_input = 0;   ///< number of the input that has `right_track`
+  std::string unit;      ///< time unit of the stamps of two tracks, "1/12800"
+};
+
 /// Starts ffmpeg or ffprobe with these arguments; messages name `about`. Throws FileError that
 /// names the package to install if the program is missing.
 [[nodiscard]] std::unique_ptr<ChildProcess> start_ffmpeg(const std::vector<std::string>& arguments,
@@ -32,7 +40,7 @@ class DecodedVideo {
   /// expression for its filter `select`; an empty one selects all pictures. Messages name `about`.
   /// Throws as `start_ffmpeg`.
   DecodedVideo(const std::vector<std::string>& input, const std::string& select_expression,
-               std::string about, const ImageLimits& limits);
+               std::string about, const ImageLimits& limits, const DecodedTracks& tracks = {});
 
   /// Returns the next picture; `nullopt` at the end. Throws FileError for pictures beyond the
   /// limits, and if no complete picture comes within `max_wait`; the program is then killed.

@@ -28,9 +28,6 @@ struct TopicChoice {
   std::vector<std::string> warnings;  ///< about unused topics, one line each
 };
 
-/// True if messages of this topic are pictures that can be read.
-[[nodiscard]] bool is_readable_picture_topic(const RecordedTopic& topic);
-
 /// Chooses topics by the names given, otherwise by type (rules: `read_recording`); `source` is the
 /// layout of the pictures. Throws FileError that names `path`, and ContractError if both a topic of
 /// odometry and frames are named.

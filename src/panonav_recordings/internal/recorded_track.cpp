@@ -22,29 +22,51 @@ bool RecordedTrack::has_stamps() const {
          std::ranges::any_of(samples_, [](const Sample& each) { return each.times.stamp_ns != 0; });
 }
 
-void RecordedTrack::sort(bool use_log_times) {
-  for (Sample& each : samples_)
-    each.at_ns = use_log_times ? each.times.log_ns : each.times.stamp_ns;
+TimedStream RecordedTrack::times(std::string name) const {
+  TimedStream stream{std::move(name), {}};
+  stream.times.reserve(samples_.size());
+  for (const Sample& each : samples_) stream.times.push_back(each.times);
+  return stream;
+}
+
+void RecordedTrack::sort(std::span<const RecordedTimes> times) {
+  std::ranges::stable_sort(samples_, {}, [](const Sample& each) { return each.times.order; });
+  for (std::size_t i = 0; i < samples_.size(); ++i) samples_[i].times = times[i];
+  const auto stamp = [](const Sample& each) { return each.times.stamp_ns; };
   std::ranges::reverse(samples_);
-  std::ranges::stable_sort(samples_, {}, &Sample::at_ns);
-  const auto same = [](const Sample& a, const Sample& b) { return a.at_ns == b.at_ns; };
+  std::ranges::stable_sort(samples_, {}, stamp);
+  const auto same = [&](const Sample& a, const Sample& b) { return stamp(a) == stamp(b); };
   samples_.erase(std::unique(samples_.begin(), samples_.end(), same), samples_.end());
+  constexpr std::int64_t second_ns = 1'000'000'000;
+  max_gap_ns_ = second_ns;
+  if (samples_.size() < 2) return;
+  std::vector<std::int64_t> intervals_ns;
+  for (std::size_t i = 1; i < samples_.size(); ++i)
+    intervals_ns.push_back(stamp(samples_[i]) - stamp(samples_[i - 1]));
+  const auto middle = intervals_ns.begin() + static_cast<std::ptrdiff_t>(intervals_ns.size() / 2);
+  std::ranges::nth_element(intervals_ns, middle);
+  max_gap_ns_ = std::clamp(std::min(*middle, 2 * second_ns) * 3 / 2, second_ns, 3 * second_ns);
+}
+
+std::optional<TimeSpan> RecordedTrack::span() const {
+  if (samples_.empty()) return std::nullopt;
+  return TimeSpan{samples_.front().times.stamp_ns, samples_.back().times.stamp_ns};
 }
 
 std::optional<ros::Pose> RecordedTrack::at(std::int64_t ns) const {
-  constexpr std::int64_t max_gap_ns = 1'000'000'000;
-  const auto after = std::ranges::lower_bound(samples_, ns, {}, &Sample::at_ns);
-  if (after != samples_.end() && after->at_ns == ns) return after->pose;
+  const auto stamp = [](const Sample& each) { return each.times.stamp_ns; };
+  const auto after = std::ranges::lower_bound(samples_, ns, {}, stamp);
+  if (after != samples_.end() && stamp(*after) == ns) return after->pose;
   if (samples_.size() < 2) return std::nullopt;
   const auto next = std::clamp(after, samples_.begin() + 1, samples_.end() - 1);
-  const Sample& a = *(next - 1);
-  const Sample& b = *next;
-  const std::int64_t interval = b.at_ns - a.at_ns;
-  if (interval > max_gap_ns || ns < a.at_ns - interval || ns > b.at_ns + interval) {
+  const std::int64_t a_ns = stamp(*(next - 1));
+  const std::int64_t b_ns = stamp(*next);
+  const std::int64_t interval_ns = b_ns - a_ns;
+  if (interval_ns > max_gap_ns_ || ns < a_ns - interval_ns || ns > b_ns + interval_ns) {
     return std::nullopt;
   }
-  return ros::interpolate(a.pose, b.pose,
-                          static_cast<double>(ns - a.at_ns) / static_cast<double>(interval));
+  return ros::interpolate((next - 1)->pose, next->pose,
+                          static_cast<double>(ns - a_ns) / static_cast<double>(interval_ns));
 }
 
 TransformChain::TransformChain(std::string_view top, std::string_view bottom)
@@ -52,7 +74,7 @@ TransformChain::TransformChain(std::string_view top, std::string_view bottom)
   if (top_ == bottom_) throw ContractError("odometry frames", top_ + " twice", "two frames");
 }
 
-void TransformChain::add(const ros::TransformStamped& transform, std::int64_t log_ns,
+void TransformChain::add(const ros::TransformStamped& transform, const RecordedTimes& times,
                          bool is_static) {
   const std::string child = normalise_frame_name(transform.child_frame_id);
   const std::string parent = normalise_frame_name(transform.header.frame_id);
@@ -69,7 +91,7 @@ void TransformChain::add(const ros::TransformStamped& transform, std::int64_t lo
     ++ignored_transform_count_;
     return;
   }
-  link.track.add({log_ns, transform.header.stamp_ns}, transform.transform);
+  link.track.add({times.log_ns, transform.header.stamp_ns, times.order}, transform.transform);
   if (link.is_static) link.track.keep_only_last();
 }
 
@@ -79,8 +101,25 @@ bool TransformChain::has_stamps() const {
   });
 }
 
-void TransformChain::sort(bool use_log_times) {
-  for (auto& [child, link] : links_) link.track.sort(use_log_times);
+std::vector<std::pair<std::string, RecordedTrack*>> TransformChain::moving_tracks() {
+  std::vector<std::pair<std::string, RecordedTrack*>> tracks;
+  for (auto& [child, link] : links_) {
+    if (link.is_static) continue;
+    tracks.emplace_back("transforms " + link.parent + " -> " + child, &link.track);
+  }
+  return tracks;
+}
+
+std::optional<TimeSpan> TransformChain::span() const {
+  std::optional<TimeSpan> common;
+  for (const auto& [child, link] : links_) {
+    const auto span = link.is_static ? std::nullopt : link.track.span();
+    if (!span) continue;
+    if (!common) common = span;
+    common->begin_ns = std::max(common->begin_ns, span->begin_ns);
+    common->end_ns = std::min(common->end_ns, span->end_ns);
+  }
+  return common;
 }
 
 std::optional<ros::Pose> TransformChain::at(std::int64_t ns) const {

@@ -4,19 +4,15 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "panonav_recordings/internal/recorded_clock.hpp"
 #include "panonav_recordings/ros_messages.hpp"
 
 namespace panonav::recordings {
-
-/// Times of a message: when it was recorded, and the stamp of its header.
-struct RecordedTimes {
-  std::int64_t log_ns = 0;
-  std::int64_t stamp_ns = 0;
-};
 
 /// Poses over time.
 class RecordedTrack {
@@ -25,20 +21,27 @@ class RecordedTrack {
   void keep_only_last() { samples_.erase(samples_.begin(), samples_.end() - 1); }
   [[nodiscard]] std::size_t size() const noexcept { return samples_.size(); }
   [[nodiscard]] bool has_stamps() const;
-  /// Sorts by header stamp or by log time. From poses of one time only the last is kept.
-  void sort(bool use_log_times);
+  /// Returns the times of all poses. The track must not be sorted yet.
+  [[nodiscard]] TimedStream times(std::string name) const;
+  /// Sorts the poses by the stamps of `times`, which are in the order of their `order`. From poses
+  /// of one stamp only the one recorded last is kept.
+  void sort(std::span<const RecordedTimes> times);
   [[nodiscard]] const ros::Pose& last() const { return samples_.back().pose; }
+  /// Returns the stamps of the first and the last pose; nullopt without poses. Must be sorted.
+  [[nodiscard]] std::optional<TimeSpan> span() const;
   /// Returns the pose at a time, interpolated, or extrapolated by at most one interval beyond
-  /// either end; `nullopt` in gaps of more than a second, within which a robot can turn or brake.
+  /// either end; `nullopt` in gaps of more than `max_gap_ns`. Must be sorted.
   [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const;
 
  private:
   struct Sample {
     RecordedTimes times;
     ros::Pose pose;
-    std::int64_t at_ns = 0;
   };
   std::vector<Sample> samples_;
+  /// One second, within which a robot can turn or brake; if poses come less often, 1.5 times their
+  /// usual interval, at most three seconds (chosen).
+  std::int64_t max_gap_ns_ = 0;
 };
 
 /// The transforms between two frames. Once a chain connects them, transforms of all other frames
@@ -48,7 +51,8 @@ class TransformChain {
   /// Throws ContractError if both frames are the same.
   TransformChain(std::string_view top, std::string_view bottom);
 
-  void add(const ros::TransformStamped& transform, std::int64_t log_ns, bool is_static);
+  /// Adds a transform that was recorded at `times`.
+  void add(const ros::TransformStamped& transform, const RecordedTimes& times, bool is_static);
   [[nodiscard]] bool is_connected() const noexcept { return connected_; }
   /// Returns the number of ignored transforms that give a frame another parent than an earlier
   /// transform.
@@ -56,7 +60,10 @@ class TransformChain {
     return ignored_transform_count_;
   }
   [[nodiscard]] bool has_stamps() const;
-  void sort(bool use_log_times);
+  /// Returns the tracks that change over time, with the names of their frames.
+  [[nodiscard]] std::vector<std::pair<std::string, RecordedTrack*>> moving_tracks();
+  /// Returns the stamps at which all moving transforms are known; nullopt if there are none.
+  [[nodiscard]] std::optional<TimeSpan> span() const;
   /// Returns top_from_bottom at a time; requires that the chain is connected.
   [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const;
   /// Lists all transforms as "parent -> child", for the error that no chain connects the two

@@ -89,6 +89,8 @@ std::uint32_t RecordingFile::get_or_create_topic(std::string_view name, std::str
   }
   if (encoding == "cdr") topic.encoding = MessageEncoding::cdr;
   if (encoding == "ros1") topic.encoding = MessageEncoding::ros1;
+  if (encoding == "protobuf") topic.encoding = MessageEncoding::protobuf;
+  topic.encoding_name = encoding;
   std::string key = topic.name + '\n' + topic.type + '\n' + std::string(encoding);
   const auto [found, is_new] =
       topic_numbers_.try_emplace(std::move(key), static_cast<std::uint32_t>(topics_.size()));

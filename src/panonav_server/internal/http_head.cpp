@@ -66,6 +66,8 @@ class HeadReader {
     if (name == "host") read_unique_field(request_.host, value);
     if (name == "origin") read_unique_field(request_.origin, value);
     if (name == "authorization") read_unique_field(request_.authorization, value);
+    if (name == "content-type") read_unique_field(request_.content_type, value);
+    if (name == "accept") request_.accept.append(request_.accept.empty() ? "" : ",").append(value);
     if (name == "transfer-encoding") set_refusal(501);
     if (name == "content-length") read_length(value);
   }

@@ -23,6 +23,13 @@ struct Affine3 {
   }
 };
 
+/// Returns the determinant of the matrix; below 0 if the transform mirrors.
+[[nodiscard]] inline double determinant(const Affine3& transform) {
+  const auto& m = transform.matrix;
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
 /// Returns a_from_c = a_from_b * b_from_c.
 [[nodiscard]] inline Affine3 operator*(const Affine3& a_from_b, const Affine3& b_from_c) {
   Affine3 result;

@@ -99,10 +99,13 @@ std::vector<fs::path> gazebo_model_folders_of_environment() {
 
 GazeboFiles::GazeboFiles(fs::path world, std::vector<fs::path> model_folders)
     : world_(std::move(world)), folders_(std::move(model_folders)) {
+  // Packages keep worlds in PACKAGE/worlds or one folder deeper, and models in PACKAGE/models;
+  // addresses may begin with the name of the package.
   const fs::path world_folder = fs::absolute(world_).lexically_normal().parent_path();
-  for (const fs::path& folder : {world_folder / "models", world_folder.parent_path() / "models",
-                                 world_folder, world_folder.parent_path()}) {
-    folders_.push_back(folder);
+  const fs::path package = world_folder.parent_path();
+  for (const fs::path& folder : {world_folder / "models", package / "models", world_folder, package,
+                                 package.parent_path() / "models", package.parent_path()}) {
+    if (std::ranges::find(folders_, folder) == folders_.end()) folders_.push_back(folder);
   }
 }
 

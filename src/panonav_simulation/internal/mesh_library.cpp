@@ -1,6 +1,7 @@
 #include "panonav_simulation/internal/mesh_library.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace panonav::simulation {
 
@@ -10,6 +11,9 @@ void place_mesh(Scene& scene, const Mesh& mesh, const Affine3& world_from_mesh, 
   placed.object = std::move(object);
   placed.material = material;
   for (Vector3& vertex : placed.vertices) vertex = world_from_mesh * vertex;
+  if (determinant(world_from_mesh) < 0.0) {
+    for (auto& triangle : placed.triangles) std::swap(triangle[0], triangle[1]);
+  }
   scene.meshes.push_back(std::move(placed));
 }
 

@@ -42,8 +42,8 @@ class MeshLibrary {
   std::map<Key, FileError> errors_;
 };
 
-/// Adds `mesh` to the scene, transformed by `world_from_mesh`. Mirroring transforms are allowed,
-/// because surfaces are visible from both sides.
+/// Adds `mesh` to the scene, transformed by `world_from_mesh`. Mirroring transforms reverse the
+/// order of the corners, so that solids remain solids.
 void place_mesh(Scene& scene, const Mesh& mesh, const Affine3& world_from_mesh, std::string object,
                 int material);
 

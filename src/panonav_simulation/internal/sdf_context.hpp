@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -26,11 +27,14 @@ struct SdfOrigin {
 class SdfContext {
  public:
   SdfContext(const std::filesystem::path& world, const GazeboOptions& options)
-      : textures(options.textures), files(world, options.model_folders) {}
+      : textures(options.textures),
+        files(world, options.model_folders),
+        before_mesh(options.before_mesh) {}
 
   Scene scene;
   TextureStore textures;
   GazeboFiles files;
+  std::function<void(const std::filesystem::path&)> before_mesh;  // of the options; may be empty
 
   /// Adds a warning about the model `object`; an empty `object` means the world itself.
   void warn(const std::string& object, const std::string& what);

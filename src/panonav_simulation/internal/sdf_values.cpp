@@ -77,8 +77,9 @@ Affine3 read_pose(pugi::xml_node pose) {
   const bool is_quaternion =
       std::string_view(pose.attribute("rotation_format").value()) == "quat_xyzw";
   const std::size_t count = is_quaternion ? 7 : 6;
-  const auto n = parse_numbers(text);
+  auto n = parse_numbers(text);
   if (n && n->empty()) return {};
+  if (n && n->size() == 3 && !is_quaternion) n->resize(6);  // a position alone
   if (!n || n->size() != count)
     throw UnusablePart{"its pose is not " + std::to_string(count) + " finite numbers"};
   const auto& v = *n;

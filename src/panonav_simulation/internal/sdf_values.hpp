@@ -42,7 +42,8 @@ struct UnusablePart {
 /// Returns the element with the pose of a part, <pose> or <origin>; a null node if there is none.
 [[nodiscard]] pugi::xml_node find_pose_element(pugi::xml_node part);
 
-/// Reads a <pose>: x y z, then roll pitch yaw or a quaternion x y z w. Throws UnusablePart.
+/// Reads a <pose>: x y z, then roll pitch yaw (may be missing) or a quaternion x y z w. Throws
+/// UnusablePart.
 [[nodiscard]] Affine3 read_pose(pugi::xml_node pose);
 
 /// Returns the name of the frame to which the pose of a part is relative; empty if it names none.

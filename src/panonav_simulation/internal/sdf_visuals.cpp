@@ -67,6 +67,33 @@ Affine3 make_centring_map(const std::vector<const FileMesh*>& parts) {
   return shift;
 }
 
+/// Makes a strip along a path: two vertices for each point, beside it by half the width at a right
+/// angle to the path. The texture covers the width once and repeats along the path.
+Mesh make_strip_mesh(const std::vector<Vector3>& path, double width_m) {
+  Mesh mesh;
+  double along_m = 0.0;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Vector3& before = path[i > 0 ? i - 1 : 0];
+    const Vector3& after = path[std::min(i + 1, path.size() - 1)];
+    const double length_m = std::hypot(after.x_m - before.x_m, after.y_m - before.y_m);
+    if (!(length_m > 0.0)) throw UnusablePart{"two of its points are at one place"};
+    const double left_x_m = -0.5 * width_m * (after.y_m - before.y_m) / length_m;
+    const double left_y_m = 0.5 * width_m * (after.x_m - before.x_m) / length_m;
+    along_m += std::hypot(path[i].x_m - before.x_m, path[i].y_m - before.y_m);
+    for (const double side : {1.0, -1.0}) {
+      mesh.vertices.push_back(
+          {path[i].x_m + side * left_x_m, path[i].y_m + side * left_y_m, path[i].z_m});
+      mesh.texture_coordinates.push_back(
+          {side < 0.0 ? 1.0F : 0.0F, static_cast<float>(along_m / width_m)});
+    }
+    if (i == 0) continue;
+    const auto right = static_cast<std::uint32_t>(2 * i + 1);
+    mesh.triangles.push_back({right - 3, right - 2, right});
+    mesh.triangles.push_back({right - 3, right, right - 1});
+  }
+  return mesh;
+}
+
 void set_emission(Material& material, const Colour& emissive) {
   if (brightness(emissive) <= brightness(material.colour)) return;
   material.colour = emissive;
@@ -81,6 +108,20 @@ void SdfVisuals::add(pugi::xml_node visual, const Affine3& world_from_visual,
   for (const pugi::xml_node& shape : visual.child("geometry")) {
     if (shape.type() == pugi::node_element) add_shape(shape, visual, world_from_visual, origin);
   }
+}
+
+void SdfVisuals::add_road(pugi::xml_node road, const Affine3& world_from_road,
+                          const SdfOrigin& origin) {
+  const double width_m = read_number(road, "width", 1.0);
+  if (!(width_m > 0.0)) throw UnusablePart{"its width is not above 0"};
+  std::vector<Vector3> path;
+  for (const pugi::xml_node& point : road.children("point"))
+    path.push_back(read_pose(point).translation);
+  if (path.size() < 2) throw UnusablePart{"it has fewer than two points"};
+  Scene& scene = context_.scene;
+  scene.materials.push_back(apply_material({}, road, origin));
+  place_mesh(scene, make_strip_mesh(path, width_m), world_from_road, origin.object,
+             static_cast<int>(scene.materials.size()) - 1);
 }
 
 void SdfVisuals::add_shape(pugi::xml_node shape, pugi::xml_node visual,
@@ -110,10 +151,12 @@ void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
   if (!path)
     throw UnusablePart{"its mesh " + quote(uri) + " was not found in " +
                        context_.files.list_folders()};
+  if (context_.before_mesh) context_.before_mesh(*path);
   const pugi::xml_node submesh = shape.child("submesh");
   const std::string name = child_text(submesh, "name");
   std::vector<const FileMesh*> shown;
-  for (const FileMesh& part : meshes_.read(*path)) {
+  // Gazebo takes the coordinates of all formats as they are, with z up; it ignores <up_axis>.
+  for (const FileMesh& part : meshes_.read(*path, UpAxis::z)) {
     if (name.empty() || part.node == name || part.geometry == name) shown.push_back(&part);
   }
   if (shown.empty()) throw UnusablePart{path->string() + " has no part " + quote(name)};

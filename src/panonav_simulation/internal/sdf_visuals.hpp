@@ -17,6 +17,9 @@ class SdfVisuals {
   /// Adds the meshes and materials of a <visual>. Throws UnusablePart, Error.
   void add(pugi::xml_node visual, const Affine3& world_from_visual, const SdfOrigin& origin);
 
+  /// Adds a <road>: a flat strip of its width along its points. Throws UnusablePart, Error.
+  void add_road(pugi::xml_node road, const Affine3& world_from_road, const SdfOrigin& origin);
+
   /// Returns the indices of the scene's meshes that are planes.
   [[nodiscard]] const std::vector<std::size_t>& planes() const { return planes_; }
 

@@ -31,11 +31,11 @@ class Card extends HTMLElement {
     if (this.hidden) return;
     const { references, names, headings } = this.run.retained, place = [references[2 * reference], references[2 * reference + 1]];
     const heading = headings?.[reference], away = at ? Math.hypot(at[0] - place[0], at[1] - place[1]) : 0;
-    const metres = ([x, y]) => `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
+    const { unit } = this.run, describe = ([x, y]) => `x ${x.toFixed(2)} ${unit}, y ${y.toFixed(2)} ${unit}`;
     this.at = at ?? place;
-    this.querySelector('h2').textContent = (at ? `Nearest view, ${away.toFixed(2)} m away: ` : '') +
+    this.querySelector('h2').textContent = (at ? `Nearest view, ${away.toFixed(2)} ${unit} away: ` : '') +
       (names?.[reference] ?? `stored view ${reference}`);
-    this.querySelector('.where').textContent = metres(place) +
+    this.querySelector('.where').textContent = describe(place) +
       (typeof heading === 'number' ? `, heading ${degrees(heading).toFixed(0)}°` : '');
     const image = this.querySelector('img');
     image.hidden = !this.run.views;

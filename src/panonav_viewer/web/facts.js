@@ -1,6 +1,21 @@
 import { degrees } from 'panonav/draw';
 import { isTruth } from 'panonav/store';
 
+// Values have the names of the recording, as inside or along_m. People read what they are, with their unit.
+const meanings = {
+  along: 'distance along the route', best_match: 'most similar view', changed: 'sectors in which the scene has changed', closures: 'loop closures',
+  correction: 'correction of the odometry', correlation: 'correlation with the stored line', delay: 'delay of the answer', dropped: 'images without an answer',
+  inside: 'probability that the robot is in the mapped area', known_probability: 'probability that the place is known',
+  lateral: 'offset from the route, left positive', modes: 'possible positions', nearest: 'nearest view', origin: 'position was', particles: 'particles',
+};
+const units = { ms: ' ms', s: ' s', rad: ' rad', deg: '°' };
+// entered_area: entered area
+const toPlainWords = text => text.replace(/\b[a-z]+(?:_[a-z]+)+\b/g, name => name.replaceAll('_', ' '));
+function toReadable(name, value, length) {
+  const [, stem, unit] = name.match(/^(.+)_(m|ms|s|rad|deg)$/) ?? [undefined, name, undefined];
+  return [meanings[stem] ?? stem.replaceAll('_', ' '), unit ? value + (unit === 'm' ? ` ${length}` : units[unit]) : name === 'event' ? toPlainWords(value) : value];
+}
+
 // Lists the figures of the moment as text, also for screen readers; below them the time of each stage, and the events so
 // far: changes of state and decisions, each a button that seeks its moment.
 class Facts extends HTMLElement {
@@ -17,15 +32,15 @@ class Facts extends HTMLElement {
     const { moments } = this.run, happened = [];
     moments.forEach((moment, i) => {
       const { event } = moment.values ?? {}, changed = moment.state && moment.state !== moments[i - 1]?.state;
-      if (event || changed) happened.push([i, moment.t, [changed && moment.state, event].filter(Boolean).join(': ')]);
+      if (event || changed) happened.push([i, moment.t, [changed && moment.state, event && toPlainWords(event)].filter(Boolean).join(': ')]);
     });
     const newest = happened.slice(-50).reverse(), json = JSON.stringify(newest.map(([, ...rest]) => rest));
     if (json === this.json) return;
     this.json = json;
-    this.querySelector('ol').replaceChildren(...newest.map(([, t, text]) => {
+    this.querySelector('ol').replaceChildren(...newest.map(([number, t, text]) => {
       const item = document.createElement('li'), button = document.createElement('button');
       button.type = 'button';
-      button.textContent = `${(t - moments[0].t).toFixed(1)} s  ${text}`;
+      button.textContent = this.run.counted ? `image ${number + 1}: ${text}` : `${(t - moments[0].t).toFixed(1)} s  ${text}`;
       button.addEventListener('click', () => this.run.seek(t));
       item.append(button);
       return item;
@@ -35,17 +50,17 @@ class Facts extends HTMLElement {
     const moment = this.run.moment;
     if (!moment || this.hidden) return;
     const rows = [];
-    const pose = ([x, y, heading]) => `${x.toFixed(2)} m, ${y.toFixed(2)} m` +
+    const length = this.run.unit, pose = ([x, y, heading]) => `${x.toFixed(2)} ${length}, ${y.toFixed(2)} ${length}` +
       (heading === null ? '' : `, ${degrees(heading).toFixed(1)}°`);
     const estimated = moment.pose && !isTruth(moment);
     if (estimated) rows.push(['estimate', pose(moment.pose)]);
     if (moment.truth) rows.push(['ground truth', pose(moment.truth)]);
     if (estimated && moment.truth) {
-      rows.push(['error', `${Math.hypot(moment.pose[0] - moment.truth[0], moment.pose[1] - moment.truth[1]).toFixed(3)} m`]);
+      rows.push(['error', `${Math.hypot(moment.pose[0] - moment.truth[0], moment.pose[1] - moment.truth[1]).toFixed(3)} ${length}`]);
     }
     if (moment.odometry) rows.push(['odometry', pose(moment.odometry)]);
     if (moment.tilt) rows.push(['roll, pitch', moment.tilt.map(value => `${degrees(value).toFixed(1)}°`).join(', ')]);
-    for (const [name, value] of Object.entries(moment.values ?? {})) rows.push([name.replaceAll('_', ' '), value]);
+    for (const [name, value] of Object.entries(moment.values ?? {})) rows.push(toReadable(name, value, length));
     this.showStages(moment);
     const body = this.querySelector('tbody');
     body.replaceChildren(...rows.map(([name, value]) => {

@@ -20,11 +20,14 @@ const skeleton = `
 <span class="hint">Space: pause. Arrows: one image. Home, End: first, last. Digits: panels. Plus, minus, 0: zoom of the map; on it, arrows and Enter: views.</span></div>`;
 const panels = { map: 'Map', pictures: 'Images', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
 
+const hasPlaces = ({ references, plan, edges }, moments) =>
+  Boolean(references || plan || edges || moments.some(({ pose, truth, particles }) => pose || truth || particles));
+
 // Returns the names of the panels that have something to show.
 function choosePanels({ live, moments = [], retained = {}, route }) {
   if (live) return ['map', 'pictures', 'facts', 'timeline'];
   const has = {
-    map: retained.references || retained.plan || retained.edges || moments.some(({ pose, truth, particles }) => pose || truth || particles),
+    map: hasPlaces(retained, moments),
     pictures: moments.some(({ data }) => data && Object.keys(data).length),
     facts: true,
     route,
@@ -66,6 +69,8 @@ class RunPlayer extends HTMLElement {
     }
     if (this.live) {
       this.playing = this.connected = true;
+      for (const event of ['grown', 'retained']) run.addEventListener(event, () => this.showMapIfKnown());
+      this.showMapIfKnown();
       follow(run, content.live, now => { this.connected = now; this.tell(); });
     } else {
       run.over = true;
@@ -73,9 +78,10 @@ class RunPlayer extends HTMLElement {
       let changes = {};
       for (const moment of run.moments) moment.changes = changes = moment.changes ? { ...changes, ...moment.changes } : changes;
       run.addEventListener('moment', () => Object.assign(run.retained, run.moment.changes));
+      run.counted = run.moments.every(({ t }, i) => t === i);  // images without stamps are numbered
       run.retain(content.retained);
       run.dispatch('grown');
-      run.show(0);
+      run.show(content.unordered ? 0 : run.last);  // until it plays, it shows what it leads to
       this.play(false);
       if (run.last > 0) watch(this);
       else this.find('foot').hidden = true;
@@ -101,8 +107,17 @@ class RunPlayer extends HTMLElement {
     this.find('panels').append(button);
   }
 
+  // Shows the map of a live run when the first position is known: a memory may have none.
+  showMapIfKnown() {
+    const panel = this.querySelector('pn-map'), isKnown = hasPlaces(this.run.retained, this.run.moments), button = this.find('panels').firstChild;
+    if (button.hidden === !isKnown) return;
+    panel.hidden = button.hidden = !isKnown;
+    this.find('shown').classList.toggle('has-map', isKnown);
+    panel.redraw();
+  }
+
   setVisible(visible) {
-    if (visible && !this.held && moves() && this.run.index < this.run.last) this.play(true);
+    if (visible && !this.held && moves() && !this.ended) this.play(true);
     else if (!visible) this.play(false);
   }
   hold() {
@@ -128,7 +143,7 @@ class RunPlayer extends HTMLElement {
   }
   advance() {
     const { run } = this;
-    if (run.index >= run.last) { this.play(false); return; }
+    if (run.index >= run.last) { this.ended = true; this.play(false); return; }
     const wait = (run.moments[run.index + 1].t - run.moment.t) / this.speed;
     this.timer = setTimeout(() => { run.show(run.index + 1); this.advance(); }, 1000 * Math.max(1 / 60, Math.min(2, wait)));
   }
@@ -150,7 +165,7 @@ class RunPlayer extends HTMLElement {
       ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1), Home: () => this.step(-run.moments.length), End: () => this.step(run.moments.length),
       '+': map && (() => map.zoomBy(1.3)), '-': map && (() => map.zoomBy(1 / 1.3)), '0': map && (() => map.reset()),
       ' ': target.matches('button, summary') ? undefined : () => this.find('play').click(),
-    }[key] ?? (/^[1-9]$/.test(key) ? () => this.find('panels').children[key - 1]?.click() : undefined);
+    }[key] ?? (/^[1-9]$/.test(key) ? () => this.find('panels').children[key - 1]?.matches(':not([hidden])') && this.find('panels').children[key - 1].click() : undefined);
   }
   tell() {
     const { run, content } = this, { moment } = run, state = this.find('state'), slider = this.find('slider');
@@ -163,9 +178,7 @@ class RunPlayer extends HTMLElement {
     const text = (moment.state || 'no state') + (moment.probability === undefined ? ''
       : `, ${moment.state === 'unknown place' ? 'known with ' : ''}${(100 * moment.probability).toFixed(0)} %`);
     if (state.textContent !== text) state.textContent = text;
-    // A run without stamps counts its pictures.
-    this.counted ??= !this.live && run.moments.every(({ t }, i) => t === i);
-    this.find('clock').textContent = (this.counted ? '' : `${(moment.t - run.moments[0].t).toFixed(1)} s, `) +
+    this.find('clock').textContent = (run.counted ? '' : `${(moment.t - run.moments[0].t).toFixed(1)} s, `) +
       (!this.live ? `image ${run.index + 1} of ${run.moments.length}` : run.ended ? 'the run has ended'
         : !this.connected ? 'connection lost, reconnecting' : !this.playing ? 'paused' : content.replay ? 'replay' : 'live');
   }

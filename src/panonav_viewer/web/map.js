@@ -80,10 +80,10 @@ class MapPanel extends Drawing {
       this.select(event.offsetX, event.offsetY);
     }
   }
-  zoomBy(factor, x = this.clientWidth / 2, y = this.clientHeight / 2) {
+  zoomBy(factor, x = this.canvas.clientWidth / 2, y = this.canvas.clientHeight / 2) {
     const zoom = Math.max(0.2, Math.min(200, this.zoom * factor));
     factor = zoom / this.zoom;
-    const centre = [this.clientWidth / 2, this.clientHeight / 2];
+    const centre = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
     this.shift = [x, y].map((at, i) => at - centre[i] - (at - centre[i] - this.shift[i]) * factor);
     this.zoom = zoom;
     this.redraw();
@@ -100,7 +100,7 @@ class MapPanel extends Drawing {
     this.clicked = reference === undefined ? undefined : at;
     if (reference !== undefined) {
       this.readout.textContent = `stored view ${reference}${names ? `, ${names[reference]}` : ''}: ` +
-        `x ${references[2 * reference].toFixed(2)} m, y ${references[2 * reference + 1].toFixed(2)} m`;
+        `x ${references[2 * reference].toFixed(2)} ${this.run.unit}, y ${references[2 * reference + 1].toFixed(2)} ${this.run.unit}`;
     } else {
       this.readout.textContent = '';
     }
@@ -112,7 +112,7 @@ class MapPanel extends Drawing {
   chooseTowards(right, down) {
     const all = this.run.retained.references ?? [], { pose } = this.run.moment ?? {};
     const from = this.selected !== undefined ? [this.px(all[2 * this.selected]), this.py(all[2 * this.selected + 1])]
-      : pose ? [this.px(pose[0]), this.py(pose[1])] : [this.clientWidth / 2, this.clientHeight / 2];
+      : pose ? [this.px(pose[0]), this.py(pose[1])] : [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
     let best, minCost = Infinity;
     for (let i = 0; i < all.length; i += 2) {
       const x = this.px(all[i]) - from[0], y = this.py(all[i + 1]) - from[1], along = x * right + y * down, aside = Math.abs(x * down) + Math.abs(y * right);
@@ -133,7 +133,7 @@ class MapPanel extends Drawing {
     this.choose(nearest, best > 12 ? this.at(x, y) : undefined);
     if (nearest !== undefined) return;
     const [at_x, at_y] = this.at(x, y);
-    this.readout.textContent = `x ${at_x.toFixed(2)} m, y ${at_y.toFixed(2)} m`;
+    this.readout.textContent = `x ${at_x.toFixed(2)} ${this.run.unit}, y ${at_y.toFixed(2)} ${this.run.unit}`;
   }
 
   // Returns the bounds of the whole run, so that the map does not jump.
@@ -153,7 +153,7 @@ class MapPanel extends Drawing {
       if (moment.truth) include(moment.truth[0], moment.truth[1]);
     }
     if (!(box[0] <= box[2])) return undefined;
-    const [west, south, east, north] = box, around = 1.5;  // metres around the run whose walls are included
+    const [west, south, east, north] = box, around = Math.max(1.5, 0.4 * (east - west), 0.4 * (north - south));  // metres whose walls are included
     for (const wall of walls) {
       for (let i = 0; i < wall.length; i += 2) {
         if (wall[i] > west - around && wall[i] < east + around && wall[i + 1] > south - around && wall[i + 1] < north + around) include(wall[i], wall[i + 1]);
@@ -172,8 +172,10 @@ class MapPanel extends Drawing {
       this.legend.textContent = moment ? 'No positions yet.' : '';
       return;
     }
-    const margin = 0.5;
-    this.scale = this.zoom * Math.min(width / (box[2] - box[0] + 2 * margin), height / (box[3] - box[1] + 2 * margin));
+    const margin = 0.5, edge = 24;  // in units of the map, and in pixels for the robot and its arrow
+    this.scale = this.zoom * Math.min((width - 2 * edge) / (box[2] - box[0] + 2 * margin),
+      (height - 2 * edge) / (box[3] - box[1] + 2 * margin));
+    this.longest = 2 * Math.max(width, height);  // a longer radius means that nothing is known in its direction
     this.origin = [width / 2 + this.shift[0] - (box[0] + box[2]) / 2 * this.scale,
       height / 2 + this.shift[1] + (box[1] + box[3]) / 2 * this.scale];
     const keys = new Map();
@@ -238,7 +240,9 @@ class MapPanel extends Drawing {
       context.setLineDash([]);
     }
     if (shown.some(({ pose }) => pose)) {
-      keys.set(exact ? 'true path' : moment?.covariance ? 'estimate, path and 95 % ellipse' : 'estimate and path', ['estimate', 0]);
+      const bound = !moment?.covariance ? 'estimate and path' : this.radii(moment.covariance)[0] > this.longest
+        ? 'estimate and path; 95 % between the dashed lines, nothing known across the route' : 'estimate, path and 95 % ellipse';
+      keys.set(exact ? 'true path' : bound, ['estimate', 0]);
       context.strokeStyle = colour('estimate');
       context.lineWidth = 2;
       this.line(context, steady(shown, 'pose'));
@@ -265,14 +269,14 @@ class MapPanel extends Drawing {
       this.pointer(context, moment.pose, 20);
       if (moment.homing) this.drawHoming(context, moment, keys, colour);
     }
-    scaleBar(context, this.scale, width, 'm', colour);
+    scaleBar(context, this.scale, width, this.run.unit, colour);
     this.tell(keys, moment, references);
   }
   tell(keys, moment, references) {
     const legend = [...keys].map(([name, [key, round]]) =>
       `<span style="--key:${key.startsWith('linear') ? key : `var(--${key})`};--round:${round}"${key.startsWith('linear') ? ' class="scale"' : ''}>${name}</span>`).join('');
     if (this.shownLegend !== legend) this.legend.innerHTML = this.shownLegend = legend;
-    const at = ([x, y]) => `x ${x.toFixed(1)} m, y ${y.toFixed(1)} m`;
+    const { unit } = this.run, at = ([x, y]) => `x ${x.toFixed(1)} ${unit}, y ${y.toFixed(1)} ${unit}`;
     const text = ['Map of the run', references.length && `${references.length / 2} stored views`,
       moment?.compared && `most similar view ${this.nameOf(moment.compared[0])}`, moment?.pose && `robot at ${at(moment.pose)}`,
       moment?.modes?.length > 1 && `or at ${moment.modes.slice(1, 4).map(([weight, x, y]) => `${at([x, y])} with ${Math.round(100 * weight)} %`).join('; ')}`,
@@ -335,21 +339,26 @@ class MapPanel extends Drawing {
     if (!modes.length) return;
     if (modes.length > 1) keys.set('other possible poses, with weights', ['mode', '50%']);
     context.font = '12px system-ui';
+    const written = [];  // places of weights; the largest comes first, and none is written over another
     modes.forEach(([weight, x, y, heading, ...covariance], i) => {
       context.strokeStyle = context.fillStyle = colour(i ? 'mode' : 'estimate');
       context.lineWidth = 1 + 2 * weight;
       this.ellipse(context, [x, y], covariance);
       if (modes.length < 2) return;
       this.pointer(context, [x, y, heading], 14);
-      context.fillText(`${Math.round(100 * weight)} %`, this.px(x) + 8, this.py(y) - 8);
+      const text = `${Math.round(100 * weight)} %`, { width } = context.measureText(text);
+      const at = [Math.max(2, Math.min(this.canvas.clientWidth - width - 2, this.px(x) + 8)), Math.max(32, this.py(y) - 8)];
+      if (written.some(([left, right, base]) => at[0] < right + 4 && left < at[0] + width + 4 && Math.abs(base - at[1]) < 13)) return;
+      written.push([at[0], at[0] + width, at[1]]);
+      context.fillText(text, ...at);
     });
   }
   drawHoming(context, { pose, homing: [direction, sure] }, keys, colour) {
-    const confidence = sure ?? 0;
-    keys.set(`home vector, confidence ${confidence.toFixed(2)}`, ['particle', 0]);
+    const probability = sure ?? 0;
+    keys.set(`home vector, probability ${probability.toFixed(2)}`, ['particle', 0]);
     context.strokeStyle = context.fillStyle = colour('particle');
-    context.lineWidth = 1 + 4 * confidence;
-    const heading = pose[2] + direction, length = 26 + 34 * confidence;
+    context.lineWidth = 1 + 4 * probability;
+    const heading = pose[2] + direction, length = 26 + 34 * probability;
     this.pointer(context, [pose[0], pose[1], heading], length);
     context.beginPath();
     const [x, y] = [this.px(pose[0]) + length * Math.cos(heading), this.py(pose[1]) - length * Math.sin(heading)];
@@ -391,14 +400,18 @@ class MapPanel extends Drawing {
     }
     context.stroke();
   }
-  // 95 % of a normal distribution: 2.4477 standard deviations.
-  ellipse(context, [x, y], [xx, xy, yy]) {
+  // Returns the radii in pixels, the longer one first. 95 % of a normal distribution: 2.4477 standard deviations.
+  radii([xx, xy, yy]) {
     const middle = (xx + yy) / 2, half = Math.hypot((xx - yy) / 2, xy);
-    const radius = value => 2.4477 * Math.sqrt(Math.max(0, value)) * this.scale;
+    return [middle + half, middle - half].map(value => 2.4477 * Math.sqrt(Math.max(0, value)) * this.scale);
+  }
+  ellipse(context, [x, y], covariance) {
+    const [xx, xy, yy] = covariance, [longer, shorter] = this.radii(covariance);
+    context.setLineDash(longer > this.longest ? [6, 4] : []);
     context.beginPath();
-    context.ellipse(this.px(x), this.py(y), radius(middle + half), radius(middle - half),
-      -Math.atan2(2 * xy, xx - yy) / 2, 0, 2 * Math.PI);
+    context.ellipse(this.px(x), this.py(y), longer, shorter, -Math.atan2(2 * xy, xx - yy) / 2, 0, 2 * Math.PI);
     context.stroke();
+    context.setLineDash([]);
   }
 }
 customElements.define('pn-map', MapPanel);

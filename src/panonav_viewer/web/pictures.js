@@ -60,7 +60,11 @@ class Pictures extends HTMLElement {
     figure('camera').hidden = !camera;
     if (camera) figure('camera').querySelector('img').src = camera.src;
     figure('panorama').hidden = !panorama;
-    if (panorama) this.drawPanorama(figure('panorama').querySelector('canvas'), panorama, 0, true);
+    if (panorama) {
+      this.drawPanorama(figure('panorama').querySelector('canvas'), panorama, 0, true);
+      const name = this.moment.values?.image;
+      figure('panorama').querySelector('figcaption').textContent = `Panorama${name ? ` of the image ${name}` : ''}, forward in the middle`;
+    }
     figure('best').hidden = !best;
     const turn = this.moment.turn;
     if (best) {

@@ -82,10 +82,10 @@ class Plan extends Plot {
     this.slider.addEventListener('input', () => { this.hold(); this.show(Number(this.slider.value)); });
     this.key.after(controls);
     this.story = this.closest('.story');
-    this.show(this.story && !moves() ? this.frames.length - 1 : 0);
+    this.show(this.frames.length - 1);  // until it plays, it shows what it leads to
     if (this.story) watchTogether(this.story, this); else watch(this);
   }
-  setVisible(visible) { this.play(visible && !this.held && moves() && (Boolean(this.story) || this.index < this.frames.length - 1)); }
+  setVisible(visible) { this.play(visible && !this.held && moves() && (Boolean(this.story) || !this.ended)); }
   hold() { this.held = true; this.play(false); }
   play(isPlaying) {
     clearTimeout(this.timer);
@@ -95,6 +95,7 @@ class Plan extends Plot {
     if (!isPlaying) return;
     const step = () => {
       if (this.index >= this.frames.length - 1) {
+        this.ended = true;
         this.play(Boolean(this.story));  // a story begins again
         return;
       }

@@ -49,7 +49,7 @@ class RoutePanel extends Chart {
       keys.push(['matched line', 'vermilion', 'line']);
     }
     this.readout.textContent = along === null ? 'not on this route'
-      : `at ${along.toFixed(2)} m` + (truth === null ? '' : `, ${(100 * Math.abs(along - truth)).toFixed(1)} cm error`);
+      : `at ${along.toFixed(2)} ${this.run.unit}` + (truth === null ? '' : `, ${(100 * Math.abs(along - truth)).toFixed(1)} cm error`);
     this.explain(keys);
   }
   draw(...content) {

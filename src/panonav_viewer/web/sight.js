@@ -36,12 +36,19 @@ addEventListener('pointerdown', event => {  // a click pauses the animation that
   if (!event.target.closest('.controls')) current?.hold();
 });
 
-// Calls once when the element comes near the visible part, so that long pages open fast.
+// Calls once when the element comes near the visible part, so that long pages open fast, or when the page is printed.
 export function whenNear(element, call) {
+  let waiting = true;
+  const start = () => { waiting = false; call(); };
   const near = new IntersectionObserver(entries => {
-    if (!entries.some(entry => entry.isIntersecting)) return;
+    if (!waiting || !entries.some(entry => entry.isIntersecting)) return;
     near.disconnect();
-    call();
+    start();
   }, { rootMargin: '800px' });
   near.observe(element);
+  addEventListener('beforeprint', () => {
+    if (!waiting) return;
+    near.disconnect();
+    start();
+  }, { capture: true });  // before it is drawn for paper
 }

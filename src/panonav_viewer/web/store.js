@@ -17,6 +17,8 @@ export class Run extends EventTarget {
 
   get moment() { return this.moments[this.index]; }
   get last() { return this.moments.length - 1; }
+  // Unit of lengths: view steps if a map of images has no known length.
+  get unit() { return this.retained.unit ?? 'm'; }
   dispatch(name) { this.dispatchEvent(new Event(name)); }
 
   // Adds the moments before the viewer connected: [[t, x, y, heading, probability, sure, state, true x, true y], ...].
@@ -89,5 +91,5 @@ export function steady(moments, name) {
 
 export function stateClass(moment) {
   if (moment.sure) return 'good';
-  return moment.state === 'ambiguous' || moment.state === 'between places' ? 'doubt' : 'bad';
+  return ['ambiguous', 'position known, heading not'].includes(moment.state) || moment.state === 'between places' ? 'doubt' : 'bad';
 }

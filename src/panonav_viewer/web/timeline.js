@@ -38,6 +38,7 @@ class Timeline extends Drawing {
     context.strokeStyle = colour('line');
     context.lineWidth = 1;
     this.hasProbability = moments.some(({ probability }) => probability !== undefined);
+    this.classList.toggle('band', !this.hasProbability);  // of states alone, which needs less height
     for (const probability of this.hasProbability ? [0, 0.5, 1] : []) {
       context.fillText(probability.toFixed(1), 8, y(probability) + 4);
       context.beginPath();

@@ -14,13 +14,6 @@ namespace {
 
 constexpr std::size_t table_limit_bytes = 64U << 20U;
 
-std::string_view trim(std::string_view text) {
-  const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
 // Splits a line; nullopt if a quote is not closed or text follows it.
 std::optional<std::vector<std::string>> split_fields(std::string_view line) {
   std::vector<std::string> fields;
@@ -43,7 +36,7 @@ std::optional<std::vector<std::string>> split_fields(std::string_view line) {
       if (i < line.size() && line[i] != ',') return std::nullopt;
     } else {
       const std::size_t end = std::min(line.find(',', i), line.size());
-      field = trim(line.substr(i, end - i));
+      field = trim_blanks(line.substr(i, end - i));
       i = end;
     }
     fields.push_back(std::move(field));
@@ -53,6 +46,13 @@ std::optional<std::vector<std::string>> split_fields(std::string_view line) {
 }
 
 }  // namespace
+
+std::string_view trim_blanks(std::string_view text) {
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
   const auto bytes = read_file(path, table_limit_bytes);
@@ -64,7 +64,7 @@ CsvTable CsvTable::read(const std::filesystem::path& path) {
   std::size_t line_number = 0;
   while (!rest.empty()) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const std::string_view line = trim(rest.substr(0, end));
+    const std::string_view line = trim_blanks(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
     ++line_number;
     if (line.empty() || line.front() == '#') continue;

@@ -8,6 +8,9 @@
 
 namespace panonav {
 
+/// Removes blanks, tabs and carriage returns at both ends.
+[[nodiscard]] std::string_view trim_blanks(std::string_view text);
+
 /// A small table of text with a header line. Fields are separated by commas, may be in double
 /// quotes, and are trimmed of blanks; empty lines and lines that begin with # are ignored.
 class CsvTable {

@@ -29,6 +29,9 @@ void check_image_size(ImageSize size, std::string_view name, const ImageLimits& 
 
 [[nodiscard]] Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
                                 const ImageLimits& limits);
+/// Decodes at an eighth of the size, only to find damage. Returns the size of the upright picture.
+[[nodiscard]] ImageSize check_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
+                                   const ImageLimits& limits);
 [[nodiscard]] std::vector<std::uint8_t> encode_jpeg(ImageView image, int quality);
 [[nodiscard]] ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name,
                                   const ImageLimits& limits);

@@ -211,13 +211,36 @@ ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name,
   return upright_size(stored, read_exif_orientation(find_exif(bytes)));
 }
 
+namespace {
+
+void reject_printing_colours(const Reader& reader, std::string_view name) {
+  if (reader.jpeg.jpeg_color_space == JCS_CMYK || reader.jpeg.jpeg_color_space == JCS_YCCK) {
+    throw FileError(name, "is a JPEG in printing colours (CMYK); allowed: grey, RGB");
+  }
+}
+
+}  // namespace
+
+ImageSize check_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
+                     const ImageLimits& limits) {
+  Reader reader;
+  const ImageSize stored = open(reader, bytes, name, limits);
+  reject_printing_colours(reader, name);
+  reader.jpeg.scale_num = 1;
+  reader.jpeg.scale_denom = 8;
+  if (!start_steps(reader)) fail(reader, name);
+  const std::size_t stride =
+      static_cast<std::size_t>(reader.jpeg.output_width) * reader.jpeg.output_components;
+  std::vector<std::uint8_t> pixels(stride * reader.jpeg.output_height);
+  if (!read_pixels(reader, pixels.data(), stride)) fail(reader, name);
+  return upright_size(stored, read_exif_orientation(find_exif(bytes)));
+}
+
 Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
                   const ImageLimits& limits) {
   Reader reader;
   const ImageSize size = open(reader, bytes, name, limits);
-  if (reader.jpeg.jpeg_color_space == JCS_CMYK || reader.jpeg.jpeg_color_space == JCS_YCCK) {
-    throw FileError(name, "is a JPEG in printing colours (CMYK); allowed: grey, RGB");
-  }
+  reject_printing_colours(reader, name);
   if (!start_steps(reader)) fail(reader, name);
   const int channels = reader.jpeg.output_components;
   if (static_cast<int>(reader.jpeg.output_width) != size.width ||

@@ -31,6 +31,46 @@ void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_coun
   }
 }
 
+namespace {
+
+/// Sines and cosines of the azimuths of matches in the frame halfway between both views. If the
+/// query's azimuth is clockwise of the reference's, both vectors are reversed, so that a direction
+/// of motion must have a sine of at least `min_sine` to both bearings; `min_sine` is above 1 if no
+/// motion can explain the match.
+struct HalfwayBearings {
+  float query_sine[max_descriptors], query_cosine[max_descriptors];
+  float reference_sine[max_descriptors], reference_cosine[max_descriptors];
+  float min_sine[max_descriptors];
+};
+
+/// Sets the first `count` of `halfway` from the matches from `first` on.
+inline void turn_to_halfway(const MatchedBearings& matched, const MatchedBearings::Turn& turn,
+                            const MotionHypotheses& hypotheses, size_t first, size_t count,
+                            HalfwayBearings& halfway) {
+  for (size_t i = 0; i < count; ++i) {
+    const size_t at = first + i;
+    const float within = matched.cosine[at] * turn.cosine - matched.sine[at] * turn.sine;
+    // Parallax, counter-clockwise from the reference's bearing to the query's.
+    const float parallax = matched.sine[at] * turn.cosine + matched.cosine[at] * turn.sine;
+    const float size = parallax < 0.0F ? -parallax : parallax;
+    const float sign = parallax < 0.0F ? -1.0F : 1.0F;
+    halfway.query_sine[i] = sign * (matched.query_sine[at] * turn.half_cosine +
+                                    matched.query_cosine[at] * turn.half_sine);
+    halfway.query_cosine[i] = sign * (matched.query_cosine[at] * turn.half_cosine -
+                                      matched.query_sine[at] * turn.half_sine);
+    halfway.reference_sine[i] = sign * (matched.reference_sine[at] * turn.half_cosine -
+                                        matched.reference_cosine[at] * turn.half_sine);
+    halfway.reference_cosine[i] = sign * (matched.reference_cosine[at] * turn.half_cosine +
+                                          matched.reference_sine[at] * turn.half_sine);
+    const float limit =
+        (size * hypotheses.tolerance_cosine - hypotheses.tolerance_sine) / hypotheses.max_ratio;
+    const float needed = size <= hypotheses.tolerance_sine ? -2.0F : limit;
+    halfway.min_sine[i] = within > 0.0F ? needed : 2.0F;
+  }
+}
+
+}  // namespace
+
 template <Instructions set>
 void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
                                             const MatchedBearings::Turn& turn,
@@ -38,36 +78,11 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
   const float square_tolerance = hypotheses.tolerance_sine * hypotheses.tolerance_sine;
   int32_t along[motion_axes] = {};
   int32_t against[motion_axes] = {};
+  HalfwayBearings halfway;
   for (size_t first = 0; first < matched.count; first += max_descriptors) {
     const size_t left = matched.count - first;
     const size_t count = left < max_descriptors ? left : max_descriptors;
-    // Sines and cosines of the azimuths in the frame halfway between both views. If the query's
-    // azimuth is clockwise of the reference's, both vectors are reversed, so that a direction of
-    // motion must have a sine of at least `min_sine` to both bearings; `min_sine` is above 1 if no
-    // motion can explain the match.
-    float query_sine[max_descriptors], query_cosine[max_descriptors];
-    float reference_sine[max_descriptors], reference_cosine[max_descriptors];
-    float min_sine[max_descriptors];
-    for (size_t i = 0; i < count; ++i) {
-      const size_t at = first + i;
-      const float within = matched.cosine[at] * turn.cosine - matched.sine[at] * turn.sine;
-      // Parallax, counter-clockwise from the reference's bearing to the query's.
-      const float parallax = matched.sine[at] * turn.cosine + matched.cosine[at] * turn.sine;
-      const float size = parallax < 0.0F ? -parallax : parallax;
-      const float sign = parallax < 0.0F ? -1.0F : 1.0F;
-      query_sine[i] = sign * (matched.query_sine[at] * turn.half_cosine +
-                              matched.query_cosine[at] * turn.half_sine);
-      query_cosine[i] = sign * (matched.query_cosine[at] * turn.half_cosine -
-                                matched.query_sine[at] * turn.half_sine);
-      reference_sine[i] = sign * (matched.reference_sine[at] * turn.half_cosine -
-                                  matched.reference_cosine[at] * turn.half_sine);
-      reference_cosine[i] = sign * (matched.reference_cosine[at] * turn.half_cosine +
-                                    matched.reference_sine[at] * turn.half_sine);
-      const float limit =
-          (size * hypotheses.tolerance_cosine - hypotheses.tolerance_sine) / hypotheses.max_ratio;
-      const float needed = size <= hypotheses.tolerance_sine ? -2.0F : limit;
-      min_sine[i] = within > 0.0F ? needed : 2.0F;
-    }
+    turn_to_halfway(matched, turn, hypotheses, first, count, halfway);
     for (size_t i = 0; i < count; ++i) {
       const float query_tangent = matched.query_tangent[first + i];
       const float reference_tangent = matched.reference_tangent[first + i];
@@ -75,10 +90,10 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
       const float reference_square = reference_tangent * reference_tangent;
       for (size_t d = 0; d < motion_axes; ++d) {
         // Sines of the angles between the direction of motion and both bearings.
-        const float of_query =
-            query_sine[i] * hypotheses.cosine[d] - query_cosine[i] * hypotheses.sine[d];
-        const float of_reference =
-            reference_sine[i] * hypotheses.cosine[d] - reference_cosine[i] * hypotheses.sine[d];
+        const float of_query = halfway.query_sine[i] * hypotheses.cosine[d] -
+                               halfway.query_cosine[i] * hypotheses.sine[d];
+        const float of_reference = halfway.reference_sine[i] * hypotheses.cosine[d] -
+                                   halfway.reference_cosine[i] * hypotheses.sine[d];
         const float off = query_tangent * of_reference - reference_tangent * of_query;
         const float by_reference =
             (reference_square + of_reference * of_reference) * (1.0F + query_square);
@@ -87,8 +102,8 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
         const float smaller = of_query < of_reference ? of_query : of_reference;
         const float larger = of_query < of_reference ? of_reference : of_query;
         const int32_t in_plane = off * off <= square_tolerance * scale ? 1 : 0;
-        along[d] += in_plane & (smaller >= min_sine[i] ? 1 : 0);
-        against[d] += in_plane & (-larger >= min_sine[i] ? 1 : 0);
+        along[d] += in_plane & (smaller >= halfway.min_sine[i] ? 1 : 0);
+        against[d] += in_plane & (-larger >= halfway.min_sine[i] ? 1 : 0);
       }
     }
   }

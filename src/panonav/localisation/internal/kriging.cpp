@@ -4,19 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
-#include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/position_model.hpp"
 
 namespace panonav {
 
 namespace {
-
-/// Largest distance of neighbours on a grid in spacings, diagonal ones included.
-constexpr double max_adjacent_spacings = 1.5;
-/// Tolerance for rounding: a reference on a straight edge of the map has an empty half circle.
-constexpr double edge_tolerance_rad = radians(1.0);
 
 // Column differences are means of square roots, so their squares grow with distance.
 double squared(double difference) {
@@ -67,23 +60,6 @@ double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m) {
   return min_elsewhere > 0.0 ? std::sqrt(near.squared_query_differences(0) / min_elsewhere) : 1.0;
 }
 
-bool is_surrounded(const ResemblingViews& near, double spacing_m) {
-  std::vector<double> directions;
-  for (const Point2& position : near.positions) {
-    const double distance_m = distance(position, near.positions[0]);
-    if (distance_m == 0.0 || distance_m > max_adjacent_spacings * spacing_m) continue;
-    directions.push_back(
-        std::atan2(position.y_m - near.positions[0].y_m, position.x_m - near.positions[0].x_m));
-  }
-  if (directions.empty()) return false;
-  std::ranges::sort(directions);
-  double gap = directions.front() + 2.0 * std::numbers::pi - directions.back();
-  for (std::size_t i = 1; i < directions.size(); ++i) {
-    gap = std::max(gap, directions[i] - directions[i - 1]);
-  }
-  return gap < std::numbers::pi - edge_tolerance_rad;
-}
-
 KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double exponent,
                      double unit) {
   KrigedPosition result;
@@ -111,20 +87,20 @@ KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double
   const Eigen::VectorXd solution = matrix.completeOrthogonalDecomposition().solve(right);
   double total = 0.0;
   for (Eigen::Index i = 0; i < size; ++i) total += solution(i);
+  result.variance = std::max(0.0, solution.dot(right));
   for (Eigen::Index i = 0; i < size; ++i) {
     const double weight = solution(i) / total;
     result.weights.push_back(weight);
     const Point2 p = near.positions[result.used[i]];
     result.position = {result.position.x_m + weight * p.x_m, result.position.y_m + weight * p.y_m};
   }
-  result.variance = std::max(0.0, solution.dot(right));
   // With an exponent above 1 the variogram may be invalid for the L1 distance. The solution can
   // then leave the neighbourhood; the position of the best match replaces it.
   if (!(distance(result.position, near.positions[0]) <= neighbourhood_m)) {
     result.position = near.positions[0];
     result.used = {0};
     result.weights = {1.0};
-    result.variance = 2.0 * right(0);  // the variance of a single reference's error
+    result.variance = 2.0 * variogram(near.squared_query_differences(0));
   }
   return result;
 }

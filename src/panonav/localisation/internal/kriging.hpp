@@ -10,10 +10,6 @@
 
 namespace panonav {
 
-/// Share of the typical kriging variance that remains if the query equals a reference: sensor
-/// noise. Chosen so that the radius contains 95 % of the positions in
-/// tests/localisation/position_model_test.cpp.
-inline constexpr double min_variance_share = 0.1;
 /// Distance in spacings beyond which two places are unrelated: farther than the neighbours on a
 /// grid.
 inline constexpr double elsewhere_spacings = 3.0;
@@ -36,15 +32,14 @@ struct ResemblingViews {
 /// Returns the best match's difference divided by that of the best match elsewhere
 /// (`elsewhere_spacings`); 0 if there is no match elsewhere.
 [[nodiscard]] double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m);
-/// True if neighbouring references surround the best match, without an empty half circle.
-[[nodiscard]] bool is_surrounded(const ResemblingViews& near, double spacing_m);
 
 /// A position by ordinary kriging.
 struct KrigedPosition {
   Point2 position;
-  double variance = 0.0;          ///< in units of the variogram
   std::vector<std::size_t> used;  ///< indices of the interpolated resembling views
   std::vector<double> weights;    ///< of the `used` views; sum to 1
+  /// Kriging variance: expected squared error in units of the variogram.
+  double variance = 0.0;
 };
 /// Interpolates over the views within `neighbourhood_m` of the best match; the variogram is the
 /// squared difference over `unit`, to the power of `exponent`.

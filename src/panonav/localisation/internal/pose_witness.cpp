@@ -67,8 +67,9 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
   double offset_rad = 0.0;
   const double middle_rad = poses[best.front()].heading_rad;
   const auto add = [&](const Pose2& pose, const PoseWitness& witness) {
-    const double deviation_m = std::hypot(std::max(0.5 * witness.radius_m, 0.05 * spacing_m),
-                                          odometry_error_share * witness.travelled_m);
+    const double deviation_m =
+        std::hypot(std::max(0.5 * witness.radius_m.value_or(spacing_m), 0.05 * spacing_m),
+                   odometry_error_share * witness.travelled_m);
     const double weight = 1.0 / (deviation_m * deviation_m);
     weights += weight;
     mean.x_m += weight * pose.x_m;

@@ -14,9 +14,10 @@ inline constexpr double heading_agreement_tolerance_rad = radians(20.0);
 
 /// A sure localisation of one image of a run, used as evidence of the pose of another image.
 struct PoseWitness {
-  Pose2 odometry;            ///< at the witness's image, in the odometry's frame
-  Pose2 pose;                ///< localised, in the frame of the memory's positions
-  double radius_m = 0.0;     ///< contains the true position in 95 % of the cases
+  Pose2 odometry;  ///< at the witness's image, in the odometry's frame
+  Pose2 pose;      ///< localised, in the frame of the memory's positions
+  /// Contains the true position in 95 % of the cases; nullopt if it is not known.
+  std::optional<double> radius_m;
   double travelled_m = 0.0;  ///< distance travelled between the two images, >= 0
 };
 

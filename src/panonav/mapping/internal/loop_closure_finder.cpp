@@ -15,11 +15,12 @@ namespace {
 constexpr int views_per_candidate = 4;
 /// Candidates that are closer along the path than this share of the shortest loop are one place.
 constexpr double place_share_of_loop = 0.25;
-/// Share of the drift per metre on the part of a loop before the last closure, as closures have
-/// corrected that part.
-constexpr double closed_drift_share = 0.2;
 /// Error of odometry over a metre or two, as a share of the path.
 constexpr double local_drift = 0.1;
+
+bool is_before(const LoopClosure& a, const LoopClosure& b) {
+  return a.later < b.later;
+}
 
 double position_distance(const Pose2& a, const Pose2& b) {
   return distance(a.position(), b.position());
@@ -51,8 +52,6 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
           1000),
       option<&T::sequence>("number of successive views whose loop closures must agree", 1, 1000),
       option<&T::spacing_m>("shortest path between two reported loop closures", 0, 1e6),
-      option<&T::max_drift>("assumed drift of the odometry per metre since the last loop closure",
-                            0, 100),
   };
   table.visit(options, visitor);
 }
@@ -64,6 +63,7 @@ LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosu
   validate(odometry);
   odometry_.rule = VisualOdometryOptions::Rule::home_vector;  // the other gives no direction
   odometry_.max_residual = options.max_residual;
+  odometry_.min_probability = 0.0;  // closures are checked by the way back and by sequences
 }
 
 std::vector<ViewId> LoopClosureFinder::find_excluded_views(std::span<const PathNode> nodes,
@@ -116,9 +116,9 @@ std::optional<LoopClosure> LoopClosureFinder::verify_closure(std::size_t earlier
   return LoopClosure{earlier, later, there->before_from_after, there->residual};
 }
 
-std::optional<LoopClosure> LoopClosureFinder::find_best_closure(std::span<const PathNode> nodes,
-                                                                std::span<const Pose2> poses,
-                                                                const OdometryView& view) const {
+std::optional<LoopClosure> LoopClosureFinder::find_best_closure(
+    std::span<const PathNode> nodes, std::span<const Pose2> poses, const OdometryView& view,
+    const IsPossible& is_possible) const {
   const std::size_t here = nodes.size() - 1;
   const auto excluded = find_excluded_views(nodes, here);
   const auto found = memory_->search(memory_->packed(nodes[here].view),
@@ -139,7 +139,7 @@ std::optional<LoopClosure> LoopClosureFinder::find_best_closure(std::span<const 
     compared.push_back(*candidate);
     const auto closure =
         verify_closure(*candidate, here, OdometryView(memory_->signature(match.view)), view);
-    if (closure) closures.push_back(*closure);
+    if (closure && is_possible(*closure)) closures.push_back(*closure);
   }
   if (closures.empty()) return std::nullopt;
   const LoopClosure& best = *std::ranges::min_element(closures, {}, &LoopClosure::residual);
@@ -170,24 +170,6 @@ bool LoopClosureFinder::is_reciprocal(std::span<const PathNode> nodes, std::span
   });
 }
 
-bool LoopClosureFinder::is_within_drift(std::span<const PathNode> nodes,
-                                        std::span<const Pose2> poses,
-                                        const LoopClosure& closure) const {
-  // Components have no common frame, so drift does not limit closures between them.
-  if (nodes[closure.earlier].component != nodes[closure.later].component) return true;
-  const double here_m = nodes[closure.later].path_m;
-  const double loop_m = here_m - nodes[closure.earlier].path_m;
-  const double since_m = std::min(loop_m, here_m - last_closure_path_m_);
-  const double allowed_m =
-      odometry_.scale_m + options_.max_drift * (since_m + closed_drift_share * (loop_m - since_m));
-  // A heading error that grows linearly to an angle causes a drift of half the angle per metre.
-  const double allowed_rad = options_.heading_tolerance_rad + 2.0 * options_.max_drift;
-  const Pose2 closed = poses[closure.earlier] * closure.earlier_from_later;
-  const Pose2& reached = poses[closure.later];
-  return position_distance(closed, reached) < allowed_m &&
-         std::abs(angle_difference(closed.heading_rad, reached.heading_rad)) < allowed_rad;
-}
-
 bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,
                               std::span<const Pose2> poses) const {
   // The motion from a's later node to b's: along the path, and through the earlier passage.
@@ -205,37 +187,34 @@ bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,
 
 std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PathNode> nodes,
                                                  std::span<const Pose2> poses,
-                                                 const OdometryView& view, double scale_m) {
+                                                 const OdometryView& view, double scale_m,
+                                                 const IsPossible& is_possible) {
   require(nodes.size() == poses.size() && !nodes.empty(), "poses",
           static_cast<double>(poses.size()), "as many as nodes, and at least one");
   odometry_.scale_m = scale_m;
   const std::size_t here = nodes.size() - 1;
-  // Pending closures are kept for twice the length of a sequence, as single views may fail a check.
-  const auto oldest = static_cast<std::size_t>(2 * options_.sequence);
-  while (!pending_.empty() && here - pending_.front().closure.later > oldest) pending_.pop_front();
-  const auto closure = find_best_closure(nodes, poses, view);
-  if (!closure || !is_within_drift(nodes, poses, *closure) ||
-      !is_reciprocal(nodes, poses, *closure)) {
+  const auto reach = static_cast<std::size_t>(options_.sequence - 1);
+  while (!pending_.empty() && here - pending_.front().later > 2 * reach) pending_.pop_front();
+  const auto found = find_best_closure(nodes, poses, view, is_possible);
+  if (found && is_reciprocal(nodes, poses, *found)) pending_.push_back(*found);
+  const auto closure = std::ranges::find(pending_, here - reach, &LoopClosure::later);
+  if (here < reach || closure == pending_.end()) return {};
+  // The displacement between views is the more certain the smaller it is, so a passage through a
+  // known place is closed where the views explain each other best. Matches of other components are
+  // checked by their number.
+  int agreeing = 0;
+  for (const LoopClosure& other : pending_) {
+    if (!agree(std::min(other, *closure, is_before), std::max(other, *closure, is_before), poses))
+      continue;
+    if (scope_ == ClosureScope::everywhere && other.residual < closure->residual) return {};
+    ++agreeing;
+  }
+  const double closed_m = nodes[closure->later].path_m;
+  if (agreeing < options_.sequence || closed_m - last_closure_path_m_ < options_.spacing_m) {
     return {};
   }
-  const bool continues = std::ranges::any_of(pending_, &Pending::reported);
-  pending_.push_back({*closure, false});
-  std::vector<Pending*> agreeing;
-  for (Pending& pending : pending_) {
-    if (agree(pending.closure, *closure, poses)) agreeing.push_back(&pending);
-  }
-  std::vector<LoopClosure> certain;
-  if (static_cast<int>(agreeing.size()) < options_.sequence) return certain;
-  const double here_m = nodes[here].path_m;
-  if (continues && here_m - last_closure_path_m_ < options_.spacing_m) return certain;
-  // At the start of a passage all closures of the sequence are reported, later only the latest.
-  for (Pending* pending : agreeing) {
-    if (continues && pending != agreeing.back()) continue;
-    certain.push_back(pending->closure);
-    pending->reported = true;
-  }
-  last_closure_path_m_ = here_m;
-  return certain;
+  last_closure_path_m_ = closed_m;
+  return {*closure};
 }
 
 }  // namespace panonav

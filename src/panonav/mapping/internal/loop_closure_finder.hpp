@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -27,9 +28,8 @@ enum class ClosureScope {
 
 /// Finds loop closures while the robot drives. Candidates come from the memory's search. Home
 /// vectors in both directions must agree with the compass and be each other's inverse; the search
-/// from the candidate must find the present view; no other place may explain the view as well; the
-/// closure must be within the drift of the odometry; and the closures of successive views must
-/// agree.
+/// from the candidate must find the present view; the path must allow it; no
+/// other such place may explain the view as well; and the closures of successive views must agree.
 class LoopClosureFinder {
  public:
   /// `memory` must outlive the finder. Throws OptionError.
@@ -37,28 +37,31 @@ class LoopClosureFinder {
                     const VisualOdometryOptions& odometry,
                     ClosureScope scope = ClosureScope::everywhere);
 
+  /// True if the path between both nodes allows the closure.
+  using IsPossible = std::function<bool(const LoopClosure&)>;
+
   /// Returns the closures that have become certain with the last of `nodes`, whose view is the
-  /// latest of the memory. While the robot drives along a known path, its first certain closure
-  /// comes with those of the nodes just before; after that, each node adds its own. `poses`:
-  /// poses of the nodes in the map so far, which distinguish places and check the sequence.
-  /// `scale_m`: metric scale of visual displacements. Throws ContractError on different numbers of
-  /// nodes and poses. Cost: two searches of the memory and, where there are candidates, 0.3 ms for
-  /// each.
+  /// latest of the memory: those of the node `sequence - 1` before it, if no closure of the nodes
+  /// around it explains the views better. `poses`: poses of the nodes in the map so far, which
+  /// distinguish places and check the sequence. `scale_m`: metric scale of visual displacements;
+  /// `is_possible`: is asked about each candidate, so that of places that look alike only those
+  /// that the path allows compete. Throws ContractError on different numbers of nodes and poses.
+  /// Cost: two searches of the memory and, where there are candidates, 0.3 ms for each.
   [[nodiscard]] std::vector<LoopClosure> find(std::span<const PathNode> nodes,
                                               std::span<const Pose2> poses,
-                                              const OdometryView& view, double scale_m);
+                                              const OdometryView& view, double scale_m,
+                                              const IsPossible& is_possible);
 
  private:
   [[nodiscard]] std::optional<LoopClosure> find_best_closure(std::span<const PathNode> nodes,
                                                              std::span<const Pose2> poses,
-                                                             const OdometryView& view) const;
+                                                             const OdometryView& view,
+                                                             const IsPossible& is_possible) const;
   [[nodiscard]] std::optional<LoopClosure> verify_closure(std::size_t earlier, std::size_t later,
                                                           const OdometryView& earlier_view,
                                                           const OdometryView& later_view) const;
   [[nodiscard]] bool is_reciprocal(std::span<const PathNode> nodes, std::span<const Pose2> poses,
                                    const LoopClosure& closure) const;
-  [[nodiscard]] bool is_within_drift(std::span<const PathNode> nodes, std::span<const Pose2> poses,
-                                     const LoopClosure& closure) const;
   [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
                            std::span<const Pose2> poses) const;
   /// Returns the views that are no candidates for a closure with the node.
@@ -72,11 +75,7 @@ class LoopClosureFinder {
   VisualOdometryOptions odometry_;
   ClosureScope scope_;
   double last_closure_path_m_ = 0.0;  // path length at the last closure
-  struct Pending {
-    LoopClosure closure;
-    bool reported = false;
-  };
-  std::deque<Pending> pending_;  // of the last views, oldest first
+  std::deque<LoopClosure> pending_;   // of the last views, oldest first
 };
 
 }  // namespace panonav

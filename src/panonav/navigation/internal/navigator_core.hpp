@@ -14,9 +14,6 @@
 
 namespace panonav {
 
-/// Smallest confidence of a used home vector; below it the vector is as likely to be only noise.
-inline constexpr double min_vector_confidence = 0.5;
-
 /// Scales of a memory, which a navigator learns once at construction.
 struct MemoryScales {
   PlaceScale place;   ///< learnt with all components

@@ -146,7 +146,7 @@ void Navigator::Core::detect_obstruction(Step& step) {
     // tested while the robot follows a stored route: its steps may be short there, and the
     // scanlines of the route determine its position.
     obstruction.is_present |=
-        !pilot.is_on_leg() && back.confidence < min_vector_confidence &&
+        !pilot.is_on_leg() && !back.has_direction() &&
         image_difference(*last.view, step.view.view) <
             0.5 * std::min(scales.place.neighbour_difference, scales.coarse.neighbour_difference);
     step.last_direction_rad = wrap_angle(*last.direction_rad + back.heading_rad);

@@ -188,8 +188,16 @@ PairSolution solve(const PairEquations& equations) noexcept {
   s.xi = y1 * d[1] - l21 * s.eta;
   s.turn = y0 * d[0] - l10 * s.xi - l20 * s.eta;
   s.explained = y0 * y0 * d[0] + y1 * y1 * d[1] + y2 * y2 * d[2];
-  // The trace of the lower right block of the inverse.
-  s.variance = d[1] + l21 * l21 * d[2] + d[2];
+  // The inverse of the matrix, by the inverse of its lower factor.
+  const double i10 = -l10;
+  const double i20 = l10 * l21 - l20;
+  const double i21 = -l21;
+  s.covariance = {d[0] + i10 * i10 * d[1] + i20 * i20 * d[2],
+                  i10 * d[1] + i20 * i21 * d[2],
+                  i20 * d[2],
+                  d[1] + i21 * i21 * d[2],
+                  i21 * d[2],
+                  d[2]};
   return s;
 }
 

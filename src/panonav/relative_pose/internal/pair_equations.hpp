@@ -88,7 +88,8 @@ struct PairSolution {
   double xi = 0.0;
   double eta = 0.0;
   double explained = 0.0;  ///< energy that the solution explains
-  double variance = 0.0;   ///< of xi and eta, for unit variance of an equation
+  /// Covariance of turn, xi and eta for unit variance of an equation: 00 01 02 11 12 22.
+  std::array<double, 6> covariance{};
 };
 
 /// Solves the normal equations; unknowns on which the views do not depend stay 0.

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -152,15 +153,21 @@ void check_path_is_free(const fs::path& path) {
   }
 }
 
-// A hard link fails if the name has been used in the meantime, while a rename would replace that
-// file.
-void link_to_final_name(const fs::path& unfinished, const fs::path& path) {
-  if (::link(unfinished.c_str(), path.c_str()) != 0) {
+// Fails if the name has been used in the meantime. File systems that cannot rename without
+// replacing can make a hard link; where neither works, a file of that name would be replaced.
+void move_to_final_name(TemporaryFile& unfinished, const fs::path& path) {
+  const char* from = unfinished.path().c_str();
+  if (::renameat2(AT_FDCWD, from, AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0) {
+    unfinished.keep();
+  } else if (errno == EEXIST) {
+    throw_name_taken(path);
+  } else if (::link(from, path.c_str()) != 0) {
     if (errno == EEXIST) throw_name_taken(path);
     if ((errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS) ||
-        ::rename(unfinished.c_str(), path.c_str()) != 0) {
+        ::rename(from, path.c_str()) != 0) {
       throw FileError(path.string(), "cannot be created: " + system_message());
     }
+    unfinished.keep();
   }
   sync_folder(parent_folder(path));
 }
@@ -172,7 +179,7 @@ void create_memory_tables(const fs::path& path, const MemoryHeader& header,
   validate(header);
   if (const auto scheme = find_memory_scheme(path)) return scheme->create(path, header, fill);
   check_path_is_free(path);
-  const TemporaryFile unfinished(path);
+  TemporaryFile unfinished(path);
   remove_log_files(unfinished.path());
   try {
     Database database(unfinished.path(), DatabaseMode::create);
@@ -194,7 +201,7 @@ void create_memory_tables(const fs::path& path, const MemoryHeader& header,
     remove_log_files(unfinished.path());
     throw;
   }
-  link_to_final_name(unfinished.path(), path);
+  move_to_final_name(unfinished, path);
 }
 
 OpenedMemory open_memory_tables(const fs::path& path, Access access) {

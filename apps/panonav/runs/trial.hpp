@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/session.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/localisation/place.hpp"
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/picture_guess.hpp"
+
+namespace panonav::command {
+
+/// A trial of a user's own images: all are memorised, and each is localised among the others.
+struct Trial {
+  /// An image, and the place that was found for it among the other images.
+  struct Query {
+    std::string name;
+    Place place;
+  };
+
+  std::vector<std::string> inputs;  ///< as the user typed them; several videos are one
+  PictureGuess guess;
+  std::size_t image_count = 0;      ///< of the input
+  std::vector<std::string> unread;  ///< images that cannot be read or have another size
+  std::vector<Query> queries;       ///< the images that were tried, in their order
+  std::optional<double> lean_rad;   ///< median lean of the camera
+  /// Elevation up to which the images show the camera's carrier; these rows are left out.
+  std::optional<double> carrier_top_rad;
+  double mean_brightness = 0.0;          ///< 0 .. 1
+  std::optional<Image> example;          ///< an unwrapped image
+  std::filesystem::path memory;          ///< the memory file
+  std::optional<TopologicalMap> map;     ///< of the memory
+  std::optional<MemoryMap> map_summary;  ///< description of `map`
+  bool has_positions = false;            ///< of a data set, so that there is no map
+  /// Median distance between two images if things around are 1.5 m away (`VisualOdometryOptions`);
+  /// nullopt: most pairs of images do not show the motion between them.
+  std::optional<double> median_distance_m;
+  std::vector<Pose2> map_poses;                 ///< of the map's nodes, parts beside each other
+  std::optional<std::filesystem::path> camera;  ///< file of a camera that was found
+
+  [[nodiscard]] std::size_t count_known() const;
+  /// True if two images are typically nearer to each other than the shortest step of a good
+  /// recording, so that the whole recording shows one place.
+  [[nodiscard]] bool is_standing() const;
+  /// Number of consecutive images whose motion is part of the map.
+  [[nodiscard]] std::size_t count_connected_steps() const;
+};
+
+/// Opens the input (of several, videos that continue the first), guesses how to read its images,
+/// memorises at most 400 of them at equal intervals in `folder`, and localises each one among the
+/// others. Throws FileError.
+[[nodiscard]] Trial run_trial(const std::vector<std::string>& inputs,
+                              const std::filesystem::path& folder, Session& session);
+
+/// The result of a trial in words.
+struct TrialVerdict {
+  bool is_good = false;               ///< at least nine of ten images and steps are recognised
+  std::string headline;               ///< one line
+  std::vector<std::string> findings;  ///< a sentence each, the most important one first
+  std::vector<std::string> commands;  ///< command lines to continue with
+};
+[[nodiscard]] TrialVerdict judge_trial(const Trial& trial);
+
+}  // namespace panonav::command

@@ -1,0 +1,442 @@
+#include "panonav/pipeline/memory_map.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numeric>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/localisation/observation_model.hpp"
+#include "panonav/mapping/lattice.hpp"
+#include "panonav/mapping/topological_mapper.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/route/route_panorama.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// Parameter that is set if the positions of the views come from a map; its value is their unit.
+constexpr const char* unit_parameter = "map_unit";
+constexpr const char* metres_text = "metres";
+constexpr const char* view_steps_text = "view_steps";  // followed by the assumed metres of a step
+/// Distance between components that have no common frame, in median steps. It exceeds the distance
+/// over which positions are interpolated (chosen).
+constexpr double component_gap_steps = 6.0;
+/// Smallest number of views of a part whose views get positions: fewer are too few for the model of
+/// observations, and steps between images that are far apart are too often wrong.
+constexpr std::size_t min_positioned_views = ObservationModel::min_views;
+/// Assumed distance between neighbouring views of an arrangement: that which is recommended for a
+/// recording.
+constexpr double assumed_spacing_m = 0.3;
+
+struct StoredUnit {
+  LengthUnit unit = LengthUnit::metres;
+  double assumed_m = 1.0;
+};
+
+StoredUnit read_stored_unit(const MemoryFile& memory) {
+  const auto text = memory.parameter(unit_parameter);
+  if (!text || text->empty() || *text == metres_text) return {};
+  const std::vector<std::string> words = split_words(*text);
+  StoredUnit stored{.unit = LengthUnit::view_steps};
+  if (words.size() == 2 && words[0] == view_steps_text && read_number(words[1], stored.assumed_m) &&
+      std::isfinite(stored.assumed_m) && stored.assumed_m > 0.0) {
+    return stored;
+  }
+  throw FileError(memory.path().string(), std::string("parameter ") + unit_parameter + " is '" +
+                                              to_readable_line(*text) +
+                                              "'; allowed: " + metres_text + ", or " +
+                                              view_steps_text + " and a number above 0");
+}
+
+double length(const Pose2& step) {
+  return std::hypot(step.x_m, step.y_m);
+}
+
+/// Bounds of the positions of a component.
+struct Box {
+  double min_x_m = std::numeric_limits<double>::infinity();
+  double max_x_m = -std::numeric_limits<double>::infinity();
+  double min_y_m = std::numeric_limits<double>::infinity();
+  double max_y_m = -std::numeric_limits<double>::infinity();
+
+  void add(const Pose2& pose) {
+    min_x_m = std::min(min_x_m, pose.x_m);
+    max_x_m = std::max(max_x_m, pose.x_m);
+    min_y_m = std::min(min_y_m, pose.y_m);
+    max_y_m = std::max(max_y_m, pose.y_m);
+  }
+  [[nodiscard]] double width() const { return max_x_m - min_x_m; }
+  [[nodiscard]] double height() const { return max_y_m - min_y_m; }
+};
+
+std::vector<std::size_t> count_nodes(const TopologicalMap& map) {
+  std::vector<std::size_t> counts;
+  for (const TopologicalMap::Node& node : map.nodes) {
+    counts.resize(std::max(counts.size(), node.component + 1), 0);
+    ++counts[node.component];
+  }
+  return counts;
+}
+
+/// Returns the offset of each component (`place_components_side_by_side`), given their boxes.
+std::vector<Point2> compute_offsets(const std::vector<Box>& boxes,
+                                    const std::vector<std::size_t>& order, double gap) {
+  std::vector<Point2> offsets(boxes.size());
+  const Box& first = boxes[order.front()];
+  double area = 0.0;
+  for (const Box& box : boxes) area += (box.width() + gap) * (box.height() + gap);
+  constexpr double width_to_height = 1.5;
+  const double row_width = std::max(first.width(), std::sqrt(width_to_height * area));
+  double x = first.max_x_m + gap;
+  double top = first.max_y_m;
+  double row_height = first.height();
+  for (const std::size_t component : std::span(order).subspan(1)) {
+    const Box& box = boxes[component];
+    if (x + box.width() > first.min_x_m + row_width) {
+      x = first.min_x_m;
+      top -= row_height + gap;
+      row_height = 0.0;
+    }
+    offsets[component] = {x - box.min_x_m, top - box.max_y_m};
+    x += box.width() + gap;
+    row_height = std::max(row_height, box.height());
+  }
+  return offsets;
+}
+
+/// Returns the motions between views that follow each other in an earlier map in metres.
+std::map<std::pair<ViewId, ViewId>, Pose2> read_metric_steps(const MemoryFile& memory) {
+  std::map<std::pair<ViewId, ViewId>, Pose2> steps;
+  const auto map = memory.map(map_name);
+  if (!map || !has_positions_from_map(memory) || read_length_unit(memory) != LengthUnit::metres) {
+    return steps;
+  }
+  for (const TopologicalMap::Edge& edge : map->edges) {
+    if (edge.kind == Link::Kind::sequence) steps.emplace(std::pair(edge.a, edge.b), edge.a_from_b);
+  }
+  return steps;
+}
+
+/// True if views resemble the next one more often than by chance: the next one is among the most
+/// similar tenth of all views for more of them than the mean of a random order plus three standard
+/// deviations.
+bool are_in_order(const VisualMemory& views) {
+  constexpr std::size_t max_tested = 200;
+  const auto ids = views.views();
+  const std::size_t steps = ids.size() - 1;
+  const std::size_t every = (steps + max_tested - 1) / max_tested;
+  const std::size_t top = std::max<std::size_t>(1, ids.size() / 10);
+  std::size_t tested = 0;
+  std::size_t similar = 0;
+  for (std::size_t i = 0; i < steps; i += every) {
+    const std::array self{ids[i]};
+    const auto found = views.search(views.packed(ids[i]), {.top = static_cast<int>(top)},
+                                    {.excluded_views = self});
+    ++tested;
+    similar += std::ranges::find(found.matches, ids[i + 1], &Match::view) != found.matches.end();
+  }
+  const double chance = static_cast<double>(top) / static_cast<double>(steps);
+  const double mean = static_cast<double>(tested) * chance;
+  return static_cast<double>(similar) > mean + 3.0 * std::sqrt(mean * (1.0 - chance));
+}
+
+/// Returns what the names of images of one recording have in common: all before the time in a video
+/// ("walk.mp4@3.2"), or the folder and the name without digits.
+std::string series_of(const std::string& name) {
+  const std::size_t at = name.rfind('@');
+  if (at != std::string::npos) return name.substr(0, at);
+  const std::size_t file = name.rfind('/') + 1;  // 0 without a folder
+  std::string series = name.substr(0, file);
+  std::ranges::copy_if(std::string_view(name).substr(file), std::back_inserter(series),
+                       [](char c) { return c < '0' || c > '9'; });
+  return series;
+}
+
+/// A map of views in their order.
+struct OrderedMap {
+  TopologicalMap map;
+  bool is_metric = false;
+  double assumed_unit_m = 1.0;  ///< of lengths that are not metric
+};
+
+OrderedMap map_in_order(const MemoryFile& file, const VisualMemory& views,
+                        const std::map<std::string, Pose2>& odometry, double camera_height_m,
+                        const std::function<void()>& mapped) {
+  const auto metric_steps = read_metric_steps(file);
+  VisualMemory nodes(views.shape(), views.full_scale(), views.elevations());
+  VisualOdometryOptions options;
+  options.camera_height_m = camera_height_m;
+  TopologicalMapper mapper(nodes, {}, options);
+  std::optional<ViewId> before;
+  std::optional<Pose2> last_odometry;  // of the last view that has one
+  std::size_t views_since_odometry = 0;
+  for (const ViewId view : views.views()) {
+    const ReferenceInfo& info = views.info(view);
+    if (before && series_of(views.info(*before).name) != series_of(info.name)) {
+      // Another recording begins anywhere, and so does its odometry.
+      mapper.begin_path();
+      before.reset();
+      last_odometry.reset();
+      views_since_odometry = 0;
+    }
+    std::optional<Pose2> moved;
+    std::size_t moved_views = 1;
+    ++views_since_odometry;
+    const auto here = odometry.find(info.name);
+    if (last_odometry && here != odometry.end()) {
+      moved = inverse(*last_odometry) * here->second;
+      moved_views = views_since_odometry;
+    } else if (before) {
+      const auto known = metric_steps.find({*before, view});
+      if (known != metric_steps.end()) moved = known->second;
+    }
+    if (here != odometry.end()) {
+      last_odometry = here->second;
+      views_since_odometry = 0;
+    }
+    nodes.append_with_id(view, views.packed(view), info);
+    static_cast<void>(mapper.add(view, OdometryView(views.signature(view)), moved, moved_views));
+    before = view;
+    if (mapped) mapped();
+  }
+  mapper.finish();
+  return {mapper.map(), mapper.is_metric(), 1.0};
+}
+
+void unlink_edges(MemoryFile& memory, const TopologicalMap& old_map,
+                  const TopologicalMap& new_map) {
+  std::set<std::pair<ViewId, ViewId>> kept;
+  for (const TopologicalMap::Edge& edge : new_map.edges) kept.insert(std::minmax(edge.a, edge.b));
+  for (const TopologicalMap::Edge& edge : old_map.edges) {
+    if (!kept.contains(std::minmax(edge.a, edge.b))) memory.unlink(edge.a, edge.b);
+  }
+}
+
+void store_poses(MemoryFile& memory, const TopologicalMap& map) {
+  const auto poses = place_components_side_by_side(map);
+  const std::vector<std::size_t> counts = count_nodes(map);
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    std::optional<ReferencePose> pose;
+    if (counts[map.nodes[i].component] >= min_positioned_views) {
+      pose = ReferencePose{poses[i].x_m, poses[i].y_m, poses[i].heading_rad};
+    }
+    memory.set_pose(map.nodes[i].view, pose);
+  }
+}
+
+void scale_routes(MemoryFile& memory, double factor) {
+  for (const std::string& name : memory.route_names()) {
+    const RoutePanorama route = memory.route(name).value();
+    RouteSource source = read_route_source(memory, name, route.columns());
+    if (!source.assumed_unit_m) continue;
+    source.assumed_unit_m.reset();
+    RoutePanorama scaled(route.columns());
+    for (std::size_t i = 0; i < route.size(); ++i) {
+      Pose2 pose = route.poses()[i];
+      pose.x_m *= factor;
+      pose.y_m *= factor;
+      static_cast<void>(scaled.append(pose, route.line(i)));
+    }
+    memory.remove_route(name);
+    static_cast<void>(memory.append_route(name, scaled));
+    store_route_source(memory, name, source);
+  }
+}
+
+}  // namespace
+
+const char* to_string(LengthUnit unit) noexcept {
+  return unit == LengthUnit::metres ? "m" : "view steps";
+}
+
+LengthUnit read_length_unit(const MemoryFile& memory) {
+  return read_stored_unit(memory).unit;
+}
+
+double read_assumed_unit_m(const MemoryFile& memory) {
+  return read_stored_unit(memory).assumed_m;
+}
+
+bool has_positions_from_map(const MemoryFile& memory) {
+  const auto text = memory.parameter(unit_parameter);
+  return text && !text->empty();
+}
+
+std::vector<Pose2> place_components_side_by_side(const TopologicalMap& map,
+                                                 std::optional<double> gap) {
+  std::vector<Pose2> poses;
+  if (map.nodes.empty()) return poses;
+  const std::vector<std::size_t> counts = count_nodes(map);
+  std::vector<Box> boxes(counts.size());
+  for (const TopologicalMap::Node& node : map.nodes) boxes[node.component].add(node.pose);
+  std::vector<std::size_t> order(counts.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return counts[i]; });
+  const double default_gap = component_gap_steps * median_step_length(map).value_or(1.0);
+  const auto offsets = compute_offsets(boxes, order, gap.value_or(default_gap));
+  for (const TopologicalMap::Node& node : map.nodes) {
+    const Point2 offset = offsets[node.component];
+    poses.push_back(
+        {node.pose.x_m + offset.x_m, node.pose.y_m + offset.y_m, node.pose.heading_rad});
+  }
+  return poses;
+}
+
+void scale_lengths(TopologicalMap& map, double factor) {
+  const auto scale = [factor](Pose2& pose) {
+    pose.x_m *= factor;
+    pose.y_m *= factor;
+  };
+  for (TopologicalMap::Node& node : map.nodes) scale(node.pose);
+  for (TopologicalMap::Edge& edge : map.edges) scale(edge.a_from_b);
+}
+
+std::optional<double> median_step_length(const TopologicalMap& map) {
+  std::vector<double> lengths;
+  for (const TopologicalMap::Edge& edge : map.edges) {
+    const double edge_length = length(edge.a_from_b);
+    if (edge.kind == Link::Kind::sequence && edge_length > 0.0) lengths.push_back(edge_length);
+  }
+  if (lengths.empty()) return std::nullopt;
+  return upper_median_in_place(std::span(lengths));
+}
+
+std::optional<MemoryMap> describe_map(const MemoryFile& memory) {
+  if (!has_positions_from_map(memory)) return std::nullopt;
+  const auto map = memory.map(map_name);
+  if (!map) return std::nullopt;
+  MemoryMap description{map->nodes.size(), count_nodes(*map), read_length_unit(memory)};
+  std::erase(description.part_sizes, 0U);  // of forgotten views
+  std::ranges::sort(description.part_sizes, std::greater{});
+  return description;
+}
+
+void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit, double assumed_unit_m) {
+  if (unit == LengthUnit::view_steps) {
+    if (const auto step = median_step_length(map)) {
+      scale_lengths(map, 1.0 / *step);
+      assumed_unit_m *= *step;
+    }
+  }
+  std::vector<Link> links;
+  for (const TopologicalMap::Edge& edge : map.edges) links.push_back({edge.a, edge.b, edge.kind});
+  memory.change([&] {
+    if (const auto before = memory.map(map_name)) unlink_edges(memory, *before, map);
+    memory.link(links);
+    memory.save_map(map_name, map);
+    store_poses(memory, map);
+    memory.set_parameter(unit_parameter, unit == LengthUnit::metres
+                                             ? metres_text
+                                             : view_steps_text + (" " + to_text(assumed_unit_m)));
+    learn_and_store_models(memory);
+  });
+}
+
+std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::string, Pose2>& odometry,
+                                   Executor& executor, double camera_height_m,
+                                   const std::function<void()>& mapped) {
+  const VisualMemory views = memory.load();
+  const auto has_pose = [&](ViewId view) { return views.info(view).pose.has_value(); };
+  if (views.size() < 2 || views.shape().components < 3 ||
+      (!has_positions_from_map(memory) && std::ranges::any_of(views.views(), has_pose))) {
+    return std::nullopt;
+  }
+  OrderedMap ordered = map_in_order(memory, views, odometry, camera_height_m, mapped);
+  if (!ordered.is_metric && !are_in_order(views)) {
+    TopologicalMap arranged = to_topological_map(arrange(views, {}, {}, executor));
+    if (std::ranges::max(count_nodes(arranged)) > std::ranges::max(count_nodes(ordered.map))) {
+      ordered.map = std::move(arranged);
+      ordered.assumed_unit_m = assumed_spacing_m;
+    }
+  }
+  if (std::ranges::max(count_nodes(ordered.map)) < min_positioned_views) {
+    remove_positions_from_map(memory);
+    MemoryMap parts{views.size(), count_nodes(ordered.map), LengthUnit::view_steps};
+    std::ranges::sort(parts.part_sizes, std::greater{});
+    return parts;
+  }
+  store_map(memory, std::move(ordered.map),
+            ordered.is_metric ? LengthUnit::metres : LengthUnit::view_steps,
+            ordered.assumed_unit_m);
+  return describe_map(memory);
+}
+
+void remove_positions_from_map(MemoryFile& memory) {
+  if (!has_positions_from_map(memory)) return;
+  memory.change([&] {
+    const auto map = memory.map(map_name);
+    if (map) {
+      unlink_edges(memory, *map, {});
+      memory.remove_map(map_name);
+    }
+    for (const ViewId view : memory.views()) memory.set_pose(view, std::nullopt);
+    memory.set_parameter(unit_parameter, "");
+  });
+}
+
+double scale_to_metres(MemoryFile& memory, ViewId a, ViewId b, double distance_m,
+                       const std::string& undo) {
+  require(std::isfinite(distance_m) && distance_m > 0.0, "distance_m", distance_m, "> 0");
+  if (!has_positions_from_map(memory)) {
+    throw ContractError(memory.path().string() +
+                        ": the positions come from a data set and are in metres; only a map of "
+                        "images is scaled");
+  }
+  const VisualMemory views = memory.load();
+  TopologicalMap map = memory.map(map_name).value_or(TopologicalMap{});
+  const auto find_node = [&](ViewId view) -> const TopologicalMap::Node& {
+    const auto found = std::ranges::lower_bound(map.nodes, view, {}, &TopologicalMap::Node::view);
+    if (found == map.nodes.end() || found->view != view) {
+      throw ContractError("view", static_cast<double>(view.value), "a view of the map");
+    }
+    return *found;
+  };
+  const TopologicalMap::Node& from = find_node(a);
+  const TopologicalMap::Node& to = find_node(b);
+  if (from.component != to.component) {
+    throw ContractError(views.info(a).name + " and " + views.info(b).name +
+                        " are in parts of the map that are not connected, so their distance is "
+                        "not known; choose two views of one part");
+  }
+  // A shorter distance is mostly the error of a single step. (chosen)
+  constexpr double min_distance_steps = 3.0;
+  const double known = distance(from.pose.position(), to.pose.position());
+  const double step = median_step_length(map).value_or(0.0);
+  if (!(known > 0.0) || known < min_distance_steps * step) {
+    throw ContractError(views.info(a).name + " and " + views.info(b).name + " are " +
+                        format_number(step > 0.0 ? known / step : 0.0, {}, 2) +
+                        " view steps apart in the map; choose two views that are far apart, at "
+                        "least 3 view steps");
+  }
+  const double factor = distance_m / known;
+  scale_lengths(map, factor);
+  memory.change(
+      [&] {
+        memory.save_map(map_name, map);
+        for (const ViewId view : views.views()) {
+          auto pose = views.info(view).pose;
+          if (!pose) continue;
+          pose->x_m *= factor;
+          pose->y_m *= factor;
+          memory.set_pose(view, pose);
+        }
+        scale_routes(memory, factor);
+        memory.set_parameter(unit_parameter, metres_text);
+        learn_and_store_models(memory);
+      },
+      undo);
+  return factor;
+}
+
+}  // namespace panonav

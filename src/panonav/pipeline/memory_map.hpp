@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// Name under which a memory file stores the map of its views.
+inline constexpr const char* map_name = "map";
+
+/// Unit of the positions of a memory, its maps and its routes. Members whose names end in `_m` are
+/// in this unit, too.
+enum class LengthUnit {
+  metres,  ///< of a data set, of odometry, or of a map with a known length
+  /// Median distance between consecutive views of the map. The map was computed from images alone,
+  /// which do not show how long a metre is (`scale_to_metres`).
+  view_steps,
+};
+
+/// Returns the unit's name for people: "m" or "view steps".
+[[nodiscard]] const char* to_string(LengthUnit unit) noexcept;
+
+/// Returns the unit of the memory's positions; metres if it has no positions.
+[[nodiscard]] LengthUnit read_length_unit(const MemoryFile& memory);
+/// Returns the metres of one unit of the memory's positions; for view steps an assumption by which
+/// algorithms choose distances: things around are 1.5 m away, or views of an arrangement 0.3 m
+/// apart. 1 for metres.
+[[nodiscard]] double read_assumed_unit_m(const MemoryFile& memory);
+/// True if the positions of the views were computed by a map, not read from a data set.
+[[nodiscard]] bool has_positions_from_map(const MemoryFile& memory);
+
+/// Returns the poses of the map's nodes in one frame. Connected components have no common frame, so
+/// they are placed beside each other, the largest one first, in rows from left to right. Their
+/// distances are at least `gap` and have no meaning. `nullopt`: six median steps, which is more
+/// than the distance over which positions are interpolated.
+[[nodiscard]] std::vector<Pose2> place_components_side_by_side(
+    const TopologicalMap& map, std::optional<double> gap = std::nullopt);
+
+/// Multiplies all lengths of a map by `factor`.
+void scale_lengths(TopologicalMap& map, double factor);
+/// Returns the median length of the edges between consecutive views; nullopt if all are 0.
+[[nodiscard]] std::optional<double> median_step_length(const TopologicalMap& map);
+
+/// Description of the map of a memory's views.
+struct MemoryMap {
+  std::size_t views = 0;                 ///< number of views in the map
+  std::vector<std::size_t> part_sizes;   ///< views of each connected component, the largest first
+  LengthUnit unit = LengthUnit::metres;  ///< of the positions
+};
+/// Describes the map from which the views got their positions; nullopt if they got none from a map.
+[[nodiscard]] std::optional<MemoryMap> describe_map(const MemoryFile& memory);
+
+/// Stores a map as the memory's own in one transaction: the map, a link for each edge, the position
+/// of each node (`place_components_side_by_side`; none in parts of fewer than
+/// `ObservationModel::min_views`), the unit, and models learnt from them. A map in
+/// `view_steps` is scaled so that its median step has length 1; `assumed_unit_m`: see
+/// `read_assumed_unit_m`, for lengths before scaling. Throws FileError.
+void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit,
+               double assumed_unit_m = 1.0);
+
+/// Makes the map of a memory whose views have no positions from data sets, in the order of their
+/// ids
+/// (`TopologicalMapper`). Views in no order, where consecutive ones are not more similar than
+/// others, are arranged by similarity instead (`arrange`). Replaces an earlier map. Lengths are in
+/// metres if odometry is known, now or when the earlier map was made.
+///
+/// `odometry`: poses of views by name. `camera_height_m`: above level ground, gives metres; 0: not
+/// known. Calls `mapped` after each view. Returns nullopt and
+/// changes nothing if a view has a position from a data set or there are fewer than two views.
+/// Stores no map if no part has `ObservationModel::min_views` views. Throws FileError. Cost: 0.5 to
+/// 10 ms a view.
+std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::string, Pose2>& odometry,
+                                   Executor& executor, double camera_height_m = 0.0,
+                                   const std::function<void()>& mapped = {});
+
+/// Removes the map and the positions that came from it. Does nothing if positions come from a data
+/// set. Throws FileError.
+void remove_positions_from_map(MemoryFile& memory);
+
+/// Scales the map, the positions and the routes in view steps to metres, by the known distance
+/// between two views. Returns the metres per former unit. `undo` describes the change for `undo`.
+/// Throws ContractError if a view does not exist, the views are not connected in the map or less
+/// than three median steps apart, the distance is not above 0, or positions come from a data set;
+/// FileError.
+double scale_to_metres(MemoryFile& memory, ViewId a, ViewId b, double distance_m,
+                       const std::string& undo);
+
+}  // namespace panonav

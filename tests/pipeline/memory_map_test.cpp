@@ -1,0 +1,293 @@
+#include "panonav/pipeline/memory_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <random>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/route/route_panorama.hpp"
+#include "support/remembered_worlds.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav::testing {
+namespace {
+
+constexpr double radius_m = 4.0;
+constexpr int round_views = 110;
+
+// Rounds of 10 m, looking ahead, with a view every 9 cm.
+std::vector<Pose2> rounds(int views) {
+  std::vector<Pose2> poses;
+  for (int i = 0; i < views; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / round_views;
+    poses.push_back({1.6 * std::sin(angle), -1.6 * std::cos(angle), wrap_angle(angle)});
+  }
+  return poses;
+}
+
+FourierSignature empty_view() {
+  return compute_signature(Panorama(round_room_shape.rows, 96, std::nullopt),
+                           round_room_shape.components);
+}
+
+std::string name_view(std::size_t i) {
+  return "view_" + std::to_string(1000 + i);
+}
+
+class MemoryMaps : public ::testing::Test {
+ protected:
+  MemoryFile make_memory() {
+    MemoryHeader header;
+    header.shape = round_room_shape;
+    header.full_scale = 0.1F;
+    header.panorama_columns = 96;
+    return MemoryFile::create(folder / ("m" + std::to_string(count_++) + ".panonav"), header);
+  }
+  static void append(MemoryFile& memory, const FourierSignature& signature,
+                     const std::optional<ReferencePose>& pose = std::nullopt) {
+    const std::string name = name_view(memory.info().views);
+    memory.append(NewView{{name, pose, std::nullopt}, pack(signature, 0.1F), {}, {}});
+  }
+  MemoryFile make_walk(const std::vector<Pose2>& poses) {
+    MemoryFile memory = make_memory();
+    for (const Pose2& pose : poses) append(memory, round_room_signature(world, pose));
+    return memory;
+  }
+  static std::vector<Point2> positions(const MemoryFile& memory) {
+    const VisualMemory views = memory.load();
+    std::vector<Point2> points;
+    for (const ViewId view : views.views()) points.push_back(views.info(view).pose->position());
+    return points;
+  }
+  static double shape(const MemoryFile& memory, const std::vector<Pose2>& truth) {
+    std::vector<Point2> points;
+    for (const Pose2& pose : truth) points.push_back(pose.position());
+    return shape_difference(positions(memory), points).value;
+  }
+
+  TemporaryFolder folder;
+  const ToyWorld world = round_room(radius_m, 5);
+  Executor executor;
+
+ private:
+  int count_ = 0;
+};
+
+TEST_F(MemoryMaps, ViewsInOrderGetPositionsInViewSteps) {
+  const auto truth = rounds(round_views + 40);
+  MemoryFile memory = make_walk(truth);
+  EXPECT_FALSE(has_positions_from_map(memory));
+  EXPECT_EQ(read_length_unit(memory), LengthUnit::metres);
+  std::size_t mapped = 0;
+  const auto map = map_views(memory, {}, executor, 0.0, [&] { ++mapped; });
+  ASSERT_TRUE(map);
+  EXPECT_EQ(mapped, truth.size());
+  EXPECT_EQ(map->unit, LengthUnit::view_steps);
+  EXPECT_EQ(map->part_sizes, std::vector<std::size_t>{truth.size()});
+  EXPECT_TRUE(has_positions_from_map(memory));
+  EXPECT_NEAR(median_step_length(memory.map(map_name).value()).value(), 1.0, 1e-9);
+  EXPECT_LT(shape(memory, truth), 0.01);
+  // Things are 4 m away and assumed to be 1.5 m away, so a step of 9 cm is taken for some 3.4 cm.
+  EXPECT_NEAR(read_assumed_unit_m(memory), 0.0914 * 1.5 / radius_m, 0.012);
+}
+
+TEST_F(MemoryMaps, OdometryMakesMetresAndIsKeptWhenViewsFollow) {
+  const auto truth = rounds(80);
+  MemoryFile memory = make_walk(truth);
+  std::map<std::string, Pose2> odometry;
+  for (std::size_t i = 0; i < truth.size(); ++i) odometry[name_view(i)] = truth[i];
+  EXPECT_EQ(map_views(memory, odometry, executor).value().unit, LengthUnit::metres);
+  const auto distance_over = [&](std::size_t i, std::size_t j) {
+    const auto points = positions(memory);
+    return distance(points[i], points[j]);
+  };
+  const double expected_m = distance(truth[0].position(), truth[40].position());
+  EXPECT_NEAR(distance_over(0, 40), expected_m, 0.02 * expected_m);
+  const auto more = rounds(100);
+  for (std::size_t i = 80; i < more.size(); ++i) {
+    append(memory, round_room_signature(world, more[i]));
+  }
+  EXPECT_EQ(map_views(memory, {}, executor).value().unit, LengthUnit::metres);
+  EXPECT_NEAR(distance_over(0, 40), expected_m, 0.02 * expected_m);
+  const double later_m = distance(more[60].position(), more[95].position());
+  EXPECT_NEAR(distance_over(60, 95), later_m, 0.1 * later_m);
+}
+
+TEST_F(MemoryMaps, ViewsInNoOrderAreArranged) {
+  // Random places of the room: neighbours in the memory are not neighbours in the room.
+  std::vector<Pose2> places;
+  for (double x = -1.5; x <= 1.5; x += 0.25) {
+    for (double y = -1.5; y <= 1.5; y += 0.25) places.push_back({x, y, 0.0});
+  }
+  std::mt19937 random(1);
+  std::ranges::shuffle(places, random);
+  MemoryFile memory = make_walk(places);
+  const auto map = map_views(memory, {}, executor);
+  ASSERT_TRUE(map);
+  EXPECT_EQ(map->unit, LengthUnit::view_steps);
+  EXPECT_GE(map->part_sizes.front(), places.size() * 9 / 10);
+  EXPECT_LT(shape(memory, places), 0.2);
+}
+
+TEST_F(MemoryMaps, AnotherRecordingDoesNotFollowTheLastView) {
+  const auto truth = rounds(40);
+  for (const auto& [first, second, follows] :
+       {std::tuple("walk/view_", "walk/view_", true),
+        std::tuple("walk/view_", "later/view_", false), std::tuple("a.mp4@", "a.mp4@", true),
+        std::tuple("walk1.mp4@", "walk2.mp4@", false)}) {
+    MemoryFile memory = make_memory();
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const std::string name = (i < 20 ? first : second) + std::to_string(100 + i);
+      memory.append(NewView{{name, std::nullopt, std::nullopt},
+                            pack(round_room_signature(world, truth[i]), 0.1F),
+                            {},
+                            {}});
+    }
+    ASSERT_TRUE(map_views(memory, {}, executor));
+    const auto map = memory.map(map_name).value();
+    const ViewId last = map.nodes[19].view;
+    const ViewId next = map.nodes[20].view;
+    EXPECT_EQ(std::ranges::any_of(map.edges,
+                                  [&](const auto& edge) {
+                                    return edge.kind == Link::Kind::sequence && edge.a == last &&
+                                           edge.b == next;
+                                  }),
+              follows)
+        << second;
+  }
+}
+
+TEST_F(MemoryMaps, PartsWithoutConnectionAreBesideEachOther) {
+  const auto truth = rounds(60);
+  MemoryFile memory = make_memory();
+  for (std::size_t i = 0; i < 40; ++i) append(memory, round_room_signature(world, truth[i]));
+  for (int i = 0; i < 5; ++i) append(memory, empty_view());
+  const ToyWorld other = round_room(radius_m, 77);
+  for (std::size_t i = 0; i < 20; ++i) append(memory, round_room_signature(other, truth[i]));
+  const auto map = map_views(memory, {}, executor);
+  ASSERT_TRUE(map);
+  EXPECT_EQ(map->part_sizes, (std::vector<std::size_t>{40, 20, 1, 1, 1, 1, 1}));
+  const VisualMemory views = memory.load();
+  const auto stored = memory.map(map_name).value();
+  const auto pose_of = [&](std::size_t i) { return views.info(stored.nodes[i].view).pose; };
+  for (std::size_t i = 0; i < stored.nodes.size(); ++i) {
+    EXPECT_EQ(pose_of(i).has_value(), i < 40 || i >= 45) << "small parts have no positions";
+    for (std::size_t j = 0; j < i; ++j) {
+      if (stored.nodes[i].component == stored.nodes[j].component) continue;
+      if (!pose_of(i) || !pose_of(j)) continue;
+      EXPECT_GE(distance(pose_of(i)->position(), pose_of(j)->position()), 5.99) << i << " " << j;
+    }
+  }
+}
+
+TEST_F(MemoryMaps, PlacesComponentsWithoutOverlapAndKeepsTheLargest) {
+  TopologicalMap map;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> anywhere(-9.0, 9.0);
+  for (std::uint32_t i = 0; i < 60; ++i) {
+    const std::size_t component = i < 20 ? 2 : i % 7;
+    map.nodes.push_back({ViewId{i + 1}, {anywhere(random), anywhere(random), 0.3}, component});
+  }
+  constexpr double gap = 2.5;
+  const auto poses = place_components_side_by_side(map, gap);
+  ASSERT_EQ(poses.size(), map.nodes.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (map.nodes[i].component == 2) EXPECT_EQ(poses[i], map.nodes[i].pose);
+    for (std::size_t j = 0; j < i; ++j) {
+      const double moved = distance(poses[i].position(), poses[j].position());
+      if (map.nodes[i].component == map.nodes[j].component) {
+        EXPECT_NEAR(moved, distance(map.nodes[i].pose.position(), map.nodes[j].pose.position()),
+                    1e-9);
+      } else {
+        EXPECT_GE(moved, gap - 1e-9);
+      }
+    }
+  }
+  EXPECT_TRUE(place_components_side_by_side({}, gap).empty());
+}
+
+TEST_F(MemoryMaps, AKnownDistanceMakesMetres) {
+  const auto truth = rounds(round_views);
+  MemoryFile memory = make_walk(truth);
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  const auto before = positions(memory);
+  RoutePanorama route(16);
+  const std::vector<float> line(16, 0.5F);
+  route.append({0.0, 0.0, 0.0}, line);
+  route.append({2.0, 0.0, 0.0}, line);
+  memory.append_route("walk", route);
+  store_route_source(memory, "walk", {.line = {.columns = 16}, .assumed_unit_m = 0.2});
+  memory.append_route("metric", route);
+  const auto views = memory.views();
+  const double factor = scale_to_metres(memory, views[3], views[50], 3.0, "scale");
+  const auto after = positions(memory);
+  EXPECT_NEAR(distance(after[3], after[50]), 3.0, 1e-9);
+  for (std::size_t i = 0; i < after.size(); ++i)
+    EXPECT_NEAR(after[i].x_m, factor * before[i].x_m, 1e-9);
+  EXPECT_EQ(read_length_unit(memory), LengthUnit::metres);
+  EXPECT_NEAR(memory.route("walk")->length_m(), 2.0 * factor, 1e-9);
+  EXPECT_FALSE(read_route_source(memory, "walk", 16).assumed_unit_m);
+  EXPECT_EQ(memory.route("metric")->length_m(), 2.0);
+  memory.undo();
+  EXPECT_EQ(positions(memory), before);
+  EXPECT_EQ(read_length_unit(memory), LengthUnit::view_steps);
+  EXPECT_EQ(memory.route("walk")->length_m(), 2.0);
+}
+
+TEST_F(MemoryMaps, RefusesDistancesThatMeanNothing) {
+  const auto truth = rounds(40);
+  MemoryFile memory = make_memory();
+  for (std::size_t i = 0; i < 30; ++i) append(memory, round_room_signature(world, truth[i]));
+  for (int i = 0; i < 4; ++i) append(memory, empty_view());
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  const auto views = memory.views();
+  EXPECT_THROW(scale_to_metres(memory, views[0], views[0], 1.0, "s"), ContractError);
+  EXPECT_THROW(scale_to_metres(memory, views[0], views[32], 1.0, "s"), ContractError);
+  EXPECT_THROW(scale_to_metres(memory, views[0], ViewId{999}, 1.0, "s"), ContractError);
+  for (const double bad : {0.0, -1.0, std::nan("")}) {
+    EXPECT_THROW(scale_to_metres(memory, views[0], views[5], bad, "s"), ContractError);
+  }
+  EXPECT_EQ(read_length_unit(memory), LengthUnit::view_steps);
+}
+
+TEST_F(MemoryMaps, PositionsOfADataSetAreKeptAndReplaceThoseOfAMap) {
+  const auto truth = rounds(30);
+  MemoryFile posed = make_memory();
+  for (const Pose2& pose : truth) {
+    append(posed, round_room_signature(world, pose),
+           ReferencePose{pose.x_m, pose.y_m, pose.heading_rad});
+  }
+  EXPECT_FALSE(map_views(posed, {}, executor));
+  EXPECT_NEAR(shape(posed, truth), 0.0, 1e-12);
+  EXPECT_THROW(scale_to_metres(posed, posed.views()[0], posed.views()[9], 1.0, "s"), ContractError);
+  remove_positions_from_map(posed);
+  EXPECT_EQ(posed.info().views_with_position, truth.size());
+  MemoryFile mapped = make_walk(truth);
+  ASSERT_TRUE(map_views(mapped, {}, executor));
+  remove_positions_from_map(mapped);
+  EXPECT_EQ(mapped.info().views_with_position, 0U);
+  EXPECT_EQ(mapped.info().links, 0U);
+  EXPECT_FALSE(has_positions_from_map(mapped));
+  EXPECT_FALSE(describe_map(mapped));
+}
+
+TEST_F(MemoryMaps, RefusesAnUnknownUnit) {
+  MemoryFile memory = make_walk(rounds(3));
+  for (const char* text : {"inches", "view_steps", "view_steps x", "view_steps -1"}) {
+    memory.set_parameter("map_unit", text);
+    EXPECT_THROW(static_cast<void>(read_length_unit(memory)), FileError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace panonav::testing
