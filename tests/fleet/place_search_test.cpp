@@ -45,9 +45,9 @@ class PlaceSearchTest : public MemoryFileTest {
                 held.search(signature, options, mask).matches);
     }
   }
-  /// Changes are reported a moment later.
+  /// Changes are reported a moment later; on a busy machine after many seconds.
   static void refresh(PlaceSearch& search, std::size_t views) {
-    for (int i = 0; i < 500; ++i) {
+    for (int i = 0; i < 6000; ++i) {
       search.refresh();
       if (search.size() == views) return;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));

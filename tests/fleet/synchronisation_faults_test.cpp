@@ -27,9 +27,14 @@ TEST_F(SynchronisedMemory, AKillAtAnyMomentLosesAndDoublesNothing) {
   Random random(8);
   int next = 100;
   int kills = 0;
-  double longest_s = 0.02;
+  double duration_s = 0.02;  // of the latest whole synchronisation
   std::set<std::string> expected = names(folder / "a");
-  for (int round = 0; round < 24; ++round) {
+  // At a random moment within 1.5 times that duration two of three kills come in time; rounds go on
+  // where the machine was busy meanwhile.
+  constexpr int min_rounds = 24;
+  constexpr int max_rounds = 120;
+  constexpr int min_kills = 7;
+  for (int round = 0; round < min_rounds || (kills < min_kills && round < max_rounds); ++round) {
     {
       MemoryFile file = open("a");
       for (const NewView& view : numbered(next, 30)) expected.insert(view.info.name);
@@ -47,7 +52,7 @@ TEST_F(SynchronisedMemory, AKillAtAnyMomentLosesAndDoublesNothing) {
       return 0;
     });
     ASSERT_GT(child, 0);
-    ::usleep(static_cast<useconds_t>(1e6 * random.uniform(0.0, 1.5 * longest_s)));
+    ::usleep(static_cast<useconds_t>(1e6 * random.uniform(0.0, 1.5 * duration_s)));
     ::kill(child, SIGKILL);
     int status = 0;
     ASSERT_EQ(::waitpid(child, &status, 0), child);
@@ -57,12 +62,12 @@ TEST_F(SynchronisedMemory, AKillAtAnyMomentLosesAndDoublesNothing) {
     }
     if (round % 4 == 3) {
       const SynchronisationReport whole = sync("a");
-      longest_s = std::max(longest_s, whole.seconds);
+      duration_s = whole.seconds;
       ASSERT_EQ(whole.conflicts, 0U);
       ASSERT_EQ(names(folder / "a"), expected);
     }
   }
-  EXPECT_GT(kills, 6);
+  EXPECT_GE(kills, min_kills);
   (void)sync("b");
   EXPECT_EQ(names(server("x")), expected);
   EXPECT_TRUE(is_same(content(folder / "a"), content(folder / "b")));

@@ -395,9 +395,11 @@ def killed_server(server):
 
 def storage(server):
     """The tests of storage and of this component hold of memories on the server."""
-    tests = run(TEST_FLEET, f"--gtest_filter={SHARED}", timeout=None,
-                env=os.environ | {"PANONAV_TEST_SERVER": server.memory("x").replace("&memory=x", "")})
-    assert int(re.search(r"PASSED +\] (\d+)", tests)[1]) >= 20, tests
+    tests = subprocess.run([TEST_FLEET, f"--gtest_filter={SHARED}"], capture_output=True, text=True,
+                           env=os.environ | {"PANONAV_TEST_SERVER": server.memory("x").replace("&memory=x", "")})
+    failures = re.findall(r".*(?:Failure|FAILED|ERROR: )(?:.*\n){1,6}", tests.stdout + tests.stderr)
+    assert tests.returncode == 0, "".join(failures)[-4000:]
+    assert int(re.search(r"PASSED +\] (\d+)", tests.stdout)[1]) >= 20, tests.stdout
 
 
 def verbs(server, folder):
