@@ -84,7 +84,6 @@ class TopologicalMapper::Implementation {
                  const PoseGraphOptions& graph)
       : memory_(&memory),
         options_(options),
-        odometry_options_(odometry),
         odometry_(odometry),
         graph_(graph),
         finder_(memory, closure, odometry) {
@@ -129,7 +128,7 @@ class TopologicalMapper::Implementation {
     return update;
   }
 
-  void begin_path() { odometry_ = VisualOdometry(odometry_options_); }
+  void begin_path() { odometry_.begin_path(); }
 
   void finish() {
     if (changed_) optimise();
@@ -391,7 +390,6 @@ class TopologicalMapper::Implementation {
 
   const VisualMemory* memory_;
   MappingOptions options_;
-  VisualOdometryOptions odometry_options_;
   VisualOdometry odometry_;
   PoseGraphOptions graph_;
   LoopClosureFinder finder_;

@@ -36,8 +36,6 @@ constexpr double min_share_of_motion = 0.25;
 /// Number of peaks of the correlation from which a step is computed. The third or fourth is the
 /// right one in some symmetric rooms, as displacement lowers its correlation.
 constexpr int tried_headings = 4;
-/// Turns that differ by more than this are two solutions.
-constexpr double min_turn_difference_rad = std::numbers::pi / 4.0;
 /// Smallest probability of a step that passes over views. A wrong step does more harm to a map than
 /// a gap (chosen).
 constexpr double min_probability_of_long_step = 0.9;
@@ -50,26 +48,16 @@ FourierHomingOptions make_vector_options(const VisualOdometryOptions& options) {
           .displacement_search = false};
 }
 
-/// Logarithm of the likelihood of a home vector against unrelated views, with the prior of its
-/// turn.
-double compute_evidence(const HomeVector& vector, const MotionPrior& prior) {
-  constexpr double min_residual = 1e-12;
-  return -vector.frequencies * std::log(std::clamp(vector.residual, min_residual, 1.0)) +
-         prior.log_density(vector.heading_rad);
-}
-
 /// Returns the more probable one of the best home vector and the best one with another turn.
 HomeVector choose_vector(const HomingView& before, const HomingView& after,
                          const FourierHomingOptions& options, const MotionPrior& prior) {
   const HomeVector first = home_vector(before, after, options);
   if (!prior.mean_turn_rad) return first;
-  const HeadingWindow others{
-      .middle_rad = static_cast<float>(wrap_angle(first.heading_rad + std::numbers::pi)),
-      .half_width_rad = static_cast<float>(std::numbers::pi - min_turn_difference_rad)};
-  const HomeVector second = home_vector(before, after, options, others);
-  const bool is_second_right =
-      second.correlation > 0.0 && compute_evidence(second, prior) > compute_evidence(first, prior);
-  return is_second_right ? second : first;
+  const auto second = find_second_vector(before, after, first, options);
+  const auto log_posterior = [&](const HomeVector& vector) {
+    return vector.log_likelihood() + prior.log_density(vector.heading_rad);
+  };
+  return second && log_posterior(*second) > log_posterior(first) ? *second : first;
 }
 
 std::optional<VisualStep> published_step(const OdometryView& before, const OdometryView& after,
@@ -225,40 +213,41 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options) : options_(
 
 double VisualOdometry::scale_m() const {
   if (ground_) return ground_->scale_m().value_or(options_.scale_m);
-  if (first_lengths_.size() < steps_of_speed) return options_.scale_m;
+  if (drive_.first_lengths.size() < steps_of_speed) return options_.scale_m;
   const auto median = [](std::vector<double> lengths) {
     return upper_median_in_place(std::span(lengths));
   };
-  return options_.scale_m * median(first_lengths_) / median(latest_lengths_);
+  return options_.scale_m * median(drive_.first_lengths) / median(drive_.latest_lengths);
 }
 
 void VisualOdometry::learn_speed(double length_in_views) {
   const bool is_published = options_.rule == VisualOdometryOptions::Rule::published;
   if (is_published || ground_ || !options_.steady_speed || length_in_views <= 0.0) return;
-  if (!latest_lengths_.empty()) {
-    std::vector<double> lengths = latest_lengths_;
+  if (!drive_.latest_lengths.empty()) {
+    std::vector<double> lengths = drive_.latest_lengths;
     const double usual = upper_median_in_place(std::span(lengths));
     if (length_in_views < min_share_of_motion * usual) return;
   }
-  if (first_lengths_.size() < steps_of_speed) first_lengths_.push_back(length_in_views);
-  if (latest_lengths_.size() == steps_of_speed) latest_lengths_.erase(latest_lengths_.begin());
-  latest_lengths_.push_back(length_in_views);
+  if (drive_.first_lengths.size() < steps_of_speed) drive_.first_lengths.push_back(length_in_views);
+  if (drive_.latest_lengths.size() == steps_of_speed)
+    drive_.latest_lengths.erase(drive_.latest_lengths.begin());
+  drive_.latest_lengths.push_back(length_in_views);
 }
 
 MotionPrior VisualOdometry::prior(std::size_t views) const {
   // Before the first step, a turn of 30 degrees, a known and an unknown step are assumed.
   constexpr double first_turn_rad = std::numbers::pi / 6.0;
-  const double mean_turn_rad = (turn_sum_rad_ + first_turn_rad) / (turn_weight_ + 1.0);
+  const double mean_turn_rad = (drive_.turn_sum_rad + first_turn_rad) / (drive_.turn_weight + 1.0);
   return {.mean_turn_rad = static_cast<double>(views) * std::max(mean_turn_rad, min_mean_turn_rad),
-          .share_right = (known_weight_ + 1.0) / (tried_weight_ + 2.0)};
+          .share_right = (drive_.known_weight + 1.0) / (drive_.tried_weight + 2.0)};
 }
 
 void VisualOdometry::learn_turn(const VisualStep& step) {
   // Free turns say nothing of the others.
   const double turn_rad = step.before_from_after.heading_rad;
   const double share = prior(1).share_along(turn_rad);
-  turn_weight_ = kept_weight * turn_weight_ + share;
-  turn_sum_rad_ = kept_weight * turn_sum_rad_ + share * std::abs(turn_rad);
+  drive_.turn_weight = kept_weight * drive_.turn_weight + share;
+  drive_.turn_sum_rad = kept_weight * drive_.turn_sum_rad + share * std::abs(turn_rad);
 }
 
 std::optional<VisualStep> VisualOdometry::add(OdometryView view) {
@@ -267,8 +256,8 @@ std::optional<VisualStep> VisualOdometry::add(OdometryView view) {
     const std::size_t views = latest_.size() - i;
     step = compute_step(latest_[i].view, view, options_, prior(views));
     if (views == 1) {
-      known_weight_ = kept_weight * known_weight_ + (step ? step->probability : 0.0);
-      tried_weight_ = kept_weight * tried_weight_ + 1.0;
+      drive_.known_weight = kept_weight * drive_.known_weight + (step ? step->probability : 0.0);
+      drive_.tried_weight = kept_weight * drive_.tried_weight + 1.0;
     }
     const double min_probability =
         views > 1 && options_.min_probability > 0.0
@@ -297,6 +286,11 @@ std::optional<VisualStep> VisualOdometry::add(OdometryView view) {
 void VisualOdometry::set_scale_m(double scale_m) {
   options_.scale_m = scale_m;
   validate(options_);
+}
+
+void VisualOdometry::begin_path() {
+  latest_.clear();
+  drive_ = {};
 }
 
 void VisualOdometry::restart(std::optional<OdometryView> view) {

@@ -136,6 +136,9 @@ class VisualOdometry {
   std::optional<VisualStep> add(OdometryView view);
   /// Sets the metres per unit of visual length of further steps. Throws OptionError unless > 0.
   void set_scale_m(double scale_m);
+  /// Begins a new drive: the next view does not follow the last one. Previous views, turns and the
+  /// speed are forgotten; the pose and the scale that the ground has shown are kept.
+  void begin_path();
   /// Forgets the previous views, because the motion since then is known from elsewhere. `view`: the
   /// latest view, from which the next step begins; nullopt: unknown. The pose is kept.
   void restart(std::optional<OdometryView> view);
@@ -163,12 +166,16 @@ class VisualOdometry {
 
   VisualOdometryOptions options_;
   std::optional<GroundLengths> ground_;
-  std::vector<double> first_lengths_;   // in views, of steps with motion
-  std::vector<double> latest_lengths_;  // likewise
-  double known_weight_ = 0.0;  // sum of the probabilities of tried steps, older ones count less
-  double tried_weight_ = 0.0;  // number of them, likewise
-  double turn_weight_ = 0.0;   // number of known steps, likewise
-  double turn_sum_rad_ = 0.0;  // of their absolute turns
+  /// Statistics of the steps of a drive so far, for the next one.
+  struct Drive {
+    std::vector<double> first_lengths;   // in views, of steps with motion
+    std::vector<double> latest_lengths;  // likewise
+    double known_weight = 0.0;  // sum of the probabilities of tried steps, older ones count less
+    double tried_weight = 0.0;  // number of them, likewise
+    double turn_weight = 0.0;   // number of known steps, likewise
+    double turn_sum_rad = 0.0;  // of their absolute turns
+  };
+  Drive drive_;
   struct PosedView {
     OdometryView view;
     Pose2 pose;

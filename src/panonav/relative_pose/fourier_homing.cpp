@@ -20,6 +20,11 @@ namespace panonav {
 
 namespace {
 
+double compute_log_likelihood(double frequencies, double residual) {
+  constexpr double min_residual = 1e-12;  // keeps equal views finite
+  return -frequencies * std::log(std::clamp(residual, min_residual, 1.0));
+}
+
 class PairOfViews {
  public:
   PairOfViews(const HomingView& home, const HomingView& current,
@@ -183,9 +188,7 @@ void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
   best_ = {};
   vector_.heading_rad = 0.0;
   vector_.residual = 1.0;
-  // Logarithm of the likelihood of the residual against unrelated views, to a factor. Residuals
-  // alone cannot be compared: at a wrong heading only the few frequencies that match have weight.
-  double best_evidence = -1.0;  // below all
+  double best_likelihood = -1.0;  // below all
   for (std::size_t i = 0; i < headings.size(); ++i) {
     const float turn = headings[i];
     // Skips headings at which the views correlate less than half as well, as these do not explain
@@ -196,9 +199,9 @@ void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
     const double unexplained = std::max(0.0, normal_.energy - solution.explained);
     const double residual =
         normal_.energy_of_views > 0.0 ? unexplained / normal_.energy_of_views : 1.0;
-    const double evidence = -sum_component_weights() * std::log(std::clamp(residual, 1e-12, 1.0));
-    if (evidence <= best_evidence) continue;
-    best_evidence = evidence;
+    const double likelihood = compute_log_likelihood(sum_component_weights(), residual);
+    if (likelihood <= best_likelihood) continue;
+    best_likelihood = likelihood;
     set_best(turn, solution, residual);
   }
   vector_.xi += best_.xi;
@@ -413,6 +416,10 @@ double HomeVector::direction_deviation_rad() const noexcept {
   const double across =
       eta * eta * covariance[0] - 2.0 * xi * eta * covariance[1] + xi * xi * covariance[4];
   return std::min(std::sqrt(std::max(0.0, across)) / square, std::numbers::pi);
+}
+
+double HomeVector::log_likelihood() const noexcept {
+  return compute_log_likelihood(frequencies, residual);
 }
 
 bool HomeVector::has_direction() const noexcept {

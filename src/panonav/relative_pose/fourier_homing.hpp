@@ -36,6 +36,10 @@ struct HomeVector {
   /// True if the vector is longer than its standard deviation. False at home, where there is no
   /// direction.
   [[nodiscard]] bool has_direction() const noexcept;
+  /// Logarithm of the likelihood of the residual against unrelated views, except for a constant.
+  /// Residuals alone cannot be compared: at a wrong heading only the few frequencies that match
+  /// have weight.
+  [[nodiscard]] double log_likelihood() const noexcept;
 };
 
 /// Largest value of `FourierHomingOptions::starting_estimates`.

@@ -100,17 +100,6 @@ double compute_band_agreement(const HomingView& home, const HomingView& current,
   return agreement;
 }
 
-std::optional<HomeVector> find_second_vector(const HomingView& home, const HomingView& current,
-                                             const HomeVector& first,
-                                             FourierHomingOptions options) {
-  options.turn = FourierHomingOptions::TurnEstimate::global;
-  const HeadingWindow others{
-      .middle_rad = static_cast<float>(wrap_angle(first.heading_rad + std::numbers::pi)),
-      .half_width_rad = static_cast<float>(std::numbers::pi - min_turn_difference_rad)};
-  const HomeVector second = home_vector(home, current, options, others);
-  return second.correlation > 0.0 ? std::optional(second) : std::nullopt;
-}
-
 }  // namespace
 
 bool PairFeatures::is_related() const noexcept {
@@ -156,6 +145,17 @@ PairFeatures compute_pair_features(const HomingView& home, const HomingView& cur
       std::abs(wrap_angle(pair.reverse.direction_rad() + pair.vector.heading_rad +
                           std::numbers::pi - pair.vector.direction_rad()));
   return features;
+}
+
+std::optional<HomeVector> find_second_vector(const HomingView& home, const HomingView& current,
+                                             const HomeVector& first,
+                                             FourierHomingOptions options) {
+  options.turn = FourierHomingOptions::TurnEstimate::global;
+  const HeadingWindow others{
+      .middle_rad = static_cast<float>(wrap_angle(first.heading_rad + std::numbers::pi)),
+      .half_width_rad = static_cast<float>(std::numbers::pi - min_turn_difference_rad)};
+  const HomeVector second = home_vector(home, current, options, others);
+  return second.correlation > 0.0 ? std::optional(second) : std::nullopt;
 }
 
 std::optional<PairEvidence> compute_pair_evidence(const HomingView& home, const HomingView& current,

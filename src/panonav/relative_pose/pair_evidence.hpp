@@ -64,6 +64,13 @@ struct PairEvidence {
   double probability = 0.0;
 };
 
+/// Returns the best home vector whose turn differs from that of `first` by more than 45 degrees;
+/// nullopt if the views correlate at no such turn. Throws and costs as `home_vector`.
+[[nodiscard]] std::optional<HomeVector> find_second_vector(const HomingView& home,
+                                                           const HomingView& current,
+                                                           const HomeVector& first,
+                                                           FourierHomingOptions options = {});
+
 /// Computes the relative pose of two views and how probable it is. nullopt if the views do not show
 /// that they have a relative pose (`PairFeatures::is_related`), for example views of two buildings,
 /// noise, or views without structure. `window`: turns that are considered for `vector`; those of
