@@ -32,6 +32,9 @@ struct ElsewhereExperiments : Experiments {
   /// Measures how well the covariance of tracked poses that are reported as localised fits their
   /// errors.
   void reproduce_tracked_poses();
+  /// Measures maps of drives by images alone and with wheels, and positions stated beside drives
+  /// and routes.
+  void reproduce_drives();
   /// Measures home vectors between two views of one ground, between views of two grounds, and
   /// between noise images.
   void reproduce_home_vectors();
