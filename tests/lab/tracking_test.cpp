@@ -8,6 +8,10 @@
 #include "lab/runs/tracking_filter.hpp"
 #include "lab/runs/tracking_run.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav/pipeline/visual_motion.hpp"
+#include "panonav_simulation/mapping_run.hpp"
 #include "support/skips.hpp"
 
 namespace panonav::lab {
@@ -155,6 +159,29 @@ TEST(Tracking, HardRunsSeeAChangedOfficeThatStaysTheSameForMoreRuns) {
   walks.variants = 0;
   EXPECT_THROW((void)record_walks(place, *remembered, make_hard_condition(), walks, two),
                ContractError);
+}
+
+// One iteration shortens displacements as long as the spacing of the references, which makes the
+// scale 1.4 to 1.5 times too large in these scenes.
+TEST(ScaleOfAMemory, HoldsForStepsShorterThanTheSpacing) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor executor(2);
+  for (const char* const scene : {"loop", "lab"}) {
+    const auto place = simulation::record_place(
+        {.scene = scene, .spacing_m = 0.5, .queries = 1, .rows = 40, .columns = 256}, executor);
+    VisualOdometry motion = visual_odometry(make_memory_of_references(place, executor));
+    const auto truth = simulation::drive(place, {}, 0.15, 60);
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const Panorama view = simulation::capture_view(place, truth[i], 100 + i);
+      const auto step = motion.add(OdometryView(compute_signature(preprocess(view, {}), 15)));
+      if (!step || step->views > 1) continue;
+      ratios.push_back(distance({}, step->before_from_after.position()) /
+                       distance(truth[i - 1].position(), truth[i].position()));
+    }
+    ASSERT_GT(ratios.size(), 50U);
+    EXPECT_NEAR(median(ratios), 1.0, 0.25) << scene;
+  }
 }
 
 }  // namespace

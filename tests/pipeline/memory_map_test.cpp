@@ -202,7 +202,9 @@ TEST_F(MemoryMaps, PlacesComponentsWithoutOverlapAndKeepsTheLargest) {
   const auto poses = place_components_side_by_side(map, gap);
   ASSERT_EQ(poses.size(), map.nodes.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (map.nodes[i].component == 2) EXPECT_EQ(poses[i], map.nodes[i].pose);
+    if (map.nodes[i].component == 2) {
+      EXPECT_EQ(poses[i], map.nodes[i].pose);
+    }
     for (std::size_t j = 0; j < i; ++j) {
       const double moved = distance(poses[i].position(), poses[j].position());
       if (map.nodes[i].component == map.nodes[j].component) {

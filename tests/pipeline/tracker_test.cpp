@@ -120,7 +120,9 @@ TEST_F(TrackerTest, PicturesWithoutOdometryAreBridged) {
     EXPECT_EQ(tracker.odometry().has_value(), i >= 2);
     if (i == 2) error_m = distance(robot(), pose(i).position());
     // Odometry is cumulative, so that the pause leaves no error.
-    if (i >= 10 && i < 18) EXPECT_NEAR(distance(robot(), pose(i).position()), error_m, 0.01) << i;
+    if (i >= 10 && i < 18) {
+      EXPECT_NEAR(distance(robot(), pose(i).position()), error_m, 0.01) << i;
+    }
   }
   EXPECT_EQ(tracker.visual_odometry()->tried_steps(), 2 + 2 + 2);
   EXPECT_EQ(tracker.visual_odometry()->breaks(), 0);
@@ -145,8 +147,9 @@ TEST_F(TrackerTest, MissingOdometryIsFilledFromThePictures) {
     (void)add_visual_odometry(run, tracker.memory(), tracker.encoder(), executor);
     for (std::size_t i = 0; i < poses.size(); ++i) {
       ASSERT_TRUE(run.entries[i].odometry);
-      if (before.entries[i].odometry)
+      if (before.entries[i].odometry) {
         EXPECT_EQ(run.entries[i].odometry, before.entries[i].odometry);
+      }
       const Pose2 expected = odometry_from_world * poses[i];
       EXPECT_LT(distance(run.entries[i].odometry->position(), expected.position()), 0.1) << i;
     }

@@ -299,7 +299,7 @@ int count_carrier_rows(std::span<const Panorama> panoramas) {
     double energy = 0.0;
     for (const Panorama& panorama : panoramas) {
       double average = 0.0;
-      for (const float value : panorama.row(y)) average += value / columns;
+      for (const float value : panorama.row(y)) average += static_cast<double>(value) / columns;
       for (int c = 0; c < columns; ++c) {
         const double off = panorama.at(y, c) - average;
         mean[static_cast<std::size_t>(c)] += off / count;

@@ -18,7 +18,11 @@ namespace {
 
 /// Estimates the scale in metres per unit of visual displacement, from nearest pairs of views with
 /// positions.
-double compute_scale(const VisualMemory& memory, const VisualOdometryOptions& options) {
+double compute_scale(const VisualMemory& memory) {
+  // Views of a memory are farther apart than images of a drive, and one iteration shortens such
+  // displacements: the scale is 1.2 to 1.5 times too large in six scenes with a view every 0.5 m,
+  // with eight iterations 1.06 to 1.25 times. More iterations change nothing.
+  const VisualOdometryOptions options{.iterations = 8};
   std::vector<ViewId> posed;
   for (const ViewId view : memory.views()) {
     if (memory.info(view).pose) posed.push_back(view);
@@ -145,15 +149,17 @@ void add_motion_by_images(std::span<DatasetEntry> entries, VisualOdometry& odome
 }  // namespace
 
 OdometryNoise visual_odometry_noise() {
-  const MappingOptions mapping;
+  // Lengths of two of three steps lie within a quarter of the median, as the distance of things
+  // around changes along a drive (30 drives in six scenes, 2,970 steps).
+  constexpr double length_deviation = 0.25;
   return {.drive = DriveKind::holonomic,
-          .translation_from_translation = mapping.step_deviation,
-          .rotation_from_translation = mapping.turn_deviation};
+          .translation_from_translation = length_deviation,
+          .rotation_from_translation = MappingOptions{}.turn_deviation};
 }
 
 VisualOdometry visual_odometry(const VisualMemory& memory) {
   VisualOdometryOptions options;
-  options.scale_m = compute_scale(memory, options);
+  options.scale_m = compute_scale(memory);
   options.steady_speed = false;  // the memory knows the lengths
   return VisualOdometry(options);
 }

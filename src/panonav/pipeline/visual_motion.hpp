@@ -20,7 +20,8 @@ inline constexpr std::size_t gap_scale_images = 6;
 /// Smallest number of such steps, of which one may be wrong; with fewer the memory gives the scale.
 inline constexpr std::size_t min_gap_scale_steps = 3;
 
-/// Returns the noise that a map assumes for visual odometry.
+/// Returns the noise of motion that is read from images at the scale of a memory: lengths vary more
+/// than in a map of the drive, where the speed is steady.
 [[nodiscard]] OdometryNoise visual_odometry_noise();
 /// Makes visual odometry whose scale is calibrated by views of the memory with known positions.
 [[nodiscard]] VisualOdometry visual_odometry(const VisualMemory& memory);
