@@ -3,6 +3,7 @@
 #include "bindings.hpp"
 #include "memories.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/map_scale.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_list.hpp"
 #include "panonav_fleet/memory_synchronisation.hpp"

@@ -142,6 +142,7 @@ RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesyst
   options.odometry =
       drive.origin == RoutePoseOrigin::odometry || drive.origin == RoutePoseOrigin::images;
   options.assumed_unit_m = drive.assumed_unit_m;
+  options.is_in_map_unit = drive.is_in_map_unit;
   RouteRecorder recorder(std::move(file), dataset.source, options);
   return recorder.record(drive.drive, drive.poses, executor);
 }

@@ -124,8 +124,8 @@ TEST_F(RouteVerbs, TheSameDriveGoesOnWhereItsRecordingStopped) {
 TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   const json recorded = record();
   EXPECT_EQ(keys_of(recorded),
-            (std::set<std::string>{"memory", "route", "appended", "lines", "columns", "length_m",
-                                   "bytes", "bytes_per_km", "file_bytes"}));
+            (std::set<std::string>{"memory", "route", "frame", "appended", "lines", "columns",
+                                   "length_m", "bytes", "bytes_per_km", "file_bytes"}));
   EXPECT_EQ(recorded["lines"], 41);
   EXPECT_EQ(recorded["appended"], 41);
   EXPECT_EQ(recorded["columns"], 360);

@@ -14,6 +14,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/pipeline/map_scale.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "support/remembered_worlds.hpp"
@@ -69,6 +70,16 @@ class MemoryMaps : public ::testing::Test {
     for (const ViewId view : views.views()) points.push_back(views.info(view).pose->position());
     return points;
   }
+  /// Stores a route of length 2.
+  static void append_route(MemoryFile& memory, const std::string& name,
+                           std::optional<double> assumed_unit_m) {
+    RoutePanorama route(16);
+    const std::vector<float> line(16, 0.5F);
+    route.append({0.0, 0.0, 0.0}, line);
+    route.append({2.0, 0.0, 0.0}, line);
+    memory.append_route(name, route);
+    store_route_source(memory, name, {.line = {.columns = 16}, .assumed_unit_m = assumed_unit_m});
+  }
   static double shape(const MemoryFile& memory, const std::vector<Pose2>& truth) {
     std::vector<Point2> points;
     for (const Pose2& pose : truth) points.push_back(pose.position());
@@ -89,7 +100,7 @@ TEST_F(MemoryMaps, ViewsInOrderGetPositionsInViewSteps) {
   EXPECT_FALSE(has_positions_from_map(memory));
   EXPECT_EQ(read_length_unit(memory), LengthUnit::metres);
   std::size_t mapped = 0;
-  const auto map = map_views(memory, {}, executor, 0.0, [&] { ++mapped; });
+  const auto map = map_views(memory, {}, executor, [&] { ++mapped; });
   ASSERT_TRUE(map);
   EXPECT_EQ(mapped, truth.size());
   EXPECT_EQ(map->unit, LengthUnit::view_steps);
@@ -228,7 +239,8 @@ TEST_F(MemoryMaps, AKnownDistanceMakesMetres) {
   route.append({0.0, 0.0, 0.0}, line);
   route.append({2.0, 0.0, 0.0}, line);
   memory.append_route("walk", route);
-  store_route_source(memory, "walk", {.line = {.columns = 16}, .assumed_unit_m = 0.2});
+  store_route_source(memory, "walk",
+                     {.line = {.columns = 16}, .assumed_unit_m = read_assumed_unit_m(memory)});
   memory.append_route("metric", route);
   const auto views = memory.views();
   const double factor = scale_to_metres(memory, views[3], views[50], 3.0, "scale");
@@ -244,6 +256,95 @@ TEST_F(MemoryMaps, AKnownDistanceMakesMetres) {
   EXPECT_EQ(positions(memory), before);
   EXPECT_EQ(read_length_unit(memory), LengthUnit::view_steps);
   EXPECT_EQ(memory.route("walk")->length_m(), 2.0);
+}
+
+TEST_F(MemoryMaps, EveryScalingMovesTheRoutesInTheUnitOfTheMap) {
+  MemoryFile memory = make_walk(rounds(round_views));
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  const auto before = positions(memory);
+  const double unit_m = read_assumed_unit_m(memory);
+  append_route(memory, "along the map", unit_m);
+  append_route(memory, "in longer steps", 2.5 * unit_m);
+  append_route(memory, "by wheels", std::nullopt);
+  const auto expect_scale = [&](double factor) {
+    const auto now = positions(memory);
+    for (std::size_t i = 0; i < now.size(); ++i)
+      EXPECT_NEAR(now[i].x_m, factor * before[i].x_m, 1e-9);
+    EXPECT_NEAR(memory.route("along the map")->length_m(), 2.0 * factor, 1e-9);
+    EXPECT_EQ(memory.route("by wheels")->length_m(), 2.0);
+  };
+  scale_to_metres(memory, 0.4, "first");
+  expect_scale(0.4);
+  EXPECT_NEAR(memory.route("in longer steps")->length_m(), 2.0 * 0.4 * 2.5, 1e-9);
+  EXPECT_TRUE(read_route_source(memory, "along the map", 16).is_in_map_unit);
+  scale_to_metres(memory, 1.5, "correction");
+  expect_scale(0.6);
+  EXPECT_NEAR(memory.route("in longer steps")->length_m(), 2.0 * 0.6 * 2.5, 1e-9);
+  memory.undo();
+  expect_scale(0.4);
+  EXPECT_EQ(read_length_unit(memory), LengthUnit::metres);
+  memory.undo();
+  expect_scale(1.0);
+  EXPECT_EQ(read_length_unit(memory), LengthUnit::view_steps);
+  EXPECT_EQ(read_route_source(memory, "along the map", 16).assumed_unit_m, unit_m);
+  EXPECT_THROW(scale_to_metres(memory, 0.0, "s"), ContractError);
+}
+
+TEST_F(MemoryMaps, AMapThatReplacesOneInMetresKeepsItsScale) {
+  MemoryFile memory = make_walk(rounds(round_views));
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  scale_to_metres(memory, 0.4, "scale");
+  const auto before = positions(memory);
+  append(memory, round_room_signature(world, {}), ReferencePose{0.3, 0.2, 0.1});  // of an update
+  TopologicalMap map = memory.map(map_name).value();
+  scale_lengths(map, 7.0);
+  store_map(memory, map, LengthUnit::view_steps);
+  EXPECT_EQ(read_length_unit(memory), LengthUnit::metres);
+  const VisualMemory views = memory.load();
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const auto pose = views.info(map.nodes[i].view).pose;
+    ASSERT_TRUE(pose);
+    EXPECT_NEAR(pose->x_m, before[i].x_m, 1e-9);
+    EXPECT_NEAR(pose->y_m, before[i].y_m, 1e-9);
+  }
+  EXPECT_FALSE(views.info(memory.views().back()).pose) << "in the frame of the earlier map";
+}
+
+TEST_F(MemoryMaps, AnArrangementKeepsItsScaleWhenViewsFollow) {
+  std::vector<Pose2> places;
+  for (double x = -1.5; x <= 1.5; x += 0.25) {
+    for (double y = -1.5; y <= 1.5; y += 0.25) places.push_back({x, y, 0.0});
+  }
+  std::mt19937 random(1);
+  std::ranges::shuffle(places, random);
+  MemoryFile memory = make_walk({places.begin(), places.end() - 5});
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  scale_to_metres(memory, 0.25, "scale");
+  const TopologicalMap before = memory.map(map_name).value();
+  for (auto place = places.end() - 5; place != places.end(); ++place)
+    append(memory, round_room_signature(world, *place));
+  EXPECT_EQ(map_views(memory, {}, executor).value().unit, LengthUnit::metres);
+  EXPECT_NEAR(compare_lengths(before, memory.map(map_name).value()).value(), 1.0, 1e-9);
+}
+
+TEST_F(MemoryMaps, RoutesInViewStepsFollowAMapThatGetsMetresFromOdometry) {
+  const auto truth = rounds(80);
+  MemoryFile memory = make_walk(truth);
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  append_route(memory, "walk", read_assumed_unit_m(memory));
+  const TopologicalMap before = memory.map(map_name).value();
+  std::map<std::string, Pose2> odometry;
+  for (std::size_t i = 0; i < truth.size(); ++i) odometry[name_view(i)] = truth[i];
+  EXPECT_EQ(map_views(memory, odometry, executor).value().unit, LengthUnit::metres);
+  const double unit_m = compare_lengths(before, memory.map(map_name).value()).value();
+  EXPECT_NEAR(unit_m, 0.0914, 0.01) << "a view step";
+  EXPECT_NEAR(memory.route("walk")->length_m(), 2.0 * unit_m, 1e-9);
+  EXPECT_FALSE(read_route_source(memory, "walk", 16).assumed_unit_m);
+  append_route(memory, "in steps of its own", 0.3);
+  for (auto& [name, pose] : odometry) pose = {2.0 * pose.x_m, 2.0 * pose.y_m, pose.heading_rad};
+  ASSERT_TRUE(map_views(memory, odometry, executor));
+  EXPECT_NEAR(memory.route("walk")->length_m(), 4.0 * unit_m, 0.02 * unit_m) << "a corrected scale";
+  EXPECT_EQ(memory.route("in steps of its own")->length_m(), 2.0) << "no length is known";
 }
 
 TEST_F(MemoryMaps, RefusesDistancesThatMeanNothing) {

@@ -50,8 +50,11 @@ class RunRouteRecorder {
     if (recogniser == nullptr) return;
     if (!recorder_) {
       auto file = MemoryFile::open(memory_, Access::read_write);
-      if (poses_ == RoutePoses::images && read_length_unit(file) == LengthUnit::view_steps) {
-        options_.assumed_unit_m = read_assumed_unit_m(file);
+      if (poses_ == RoutePoses::images) {
+        options_.is_in_map_unit = has_positions_from_map(file);
+        if (read_length_unit(file) == LengthUnit::view_steps) {
+          options_.assumed_unit_m = read_assumed_unit_m(file);
+        }
       }
       recorder_.emplace(std::move(file), source_, options_);
     }
@@ -245,8 +248,8 @@ class LocalisedRun {
     if (arguments_.report && arguments_.add) write_report();
     if (has_report_) print_report_path(*arguments_.report, session_);
     session_.note(format_count(counts.pictures, "image") + ", " + std::to_string(known_count_) +
-                  " of places of " + arguments_.memory + changes +
-                  describe_events(counts, record.left_out()) +
+                  (known_count_ == 1 ? " shows a place of " : " show places of ") +
+                  arguments_.memory + changes + describe_events(counts, record.left_out()) +
                   (live_ ? ", unwrapping " +
                                format_fixed(unwrapping_.count() /
                                                 std::max(1.0, static_cast<double>(counts.pictures)),

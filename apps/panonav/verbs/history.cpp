@@ -53,8 +53,9 @@ Verb history_verb() {
   return {"history",
           VerbGroup::memory,
           "List the changes of a memory, newest first",
-          "The list contains the newest 1000 changes by forget, prune, rename and localise "
-          "--update. panonav undo reverts the newest change; run it again to revert the change "
+          "The list contains the newest 1000 changes by forget, prune, rename, scale and "
+          "localise --update. panonav undo reverts the newest change; run it again to revert the "
+          "change "
           "before. The newest 100 changes (at most 64 MiB in total) can be reverted.",
           "  panonav history office.panonav\n"
           "  panonav history office.panonav --json",

@@ -114,6 +114,13 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   }
 }
 
+/// Prints that the poses are in the route's own frame, if the views have positions in another one.
+void print_frame(const RouteSource& route, const MemoryFile& memory, Session& session) {
+  if (!route.from_odometry || memory.info().views_with_position == 0) return;
+  session.print(
+      "x, y and heading are in the route's own frame, not in that of the views (localise).");
+}
+
 void write_fixes(const std::string& path, const std::vector<FollowedImage>& images,
                  const std::vector<double>& seconds) {
   std::vector<StampedPose> trajectory;
@@ -175,7 +182,10 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
 
   if (arguments.tum) write_fixes(*arguments.tum, images, seconds);
   const FollowSummary summary = summarise_follow(images, headings_known);
-  if (!session.json()) print_summary(summary, images, session);
+  if (!session.json()) {
+    print_summary(summary, images, session);
+    print_frame(follower.source(), memory, session);
+  }
   if (arguments.report) {
     const auto panorama = memory.route(follower.name());
     write_follow_report(

@@ -123,8 +123,42 @@ void set_line_options(const Arguments& declared, const RecordArguments& argument
   }
 }
 
+/// Frame of the poses of a route.
+enum class RouteFrame { own, map, data_set };
+
+const char* to_string(RouteFrame frame) {
+  switch (frame) {
+    case RouteFrame::own:
+      return "own";
+    case RouteFrame::map:
+      return "map";
+    case RouteFrame::data_set:
+      return "data_set";
+  }
+  return "own";
+}
+
+RouteFrame find_frame(RoutePoseOrigin origin) {
+  if (origin == RoutePoseOrigin::data_set) return RouteFrame::data_set;
+  return origin == RoutePoseOrigin::map ? RouteFrame::map : RouteFrame::own;
+}
+
+/// Prints the frame of the route's poses if it is not that of the views.
+void print_frame(RouteFrame frame, const MemoryFile& memory, Session& session) {
+  if (memory.info().views_with_position == 0) return;
+  if (frame == RouteFrame::own) {
+    session.print(
+        "The poses of the route are in a frame of its own, which is not that of the views: route "
+        "follow and localise give different x, y and heading.");
+  } else if (frame == RouteFrame::data_set && has_positions_from_map(memory)) {
+    session.print(
+        "The poses of the route are in the frame of the data set, those of the views in that of "
+        "their map: route follow and localise give different x, y and heading.");
+  }
+}
+
 void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recorded& recorded,
-                    std::uint64_t file_bytes, Session& session) {
+                    RouteFrame frame, std::uint64_t file_bytes, Session& session) {
   const double length_m = recorded.route.length_m();
   const double bytes_per_km = recorded.bytes_per_km();
   const bool is_metric = session.length_unit() == LengthUnit::metres;
@@ -132,6 +166,7 @@ void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recor
     session.print(session.json_line(
         ordered_json{{"memory", arguments.memory},
                      {"route", arguments.name},
+                     {"frame", to_string(frame)},
                      {"appended", recorded.appended},
                      {"lines", recorded.route.size()},
                      {"columns", recorded.route.columns()},
@@ -181,6 +216,7 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   options.odometry =
       drive.origin == RoutePoseOrigin::odometry || drive.origin == RoutePoseOrigin::images;
   options.assumed_unit_m = drive.assumed_unit_m;
+  options.is_in_map_unit = drive.is_in_map_unit;
   RouteRecorder recorder(std::move(*memory), dataset.source, options);
   std::optional<Progress> bar;
   const auto recorded =
@@ -191,8 +227,10 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   bar.reset();
   if (arguments.report)
     write_record_report(*arguments.report, arguments.name, recorded, session.length_unit());
-  print_recorded(arguments, recorded, recorder.memory().info().file_bytes, session);
+  const RouteFrame frame = find_frame(drive.origin);
+  print_recorded(arguments, recorded, frame, recorder.memory().info().file_bytes, session);
   if (session.json()) return ExitCode::done;
+  print_frame(frame, recorder.memory(), session);
   if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&
       !recorder.source().horizon_rows) {
     session.print(
@@ -230,17 +268,20 @@ Run declare_route_record(Arguments& arguments) {
 }  // namespace
 
 Verb route_record_verb() {
-  return {"route record",
-          VerbGroup::maps_and_routes,
-          "Record a route as lines of pixels at equal distances",
-          "A line of pixels shows the horizon all around the robot at one place of the route. A "
-          "line has one byte per degree, and one kilometre of route needs a few megabytes. Lines "
-          "are stored in batches. To continue after an interruption, run the same command again. A "
-          "recording that starts at the end of the route extends the route.",
-          "  panonav route record office.panonav teach_run\n"
-          "  panonav route record office.panonav teach_run --name corridor --odometry --report "
-          "corridor",
-          declare_route_record};
+  return {
+      "route record",
+      VerbGroup::maps_and_routes,
+      "Record a route as lines of pixels at equal distances",
+      "A line of pixels shows the horizon all around the robot at one place of the route. A "
+      "line has one byte per degree, and one kilometre of route needs a few megabytes. Lines "
+      "are stored in batches. To continue after an interruption, run the same command again. A "
+      "recording that starts at the end of the route extends the route. Its poses are those of "
+      "the data set or of the memory's map; those of odometry or images alone are in a frame of "
+      "the route's own, which is not that of the views.",
+      "  panonav route record office.panonav teach_run\n"
+      "  panonav route record office.panonav teach_run --name corridor --odometry --report "
+      "corridor",
+      declare_route_record};
 }
 
 }  // namespace panonav::command

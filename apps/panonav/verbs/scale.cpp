@@ -1,5 +1,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/pipeline/map_scale.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
@@ -25,6 +27,74 @@ double parse_length_m(const std::string& text) {
   return metres_per_unit * value;
 }
 
+/// Measures the metres per unit of the map from the ground. Throws UsageError, FileError if the
+/// images cannot show the ground.
+GroundScale measure_scale(const ScaleArguments& arguments, const MemoryFile& memory,
+                          Session& session) {
+  const double height_m = *arguments.camera_height_m;
+  if (!(height_m > 0.0) || height_m > 100.0) {
+    throw UsageError("--camera-height-m is " + to_text(height_m) +
+                     "; allowed: above 0 and at most 100");
+  }
+  if (!memory.header().elevations) {
+    throw FileError(arguments.memory,
+                    "has images whose rows have unknown elevations, so the ground cannot be found; "
+                    "use --distance VIEW VIEW LENGTH");
+  }
+  std::optional<Progress> bar;
+  return measure_ground_scale(memory, height_m, [&](std::size_t pairs) {
+    if (!bar) bar.emplace(session, "measuring", pairs);
+    bar->advance();
+  });
+}
+
+/// Returns the names of the routes that a scaling of the map scales.
+std::vector<std::string> find_routes_in_map_unit(const MemoryFile& memory) {
+  std::vector<std::string> names = memory.route_names();
+  std::erase_if(names, [&](const std::string& name) {
+    const int columns = memory.route(name).value().columns();
+    return !read_route_source(memory, name, columns).is_in_map_unit;
+  });
+  return names;
+}
+
+void print_result(const ScaleArguments& arguments, const MemoryFile& memory, double factor,
+                  const std::optional<GroundScale>& ground, Session& session) {
+  const auto step_m = median_step_length(memory.map(map_name).value());
+  const auto routes = find_routes_in_map_unit(memory);
+  if (session.json()) {
+    ordered_json json{{"memory", arguments.memory},
+                      {"factor", factor},
+                      {"view_step_m", to_json_or_null(step_m)},
+                      {"routes", routes},
+                      {"ground", nullptr}};
+    if (ground) {
+      json["ground"] = {{"measured", ground->measured},
+                        {"tried", ground->tried},
+                        {"deviation", ground->deviation}};
+    }
+    session.print(json_line(json));
+    return;
+  }
+  session.print(
+      "positions in " + arguments.memory + " are now in " + session.bold("metres") +
+      (step_m ? "; consecutive views are " + format_number(*step_m, {}, 2) + " m apart (median)"
+              : "; one former unit is " + format_number(factor, {}, 2) + " m"));
+  if (ground) {
+    session.print("The ground shows the distance of " + std::to_string(ground->measured) + " of " +
+                  format_count(ground->tried, "pair") +
+                  " of neighbouring views; standard deviation of the scale: " +
+                  format_number(100.0 * ground->deviation, {}, 2) + " %.");
+  }
+  if (!routes.empty()) {
+    std::string names;
+    for (const std::string& name : routes) names += (names.empty() ? "" : ", ") + name;
+    session.print("Routes scaled with the map: " + names + ".");
+  }
+  session.print("To revert the scaling: panonav undo " + arguments.memory);
+  session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
+}
+
 ExitCode scale(const ScaleArguments& arguments, Session& session) {
   if (arguments.distance.has_value() == arguments.camera_height_m.has_value()) {
     throw UsageError("set either --distance or --camera-height-m");
@@ -36,47 +106,30 @@ ExitCode scale(const ScaleArguments& arguments, Session& session) {
                                           : "has no map; panonav memorise makes one of images "
                                             "taken every 20 to 50 cm");
   }
-  const double former_unit_m = read_assumed_unit_m(memory);
-  std::optional<double> factor;
   if (arguments.distance) {
     const auto& words = *arguments.distance;
-    factor = scale_to_metres(memory, find_view_by_name_or_id(memory, words[0]),
-                             find_view_by_name_or_id(memory, words[1]), parse_length_m(words[2]),
-                             "scale by the distance of " + words[0] + " and " + words[1]);
-  } else {
-    if (!(*arguments.camera_height_m > 0.0) || *arguments.camera_height_m > 100.0) {
-      throw UsageError("--camera-height-m is " + to_text(*arguments.camera_height_m) +
-                       "; allowed: above 0 and at most 100");
-    }
-    const MemoryMap map = describe_map(memory).value();
-    if (2 * map.part_sizes.front() < map.views) {
-      return session.no_answer(
-          "panonav scale: the map of " + arguments.memory + " has " +
-          format_count(map.part_sizes.size(), "part") + ", the largest with " +
-          std::to_string(map.part_sizes.front()) + " of " + format_count(map.views, "view") +
-          ", so lengths cannot be computed from one image to the next; use --distance");
-    }
-    Progress progress(session, "mapping", memory.info().views);
-    static_cast<void>(map_views(memory, {}, session.executor(), *arguments.camera_height_m,
-                                [&] { progress.advance(); }));
-    if (read_length_unit(memory) != LengthUnit::metres) {
-      return session.no_answer("panonav scale: the ground in the images of " + arguments.memory +
-                               " does not show the lengths of steps; use --distance");
-    }
-  }
-  const auto step_m = median_step_length(memory.map(map_name).value());
-  if (session.json()) {
-    session.print(command::json_line(ordered_json{{"memory", arguments.memory},
-                                                  {"factor", to_json_or_null(factor)},
-                                                  {"view_step_m", to_json_or_null(step_m)}}));
+    const double factor =
+        scale_to_metres(memory, find_view_by_name_or_id(memory, words[0]),
+                        find_view_by_name_or_id(memory, words[1]), parse_length_m(words[2]),
+                        "scale by the distance of " + words[0] + " and " + words[1]);
+    print_result(arguments, memory, factor, std::nullopt, session);
     return ExitCode::done;
   }
-  session.print(
-      "positions in " + arguments.memory + " are now in " + session.bold("metres") +
-      (step_m ? "; consecutive views are " + format_number(*step_m, {}, 2) + " m apart (median)"
-              : ""));
-  session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
-  session.detail("one unit was assumed to be " + format_number(former_unit_m) + " m");
+  const GroundScale ground = measure_scale(arguments, memory, session);
+  if (!ground.unit_m) {
+    return session.no_answer(
+        "panonav scale: the ground in the images of " + arguments.memory +
+        " does not show the scale: it shows the distance of " + std::to_string(ground.measured) +
+        " of " + format_count(ground.tried, "pair") + " of neighbouring views" +
+        (ground.measured > 0 ? ", and the standard deviation of the scale is " +
+                                   format_number(100.0 * ground.deviation, {}, 2) + " %"
+                             : "") +
+        "; use --distance VIEW VIEW LENGTH");
+  }
+  scale_to_metres(
+      memory, *ground.unit_m,
+      "scale by a camera height of " + format_number(*arguments.camera_height_m) + " m");
+  print_result(arguments, memory, *ground.unit_m, ground, session);
   return ExitCode::done;
 }
 
@@ -86,9 +139,10 @@ Run declare_scale(Arguments& arguments) {
   arguments.option("--distance", "VIEW VIEW LENGTH", values->distance,
                    "Names or ids of two views of one part of the map, and their distance, such as "
                    "3.2m");
-  arguments.option("--camera-height-m", values->camera_height_m,
-                   "Height of the camera above level ground; the map is made again, and lengths "
-                   "are computed from the images of the ground");
+  arguments.option(
+      "--camera-height-m", values->camera_height_m,
+      "Height of the camera above level ground; lengths are computed from the images of "
+      "the ground in neighbouring views, and the map keeps its shape");
   arguments.explain_interruption(
       "The memory is as before. To start over, run the same command again.");
   return [values](Session& session) { return scale(*values, session); };
@@ -103,9 +157,9 @@ Verb scale_verb() {
       "Scale a map of images to metres",
       "A map that was computed from images alone has no scale: its positions are in view steps, "
       "the median distance between consecutive views. The known distance between two views, or "
-      "the height of the camera above the ground, makes them metres. Positions from a data set "
-      "or from odometry are in metres already. Routes in view steps are scaled, too. panonav "
-      "undo reverts a scaling by --distance.",
+      "the height of the camera above the ground, makes them metres. Run the verb again to correct "
+      "the scale. Routes in the unit of the map are scaled, too; those recorded with odometry or "
+      "positions are not. panonav undo reverts a scaling.",
       "  panonav scale walk.panonav --distance view_00003.png view_00027.png 3.2m\n"
       "  panonav scale walk.panonav --camera-height-m 1.6",
       declare_scale};

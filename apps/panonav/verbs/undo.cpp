@@ -1,5 +1,6 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
@@ -16,21 +17,30 @@ ExitCode undo(const UndoArguments& arguments, Session& session) {
                                  arguments.dry_run ? Access::read_only : Access::read_write);
   const auto what = memory.undoable();
   if (!what) {
-    throw FileError(arguments.memory,
-                    "contains no change that can be reverted; allowed: after forget, prune, rename "
-                    "and localise --update");
+    throw FileError(
+        arguments.memory,
+        "contains no change that can be reverted; allowed: after forget, prune, rename, "
+        "scale and localise --update");
   }
+  const LengthUnit unit_before = read_length_unit(memory);
   if (!arguments.dry_run) memory.undo();
+  const LengthUnit unit = read_length_unit(memory);
   const auto views = memory.info().views;
   if (session.json()) {
     session.print(json_line(ordered_json{{"memory", arguments.memory},
                                          {"dry_run", arguments.dry_run},
                                          {"undone", *what},
+                                         {"unit", unit == LengthUnit::metres ? "m" : "view_steps"},
                                          {"views", views}}));
     return ExitCode::done;
   }
   session.print((arguments.dry_run ? "would revert \"" : "reverted \"") + *what + "\"; " +
-                arguments.memory + " holds " + format_count(views, "view"));
+                arguments.memory + " holds " + format_count(views, "view") +
+                (unit == unit_before ? ""
+                 : unit == LengthUnit::metres
+                     ? ", with positions in metres"
+                     : ", with positions in view steps; for metres: panonav scale " +
+                           arguments.memory + " --distance VIEW VIEW LENGTH"));
   return ExitCode::done;
 }
 
@@ -49,9 +59,11 @@ Run declare_undo(Arguments& arguments) {
 Verb undo_verb() {
   return {"undo",
           VerbGroup::memory,
-          "Revert the last forget, prune, rename or localise --update",
-          "Run panonav undo again to revert earlier changes; panonav history lists all changes. "
-          "Views are restored with their thumbnails, links, positions in maps and former names. "
+          "Revert the last forget, prune, rename, scale or update",
+          "An update is that of localise --update. Run panonav undo again to revert earlier "
+          "changes; panonav history lists all changes. "
+          "Views are restored with their thumbnails, links, positions in maps and former names, "
+          "and a map and routes with their former unit. "
           "Views that were added after the reverted change stay in the memory. The verb refuses to "
           "revert a change if a view that was added later has the name of a view that would be "
           "restored, or if a map was made again.",

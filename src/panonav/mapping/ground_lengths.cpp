@@ -65,6 +65,7 @@ bool GroundLengths::correct_step(const HomingView& before, const HomingView& aft
     if (found->deviation < max_relative_deviation * length &&
         length < max_relative_change * expected && expected < max_relative_change * length) {
       if (length > min_length) {
+        ++measured_steps_;
         latest_scales_m_.push_back(length * camera_height_m_ / step.length_in_views);
       }
       if (latest_scales_m_.size() > max_scale_steps)

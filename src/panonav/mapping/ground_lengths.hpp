@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -24,9 +25,12 @@ class GroundLengths {
   /// Metric scale of visual displacements in metres per unit of length, estimated from the latest
   /// steps; nullopt before the third.
   [[nodiscard]] std::optional<double> scale_m() const;
+  /// Number of steps whose own images gave their length.
+  [[nodiscard]] std::size_t measured_steps() const noexcept { return measured_steps_; }
 
  private:
   double camera_height_m_;
+  std::size_t measured_steps_ = 0;
   std::vector<double> latest_scales_m_;  // metres for each unit of length of the views
 };
 

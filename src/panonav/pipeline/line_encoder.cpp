@@ -52,6 +52,8 @@ RouteSource read_route_source(const MemoryFile& memory, const std::string& name,
       good = read_next(i, first) && read_next(i, second);
     } else if (word == "odometry") {
       source.from_odometry = true;
+    } else if (word == "map_unit") {
+      source.is_in_map_unit = true;
     } else if (word == "assumed_unit_m") {
       good = read_next(i, source.assumed_unit_m.emplace()) && *source.assumed_unit_m > 0.0;
     } else {
@@ -72,6 +74,7 @@ void store_route_source(MemoryFile& memory, const std::string& name, const Route
             std::to_string(source.horizon_rows->second);
   }
   if (source.from_odometry) text += " odometry";
+  if (source.is_in_map_unit) text += " map_unit";
   if (source.assumed_unit_m) text += " assumed_unit_m " + to_text(*source.assumed_unit_m);
   memory.set_parameter(make_parameter_name(name), text);
 }

@@ -24,6 +24,9 @@ struct RouteSource {
   /// Metres of a unit of the poses if things around are as far away as assumed; the poses were then
   /// computed from images alone and are in view steps. nullopt: poses are in metres.
   std::optional<double> assumed_unit_m = std::nullopt;
+  /// True: lengths are those of the memory's map, so scaling the map scales the route. False: they
+  /// are metres of a data set or of odometry.
+  bool is_in_map_unit = false;
   friend bool operator==(const RouteSource&, const RouteSource&) = default;
 };
 

@@ -6,6 +6,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/map_scale.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 
 namespace panonav {
@@ -66,6 +67,7 @@ bool Mapper::add(EncodedView encoded) {
   }
   const NewView added{std::move(encoded.info), pack(view.signature, file_.header().full_scale),
                       std::move(encoded.thumbnail)};
+  if (added.info.pose) remove_positions_from_map(file_);
   const auto known = file_.find(added.info.name);
   const ViewId id = known ? *known : file_.append(added);
   std::optional<Pose2> moved;
@@ -104,20 +106,31 @@ Mapper::Result Mapper::map(const Dataset& recording, Executor& executor,
   return finish();
 }
 
+LengthUnit Mapper::current_unit() const {
+  const bool is_by_wheels = options_.mapping.wheels && has_all_odometry_;
+  return is_by_wheels || mapper_.is_metric() || options_.is_scale_known ? LengthUnit::metres
+                                                                        : LengthUnit::view_steps;
+}
+
 Mapper::Result Mapper::finish() {
   const auto start = Clock::now();
   mapper_.finish();
   result_.mapping_s += seconds_since(start);
   result_.map = mapper_.map();
   result_.wheels = options_.mapping.wheels && has_all_odometry_;
-  result_.unit = result_.wheels || mapper_.is_metric() || options_.is_scale_known
-                     ? LengthUnit::metres
-                     : LengthUnit::view_steps;
+  result_.unit = current_unit();
+  result_.is_former_scale = false;
   result_.scale_m.reset();
   if (result_.unit == LengthUnit::metres) result_.scale_m = mapper_.scale_m();
-  if (!has_any_pose_) {
+  if (!has_any_pose_ && (has_positions_from_map(file_) || file_.info().views_with_position == 0)) {
     store_map(file_, result_.map, result_.unit);
     if (const auto stored = file_.map(map_name)) result_.map = *stored;
+    result_.is_former_scale = result_.unit != read_length_unit(file_);
+    if (result_.is_former_scale) {
+      result_.unit = LengthUnit::metres;
+      const auto factor = compare_lengths(mapper_.map(), result_.map);
+      if (factor) result_.scale_m = *factor * mapper_.scale_m();
+    }
     return result_;
   }
   std::vector<Link> links;

@@ -45,6 +45,8 @@ class Mapper {
     /// Metres per unit of visual displacement; nullopt if it is not known (`unit`).
     std::optional<double> scale_m;
     LengthUnit unit = LengthUnit::metres;  ///< of the map in the file and of `map`
+    bool is_former_scale =
+        false;               ///< true: metres come from the memory's earlier map (`store_map`)
     bool wheels = false;     ///< true: motions come from odometry, which all observations had
     double mapping_s = 0.0;  ///< time of the mapping alone, without decoding and file access
   };
@@ -84,12 +86,15 @@ class Mapper {
              const SkipImage& skipped = {});
 
   /// Optimises the nodes that are not optimised yet, and stores the map and a link for each of its
-  /// edges. If no observation had a pose, the views get the poses of the map (`store_map`). More
-  /// observations may follow. Throws FileError.
+  /// edges. If no observation and no other view has a position from a data set, the views get the
+  /// poses of the map (`store_map`). More observations may follow. Throws FileError.
   Result finish();
 
   /// Returns a copy of the present map, for display; `finish` will still move nodes.
   [[nodiscard]] TopologicalMap current_map() const { return mapper_.map(); }
+  /// Returns the unit of the present map as far as its observations show it. In view steps, lengths
+  /// are not scaled yet.
+  [[nodiscard]] LengthUnit current_unit() const;
   /// Returns the file to which views are appended.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
   /// Returns the encoder that makes views of pictures.

@@ -226,7 +226,7 @@ Memoriser::Counts Memoriser::finish(Executor& executor, const std::function<void
   if (!file_) make_file(executor);
   counts_.map = describe_map(*file_);
   if (options_.map && (counts_.appended > 0 || !counts_.map)) {
-    counts_.map = map_views(*file_, odometry_, executor, 0.0, mapped);
+    counts_.map = map_views(*file_, odometry_, executor, mapped);
   }
   learn_and_store_models(*file_);
   return counts_;

@@ -18,8 +18,7 @@
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/mapping/topological_mapper.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
-#include "panonav/pipeline/line_encoder.hpp"
-#include "panonav/route/route_panorama.hpp"
+#include "panonav/pipeline/map_scale.hpp"
 
 namespace panonav {
 
@@ -38,6 +37,10 @@ constexpr std::size_t min_positioned_views = ObservationModel::min_views;
 /// Assumed distance between neighbouring views of an arrangement: that which is recommended for a
 /// recording.
 constexpr double assumed_spacing_m = 0.3;
+
+/// Relative change of the lengths of a map in metres from which its routes are scaled, too. Smaller
+/// changes are the noise of its steps (chosen).
+constexpr double min_change_of_scale = 0.01;
 
 struct StoredUnit {
   LengthUnit unit = LengthUnit::metres;
@@ -171,13 +174,11 @@ struct OrderedMap {
 };
 
 OrderedMap map_in_order(const MemoryFile& file, const VisualMemory& views,
-                        const std::map<std::string, Pose2>& odometry, double camera_height_m,
+                        const std::map<std::string, Pose2>& odometry,
                         const std::function<void()>& mapped) {
   const auto metric_steps = read_metric_steps(file);
   VisualMemory nodes(views.shape(), views.full_scale(), views.elevations());
-  VisualOdometryOptions options;
-  options.camera_height_m = camera_height_m;
-  TopologicalMapper mapper(nodes, {}, options);
+  TopologicalMapper mapper(nodes);
   std::optional<ViewId> before;
   std::optional<Pose2> last_odometry;  // of the last view that has one
   std::size_t views_since_odometry = 0;
@@ -233,24 +234,10 @@ void store_poses(MemoryFile& memory, const TopologicalMap& map) {
     }
     memory.set_pose(map.nodes[i].view, pose);
   }
-}
-
-void scale_routes(MemoryFile& memory, double factor) {
-  for (const std::string& name : memory.route_names()) {
-    const RoutePanorama route = memory.route(name).value();
-    RouteSource source = read_route_source(memory, name, route.columns());
-    if (!source.assumed_unit_m) continue;
-    source.assumed_unit_m.reset();
-    RoutePanorama scaled(route.columns());
-    for (std::size_t i = 0; i < route.size(); ++i) {
-      Pose2 pose = route.poses()[i];
-      pose.x_m *= factor;
-      pose.y_m *= factor;
-      static_cast<void>(scaled.append(pose, route.line(i)));
+  for (const ViewId view : memory.views()) {
+    if (!std::ranges::binary_search(map.nodes, view, {}, &TopologicalMap::Node::view)) {
+      memory.set_pose(view, std::nullopt);
     }
-    memory.remove_route(name);
-    static_cast<void>(memory.append_route(name, scaled));
-    store_route_source(memory, name, source);
   }
 }
 
@@ -266,6 +253,12 @@ LengthUnit read_length_unit(const MemoryFile& memory) {
 
 double read_assumed_unit_m(const MemoryFile& memory) {
   return read_stored_unit(memory).assumed_m;
+}
+
+void store_length_unit(MemoryFile& memory, LengthUnit unit, double assumed_unit_m) {
+  memory.set_parameter(unit_parameter, unit == LengthUnit::metres
+                                           ? metres_text
+                                           : view_steps_text + (" " + to_text(assumed_unit_m)));
 }
 
 bool has_positions_from_map(const MemoryFile& memory) {
@@ -323,7 +316,15 @@ std::optional<MemoryMap> describe_map(const MemoryFile& memory) {
 }
 
 void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit, double assumed_unit_m) {
-  if (unit == LengthUnit::view_steps) {
+  const auto before = memory.map(map_name);
+  const LengthUnit unit_before = read_length_unit(memory);
+  auto unit_ratio =
+      before && has_positions_from_map(memory) ? compare_lengths(*before, map) : std::nullopt;
+  if (unit == LengthUnit::view_steps && unit_before == LengthUnit::metres && unit_ratio) {
+    scale_lengths(map, 1.0 / *unit_ratio);
+    unit = LengthUnit::metres;
+    unit_ratio = 1.0;
+  } else if (unit == LengthUnit::view_steps) {
     if (const auto step = median_step_length(map)) {
       scale_lengths(map, 1.0 / *step);
       assumed_unit_m *= *step;
@@ -332,27 +333,29 @@ void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit, double a
   std::vector<Link> links;
   for (const TopologicalMap::Edge& edge : map.edges) links.push_back({edge.a, edge.b, edge.kind});
   memory.change([&] {
-    if (const auto before = memory.map(map_name)) unlink_edges(memory, *before, map);
+    if (before) unlink_edges(memory, *before, map);
     memory.link(links);
     memory.save_map(map_name, map);
     store_poses(memory, map);
-    memory.set_parameter(unit_parameter, unit == LengthUnit::metres
-                                             ? metres_text
-                                             : view_steps_text + (" " + to_text(assumed_unit_m)));
+    if (unit == LengthUnit::metres && unit_ratio &&
+        (unit_before == LengthUnit::view_steps ||
+         std::abs(*unit_ratio - 1.0) > min_change_of_scale)) {
+      scale_routes(memory, *unit_ratio);
+    }
+    store_length_unit(memory, unit, assumed_unit_m);
     learn_and_store_models(memory);
   });
 }
 
 std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::string, Pose2>& odometry,
-                                   Executor& executor, double camera_height_m,
-                                   const std::function<void()>& mapped) {
+                                   Executor& executor, const std::function<void()>& mapped) {
   const VisualMemory views = memory.load();
   const auto has_pose = [&](ViewId view) { return views.info(view).pose.has_value(); };
   if (views.size() < 2 || views.shape().components < 3 ||
       (!has_positions_from_map(memory) && std::ranges::any_of(views.views(), has_pose))) {
     return std::nullopt;
   }
-  OrderedMap ordered = map_in_order(memory, views, odometry, camera_height_m, mapped);
+  OrderedMap ordered = map_in_order(memory, views, odometry, mapped);
   if (!ordered.is_metric && !are_in_order(views)) {
     TopologicalMap arranged = to_topological_map(arrange(views, {}, {}, executor));
     if (std::ranges::max(count_nodes(arranged)) > std::ranges::max(count_nodes(ordered.map))) {
@@ -383,60 +386,6 @@ void remove_positions_from_map(MemoryFile& memory) {
     for (const ViewId view : memory.views()) memory.set_pose(view, std::nullopt);
     memory.set_parameter(unit_parameter, "");
   });
-}
-
-double scale_to_metres(MemoryFile& memory, ViewId a, ViewId b, double distance_m,
-                       const std::string& undo) {
-  require(std::isfinite(distance_m) && distance_m > 0.0, "distance_m", distance_m, "> 0");
-  if (!has_positions_from_map(memory)) {
-    throw ContractError(memory.path().string() +
-                        ": the positions come from a data set and are in metres; only a map of "
-                        "images is scaled");
-  }
-  const VisualMemory views = memory.load();
-  TopologicalMap map = memory.map(map_name).value_or(TopologicalMap{});
-  const auto find_node = [&](ViewId view) -> const TopologicalMap::Node& {
-    const auto found = std::ranges::lower_bound(map.nodes, view, {}, &TopologicalMap::Node::view);
-    if (found == map.nodes.end() || found->view != view) {
-      throw ContractError("view", static_cast<double>(view.value), "a view of the map");
-    }
-    return *found;
-  };
-  const TopologicalMap::Node& from = find_node(a);
-  const TopologicalMap::Node& to = find_node(b);
-  if (from.component != to.component) {
-    throw ContractError(views.info(a).name + " and " + views.info(b).name +
-                        " are in parts of the map that are not connected, so their distance is "
-                        "not known; choose two views of one part");
-  }
-  // A shorter distance is mostly the error of a single step. (chosen)
-  constexpr double min_distance_steps = 3.0;
-  const double known = distance(from.pose.position(), to.pose.position());
-  const double step = median_step_length(map).value_or(0.0);
-  if (!(known > 0.0) || known < min_distance_steps * step) {
-    throw ContractError(views.info(a).name + " and " + views.info(b).name + " are " +
-                        format_number(step > 0.0 ? known / step : 0.0, {}, 2) +
-                        " view steps apart in the map; choose two views that are far apart, at "
-                        "least 3 view steps");
-  }
-  const double factor = distance_m / known;
-  scale_lengths(map, factor);
-  memory.change(
-      [&] {
-        memory.save_map(map_name, map);
-        for (const ViewId view : views.views()) {
-          auto pose = views.info(view).pose;
-          if (!pose) continue;
-          pose->x_m *= factor;
-          pose->y_m *= factor;
-          memory.set_pose(view, pose);
-        }
-        scale_routes(memory, factor);
-        memory.set_parameter(unit_parameter, metres_text);
-        learn_and_store_models(memory);
-      },
-      undo);
-  return factor;
 }
 
 }  // namespace panonav

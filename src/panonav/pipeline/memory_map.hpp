@@ -35,6 +35,8 @@ enum class LengthUnit {
 /// algorithms choose distances: things around are 1.5 m away, or views of an arrangement 0.3 m
 /// apart. 1 for metres.
 [[nodiscard]] double read_assumed_unit_m(const MemoryFile& memory);
+/// Stores the unit of positions that come from a map. Throws FileError.
+void store_length_unit(MemoryFile& memory, LengthUnit unit, double assumed_unit_m = 1.0);
 /// True if the positions of the views were computed by a map, not read from a data set.
 [[nodiscard]] bool has_positions_from_map(const MemoryFile& memory);
 
@@ -61,9 +63,12 @@ struct MemoryMap {
 
 /// Stores a map as the memory's own in one transaction: the map, a link for each edge, the position
 /// of each node (`place_components_side_by_side`; none in parts of fewer than
-/// `ObservationModel::min_views`), the unit, and models learnt from them. A map in
-/// `view_steps` is scaled so that its median step has length 1; `assumed_unit_m`: see
-/// `read_assumed_unit_m`, for lengths before scaling. Throws FileError.
+/// `ObservationModel::min_views`), the unit, and models learnt from them. Other views lose their
+/// positions, which are in the frame of an earlier map. If the earlier map is in metres and shares
+/// views, a map in `view_steps` gets its scale (`compare_lengths`) and is stored in metres;
+/// otherwise it is scaled so that its median step has length 1. If a map in metres replaces one in
+/// view steps or of another scale, routes in the unit of the map are scaled, too. `assumed_unit_m`:
+/// see `read_assumed_unit_m`, for lengths before scaling. Throws FileError.
 void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit,
                double assumed_unit_m = 1.0);
 
@@ -71,27 +76,17 @@ void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit,
 /// ids
 /// (`TopologicalMapper`). Views in no order, where consecutive ones are not more similar than
 /// others, are arranged by similarity instead (`arrange`). Replaces an earlier map. Lengths are in
-/// metres if odometry is known, now or when the earlier map was made.
+/// metres if odometry is known or the earlier map is in metres.
 ///
-/// `odometry`: poses of views by name. `camera_height_m`: above level ground, gives metres; 0: not
-/// known. Calls `mapped` after each view. Returns nullopt and
+/// `odometry`: poses of views by name. Calls `mapped` after each view. Returns nullopt and
 /// changes nothing if a view has a position from a data set or there are fewer than two views.
 /// Stores no map if no part has `ObservationModel::min_views` views. Throws FileError. Cost: 0.5 to
 /// 10 ms a view.
 std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::string, Pose2>& odometry,
-                                   Executor& executor, double camera_height_m = 0.0,
-                                   const std::function<void()>& mapped = {});
+                                   Executor& executor, const std::function<void()>& mapped = {});
 
 /// Removes the map and the positions that came from it. Does nothing if positions come from a data
 /// set. Throws FileError.
 void remove_positions_from_map(MemoryFile& memory);
-
-/// Scales the map, the positions and the routes in view steps to metres, by the known distance
-/// between two views. Returns the metres per former unit. `undo` describes the change for `undo`.
-/// Throws ContractError if a view does not exist, the views are not connected in the map or less
-/// than three median steps apart, the distance is not above 0, or positions come from a data set;
-/// FileError.
-double scale_to_metres(MemoryFile& memory, ViewId a, ViewId b, double distance_m,
-                       const std::string& undo);
 
 }  // namespace panonav

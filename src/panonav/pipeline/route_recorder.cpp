@@ -33,7 +33,8 @@ RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& op
   RouteSource source{.line = options.line.value_or(HorizonScanlineOptions{}),
                      .horizon_rows = options.horizon_rows,
                      .from_odometry = options.odometry,
-                     .assumed_unit_m = options.assumed_unit_m};
+                     .assumed_unit_m = options.assumed_unit_m,
+                     .is_in_map_unit = options.is_in_map_unit};
   const auto known = file.route(options.name);
   if (!known) return source;
   const RouteSource before = read_route_source(file, options.name, known->columns());
@@ -49,6 +50,11 @@ RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& op
     throw ContractError(describe_route(file, options.name) + " is in " +
                         (before.assumed_unit_m ? "view steps" : "metres") +
                         ", these poses are in another unit; choose another name");
+  }
+  if (source.is_in_map_unit != before.is_in_map_unit && !source.assumed_unit_m) {
+    throw ContractError(describe_route(file, options.name) + " is in " +
+                        (before.is_in_map_unit ? "the unit of the map" : "metres of its drive") +
+                        ", these poses are not; choose another name");
   }
   if (source.from_odometry != before.from_odometry) {
     throw ContractError(describe_route(file, options.name) + " is in the frame of " +
@@ -165,6 +171,7 @@ DrivePoses find_poses_by_images(const Dataset& drive, const MemoryFile& memory,
       median_step);
   DrivePoses found = keep_posed_images(drive, poses, "show the motion from one to the next");
   found.origin = RoutePoseOrigin::images;
+  found.is_in_map_unit = !has_unit || has_positions_from_map(memory);
   if (!has_unit) {
     for (Pose2& pose : found.poses) {
       pose.x_m /= median_step;
@@ -188,7 +195,7 @@ DrivePoses find_drive_poses(const Dataset& drive, const MemoryFile& memory,
     const std::size_t count = posed.entries.size();
     auto poses = dataset_poses(posed);
     if (!poses.empty() && 2 * count >= images && 10 * count >= 9 * moved.entries.size()) {
-      return {std::move(posed), std::move(poses), RoutePoseOrigin::data_set, std::nullopt};
+      return {std::move(posed), std::move(poses), RoutePoseOrigin::data_set, std::nullopt, false};
     }
   }
   const bool has_enough = only_odometry ? moved.entries.size() >= std::min<std::size_t>(2, images)
@@ -196,7 +203,7 @@ DrivePoses find_drive_poses(const Dataset& drive, const MemoryFile& memory,
   if (has_enough && !moved.entries.empty()) {
     std::vector<Pose2> poses;
     for (const DatasetEntry& entry : moved.entries) poses.push_back(*entry.odometry);
-    return {std::move(moved), std::move(poses), RoutePoseOrigin::odometry, std::nullopt};
+    return {std::move(moved), std::move(poses), RoutePoseOrigin::odometry, std::nullopt, false};
   }
   if (only_odometry) {
     const std::string some = "has odometry for " + std::to_string(moved.entries.size()) + " of " +
@@ -209,6 +216,7 @@ DrivePoses find_drive_poses(const Dataset& drive, const MemoryFile& memory,
     DrivePoses found =
         keep_posed_images(drive, mapped, "are in the largest part of the memory's map");
     found.origin = RoutePoseOrigin::map;
+    found.is_in_map_unit = true;
     if (read_length_unit(memory) == LengthUnit::view_steps) {
       found.assumed_unit_m = read_assumed_unit_m(memory);
     }

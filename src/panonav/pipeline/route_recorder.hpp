@@ -33,6 +33,7 @@ struct RouteRecorderOptions {
   bool odometry = false;  ///< store the odometry's poses, even if observations have poses
   /// Of the poses, if they are in view steps (`RouteSource`); nullopt: poses are in metres.
   std::optional<double> assumed_unit_m;
+  bool is_in_map_unit = false;  ///< as in `RouteSource`
 };
 
 /// Source of the poses of a route.
@@ -49,6 +50,7 @@ struct DrivePoses {
   std::vector<Pose2> poses;                            ///< one for each image of `drive`
   RoutePoseOrigin origin = RoutePoseOrigin::data_set;  ///< where the poses come from
   std::optional<double> assumed_unit_m;                ///< as in `RouteRecorderOptions`
+  bool is_in_map_unit = false;                         ///< as in `RouteSource`
 };
 
 /// Finds the poses of a drive, in this order: of the data set (not with `only_odometry`), of its
