@@ -63,6 +63,36 @@ TEST_F(Memorise, PanoramasAreResampledToTheSizeAskedFor) {
   EXPECT_FALSE(fs::exists(folder_ / "o.panonav"));
 }
 
+TEST_F(Memorise, ARecordingOfAnotherSizeIsRefusedAsAWhole) {
+  run_well({"memorise", memory(), data()});
+  const std::string other = folder_ / "other";
+  fs::create_directory(other);
+  for (std::size_t i = 0; i < 3; ++i)
+    write_picture(other + "/small" + view_name(i), world_, {0.0, 0.0, 0.0}, 48, 6);
+  const std::vector<std::string> words{"memorise", memory(),          other, "--kind",
+                                       "panorama", "--elevation-deg", "-20", "20"};
+  const auto line = refusal(words);
+  EXPECT_TRUE(contains(line, "no image fits")) << line;
+  EXPECT_TRUE(contains(line, "size is 48 x 6; allowed: 96 x 12")) << line;
+  write_picture(other + "/small" + view_name(3), world_, {0.0, 0.0, 0.0}, 96, 12);
+  const auto result = run_panonav(words);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(contains(result.out, "1 view stored, 3 skipped")) << result.out;
+}
+
+TEST_F(Memorise, AnotherImageOfTheSameNameIsRefusedWithARemedy) {
+  run_well({"memorise", memory(), data()});
+  const std::string other = folder_ / "other";
+  write_dataset(other, landmark_world(77), grid_poses(2));
+  const auto line = refusal({"memorise", memory(), other});
+  EXPECT_TRUE(contains(line, "rename the images")) << line;
+  EXPECT_TRUE(contains(line, "merge both")) << line;
+  run_well({"memorise", folder_ / "other.panonav", other});
+  const std::string both = folder_ / "both.panonav";
+  (void)run_panonav({"merge", memory(), folder_ / "other.panonav", "-o", both});
+  EXPECT_EQ(info_of(both)["views"], 20);
+}
+
 TEST_F(Memorise, APictureOfAnotherSizeIsSkippedAndNamed) {
   for (const std::size_t odd : {std::size_t{0}, std::size_t{5}}) {
     const std::string memory = folder_ / ("odd" + std::to_string(odd) + ".panonav");
@@ -159,7 +189,7 @@ TEST_F(Memorise, OneDamagedPictureIsNamedAndSkipped) {
   write_picture(data() / view_name(5), world_, grid_poses(4)[5]);
   const auto again = run_panonav({"memorise", memory(), data()});
   ASSERT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_TRUE(contains(again.out, "1 view stored, 14 already in the memory, 1 could not be read"));
+  EXPECT_TRUE(contains(again.out, "1 view stored, 14 already in the memory, 1 skipped"));
   EXPECT_EQ(views_in(memory()), 15);
 
   expect_refusal({"memorise", folder_ / "s.panonav", data(), "--strict"},

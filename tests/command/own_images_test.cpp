@@ -78,12 +78,90 @@ TEST_F(OwnImages, LeadFromTheMemoryToTrackingRoutesAndMetres) {
                   .contains("length_m"));
 }
 
+TEST_F(OwnImages, ACorrectedScaleMovesRoutesOfTheMapAndUndoSaysTheUnit) {
+  memorise();
+  run_well({"route", "record", memory(), walk(), "--name", "early"});
+  const std::vector<std::string> scale{"scale", memory(), "--distance", view_name(0),
+                                       view_name(25)};
+  EXPECT_EQ(answer_of(with(scale, {"2m", "--json"}))["routes"], json({"early"}));
+  run_well({"route", "record", memory(), walk(), "--name", "late"});
+  const auto lengths = [&] {
+    std::vector<double> values;
+    const json info = answer_of({"info", memory(), "--json"});
+    for (const json& route : info["routes"]) values.push_back(route.at("length_m"));
+    return values;
+  };
+  const auto before = lengths();
+  ASSERT_EQ(before.size(), 2U);
+  run_well(with(scale, {"4m"}));
+  const auto after = lengths();
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(after[i], 2.0 * before[i], 1e-9);
+  EXPECT_EQ(answer_of({"undo", memory(), "--json"})["unit"], "m");
+  const std::string undone = run_panonav({"undo", memory()}).out;
+  EXPECT_TRUE(contains(undone, "positions in view steps")) << undone;
+}
+
+TEST_F(OwnImages, RoutesSayWhichFrameTheirPosesHave) {
+  memorise();
+  EXPECT_EQ(answer_of({"route", "record", memory(), walk(), "--name", "a", "--json"})["frame"],
+            "map");
+  for (const auto& entry : fs::directory_iterator(walk()))
+    fs::rename(entry.path(), entry.path().parent_path() / ("x" + entry.path().filename().string()));
+  const auto own = run_panonav({"route", "record", memory(), walk(), "--name", "b"});
+  EXPECT_TRUE(contains(own.out, "in a frame of its own")) << own.out << own.err;
+  const auto followed = run_panonav({"route", "follow", memory(), walk(), "--name", "b"});
+  EXPECT_TRUE(contains(followed.out, "in the route's own frame")) << followed.out;
+  const auto on_map = run_panonav({"route", "follow", memory(), walk(), "--name", "a"});
+  EXPECT_FALSE(contains(on_map.out, "in the route's own frame")) << on_map.out;
+}
+
+TEST_F(OwnImages, AMemoryWithoutPositionsSaysWhatItCanDo) {
+  memorise();
+  const auto verbs = answer_of({"info", memory(), "--json"})["verbs"];
+  const auto has = [](const json& list, const char* verb) {
+    return std::ranges::find(list, json(verb)) != list.end();
+  };
+  EXPECT_TRUE(has(verbs, "scale"));
+  EXPECT_TRUE(has(verbs, "track"));
+  const std::string far = folder / "far";
+  fs::create_directory(far);
+  for (std::size_t i = 0; i < 3; ++i)
+    write_picture(far + "/" + view_name(i), landmark_world(50 + i), {});
+  const std::string other = folder / "far.panonav";
+  run_well({"memorise", other, far, "--kind", "panorama", "--elevation-deg", "-20", "20"});
+  const auto fewer = answer_of({"info", other, "--json"})["verbs"];
+  EXPECT_FALSE(has(fewer, "scale"));
+  EXPECT_FALSE(has(fewer, "track"));
+  EXPECT_TRUE(contains(run_panonav({"info", other}).out, "positions   none"));
+  const std::string arranged = run_panonav({"arrange", other}).out;
+  EXPECT_TRUE(contains(arranged, "The views still have no positions")) << arranged;
+  EXPECT_TRUE(contains(arranged, "Next: panonav memorise " + other)) << arranged;
+}
+
+TEST_F(OwnImages, ViewsWithoutPositionInAMemoryOfADataSetAreNamed) {
+  const std::string grid = folder / "grid";
+  const std::string known = folder / "grid.panonav";
+  write_dataset(grid, world, grid_poses(3));
+  const auto first = run_panonav({"memorise", known, grid});
+  EXPECT_FALSE(contains(first.out, "no position")) << first.out;
+  for (const auto& entry : fs::directory_iterator(walk()))
+    fs::rename(entry.path(), entry.path().parent_path() / ("x" + entry.path().filename().string()));
+  const auto more = run_panonav(
+      {"memorise", known, walk(), "--kind", "panorama", "--elevation-deg", "-20", "20"});
+  EXPECT_EQ(more.exit_code, 0) << more.err;
+  EXPECT_TRUE(contains(more.out, "40 of 49 views have no position")) << more.out;
+}
+
 TEST_F(OwnImages, ScaleRefusesWhatMeansNothing) {
   memorise();
   expect_refusal({"scale", memory()}, "either --distance or --camera-height-m");
   expect_refusal({"scale", memory(), "--distance", view_name(0), view_name(9), "3.2ft"}, "3.2ft");
   expect_refusal({"scale", memory(), "--distance", view_name(0), "none.png", "1m"}, "none.png");
   expect_refusal({"scale", memory(), "--distance", view_name(0), view_name(0), "1m"}, "far apart");
+  const auto unseen = run_panonav({"scale", memory(), "--camera-height-m", "0.6"});
+  EXPECT_EQ(unseen.exit_code, 1) << "the images show no ground";
+  EXPECT_TRUE(contains(unseen.err, "use --distance VIEW VIEW LENGTH")) << unseen.err;
+  EXPECT_EQ(answer_of({"info", memory(), "--json"})["map"]["unit"], "view_steps");
   const std::string grid = folder / "grid";
   write_dataset(grid, world, grid_poses(3));
   run_well({"memorise", folder / "grid.panonav", grid});
@@ -197,7 +275,7 @@ TEST_F(OwnImages, EveryVerbSkipsUnusableImages) {
   };
   const auto stored = expect_skipped(with({"memorise", memory(), walk()}, layout));
   EXPECT_TRUE(contains(stored.out, "40 views stored")) << stored.out;
-  EXPECT_TRUE(contains(stored.out, "3 could not be read")) << stored.out;
+  EXPECT_TRUE(contains(stored.out, "3 skipped")) << stored.out;
   expect_skipped({"localise", memory(), walk()});
   expect_skipped({"track", memory(), walk()});
   expect_skipped({"route", "record", memory(), walk()});

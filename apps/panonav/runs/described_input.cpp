@@ -40,7 +40,7 @@ struct Takers {
 constexpr std::array<Takers, 10> takers{{
     {InputKind::memory,
      "list show gallery verify rename forget prune undo history copy export localise track home "
-     "serve ros2 map arrange memorise route_record route_follow merge synchronise navigate "
+     "serve ros2 map scale arrange memorise route_record route_follow merge synchronise navigate "
      "evaluate"},
     {InputKind::dataset,
      "memorise localise track home map route_record route_follow unwrap convert catchment"},

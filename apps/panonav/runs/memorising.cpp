@@ -1,5 +1,8 @@
 #include "runs/memorising.hpp"
 
+#include "panonav/core/number_text.hpp"
+#include "panonav/pipeline/memory_map.hpp"
+
 namespace panonav::command {
 
 void require_stored_options(const Arguments& declared, const SignatureOptions& signature,
@@ -21,6 +24,18 @@ void require_stored_options(const Arguments& declared, const SignatureOptions& s
       SignatureOptions{header.shape.rows, header.panorama_columns, header.shape.components},
       message_end);
   declared.require_same("preprocessing", preprocessing, header.preprocessing, message_end);
+}
+
+void print_views_without_position(const MemoryFile& memory, Session& session) {
+  const auto info = memory.info();
+  const std::uint64_t without = info.views - info.views_with_position;
+  if (without == 0 || info.views_with_position == 0 || has_positions_from_map(memory)) return;
+  session.print(session.red(std::to_string(without) + " of " + format_count(info.views, "view") +
+                            (without == 1 ? " has no position" : " have no position")) +
+                ": the other positions come from a data set, and " +
+                (without == 1 ? "this image" : "these images") +
+                " came without one. localise can name such a view, but gives no position near it; "
+                "track and drawn maps leave it out.");
 }
 
 }  // namespace panonav::command

@@ -11,4 +11,8 @@ namespace panonav::command {
 void require_stored_options(const Arguments& arguments, const SignatureOptions& signature,
                             const PreprocessingOptions& preprocessing, const MemoryFile& memory);
 
+/// Prints how many views have no position in a memory with positions of a data set, and what that
+/// means; prints nothing for other memories.
+void print_views_without_position(const MemoryFile& memory, Session& session);
+
 }  // namespace panonav::command

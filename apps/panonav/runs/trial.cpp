@@ -375,9 +375,10 @@ void add_image_findings(const Trial& trial, std::vector<std::string>& findings) 
     findings.push_back("The calibration of the camera that was found is in " +
                        trial.camera->string() + ".");
   }
-  if (trial.image_count > trial.queries.size() + trial.unread.size()) {
-    findings.push_back("Of " + format_count(trial.image_count, "image") + ", " +
-                       std::to_string(trial.queries.size()) + " at equal intervals were tried.");
+  const std::size_t tried = trial.queries.size();
+  if (tried > 0 && trial.image_count > tried + trial.unread.size()) {
+    findings.push_back(std::to_string(tried) + " of " + format_count(trial.image_count, "image") +
+                       ", at equal intervals, " + (tried == 1 ? "was" : "were") + " tried.");
   }
 }
 

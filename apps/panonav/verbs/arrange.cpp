@@ -92,6 +92,19 @@ ordered_json to_json(const ArrangeArguments& arguments, const Lattice& lattice,
   return json;
 }
 
+/// Prints what the lattice is for and, if the views have no positions, what makes some.
+void print_use(const ArrangeArguments& arguments, const MemoryFile& file, Session& session) {
+  if (!arguments.no_save) {
+    session.print("The lattice is stored for panonav navigate (--edges lattice).");
+  }
+  if (file.info().views_with_position > 0) return;
+  session.print(
+      "The views still have no positions, which localise and track use. panonav memorise makes a "
+      "map with positions if images are 20 to 50 cm apart; take images between those of " +
+      arguments.memory + " and add them:");
+  session.suggest({"panonav", "memorise", arguments.memory, "INPUT"});
+}
+
 void print_result(const Lattice& lattice, const VisualMemory& memory, Session& session) {
   session.print(session.bold(format_count(lattice.nodes.size(), "view")) + " arranged by " +
                 std::to_string(lattice.springs.size()) + " springs of " +
@@ -168,6 +181,7 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
     session.print(json_line(to_json(arguments, lattice, memory)));
   } else {
     print_result(lattice, memory, session);
+    print_use(arguments, file, session);
     if (arguments.files.picture && lattice.components.size() > 1) {
       session.print(*arguments.files.picture +
                     " shows the largest connected component of the map, " +
@@ -208,7 +222,8 @@ Verb arrange_verb() {
           "Compute positions of views from their similarity",
           "The views may be in any order. Poses in the memory are only used to measure the error "
           "of the result. If the views form several unconnected groups, each group is a separate "
-          "component. The result is stored in the memory as a map with the name 'lattice'.",
+          "component. The result is stored in the memory as a map with the name 'lattice', which "
+          "navigate uses; it does not change the positions of views (memorise makes them).",
           "  panonav arrange office.panonav --report arranged\n"
           "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
           declare_arrange};

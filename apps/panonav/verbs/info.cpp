@@ -6,7 +6,9 @@
 #include "panonav/core/address.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/observation_model.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/live_pictures.hpp"
@@ -61,11 +63,23 @@ std::vector<NamedRoute> list_routes(const MemoryFile& memory) {
   return routes;
 }
 
-/// Returns the verbs that take the memory: not those for routes or changes that it does not have.
+/// Returns the unit of a route's lengths, which may differ from that of the memory's positions.
+LengthUnit read_route_unit(const MemoryFile& memory, const std::string& name) {
+  const int columns = memory.route(name).value().columns();
+  return read_route_source(memory, name, columns).assumed_unit_m ? LengthUnit::view_steps
+                                                                 : LengthUnit::metres;
+}
+
+/// Returns the verbs that take the memory: not those for routes, changes, positions or a map that
+/// it does not have.
 std::vector<std::string> find_memory_verbs(const MemoryFile& memory) {
   std::vector<std::string> verbs = list_verbs_that_take(InputKind::memory);
   if (memory.route_names().empty()) std::erase(verbs, "route follow");
   if (memory.history().empty()) std::erase(verbs, "undo");
+  if (!has_positions_from_map(memory)) std::erase(verbs, "scale");
+  if (memory.info().views_with_heading < std::uint64_t{ObservationModel::min_views}) {
+    std::erase(verbs, "track");
+  }
   return verbs;
 }
 
@@ -98,7 +112,9 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
   json["verbs"] = find_memory_verbs(memory);
   auto routes = ordered_json::array();
   for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
-    routes.push_back({{"name", name}, {"lines", lines}, {"length_m", length_m}, {"bytes", bytes}});
+    const char* const length_key =
+        read_route_unit(memory, name) == LengthUnit::metres ? "length_m" : "length_steps";
+    routes.push_back({{"name", name}, {"lines", lines}, {length_key, length_m}, {"bytes", bytes}});
   }
   json["routes"] = std::move(routes);
   json["map"] = nullptr;
@@ -118,7 +134,7 @@ ExitCode print_memory(const std::string& path, Session& session) {
   const auto info = memory.info();
   session.set_length_unit(read_length_unit(memory));
   if (session.json()) {
-    session.print(session.json_line(to_json(memory, info)));
+    session.print(json_line(to_json(memory, info)));
     return ExitCode::done;
   }
   const auto& header = memory.header();
@@ -153,10 +169,13 @@ ExitCode print_memory(const std::string& path, Session& session) {
         (map->part_sizes.size() == 1 ? "" : " that are not connected") + ", positions in " +
         (map->unit == LengthUnit::metres ? "metres" : "view steps (panonav scale makes metres)"));
   }
+  if (info.views > 0 && info.views_with_position == 0) {
+    session.print(
+        "  positions   none: localise names the nearest view, but gives no position; panonav "
+        "memorise makes a map of images taken every 20 to 50 cm");
+  }
   for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
-    const int columns = memory.route(name).value().columns();
-    const bool is_in_steps = read_route_source(memory, name, columns).assumed_unit_m.has_value();
-    session.set_length_unit(is_in_steps ? LengthUnit::view_steps : LengthUnit::metres);
+    session.set_length_unit(read_route_unit(memory, name));
     session.print(
         "  route       " + name + ": " + format_count(lines, "line") + " over " +
         session.format_length(length_m, 1) + ", " +

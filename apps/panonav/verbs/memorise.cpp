@@ -84,6 +84,27 @@ void memorise_missing(const Dataset& missing, const Dataset& recording, bool str
   }
 }
 
+/// Throws FileError if no image of the recording fits the memory, for example as all have another
+/// size. Reads images up to the first that fits.
+void require_fitting_image(const Dataset& recording, const ViewEncoder& encoder) {
+  std::optional<std::string> misfit;
+  for (const DatasetEntry& entry : recording.entries) {
+    std::optional<Observation> observation;
+    try {
+      observation = read_observation(entry);
+    } catch (const Error&) {
+      continue;  // is named and skipped when it is memorised
+    }
+    try {
+      return encoder.require_fit(*observation);
+    } catch (const Error& error) {
+      if (!misfit) misfit = error.what();
+    }
+  }
+  if (!misfit) return;
+  throw FileError(recording.folder.string(), "no image fits the memory; the first one: " + *misfit);
+}
+
 MemoriserOptions make_options(const MemoriseArguments& arguments, const PictureSource& source,
                               std::vector<Skipped>& skipped, Session& session) {
   MemoriserOptions options{.source = source,
@@ -154,6 +175,7 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
                                          {"known_before", known_before},
                                          {"skipped", std::move(skipped_json)},
                                          {"views", info.views},
+                                         {"views_with_position", info.views_with_position},
                                          {"map", to_json(counts.map)},
                                          {"file_bytes", info.file_bytes}}));
     return;
@@ -161,7 +183,7 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
   session.print(
       session.bold(format_count(appended, "view")) + " stored" +
       (known_before > 0 ? ", " + std::to_string(known_before) + " already in the memory" : "") +
-      (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " could not be read") + "; " +
+      (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " skipped") + "; " +
       arguments.memory + " holds " + std::to_string(info.views));
   if (!memory.header().elevations) {
     session.print(
@@ -171,6 +193,7 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
   if (counts.map) {
     print_map(arguments.memory, *counts.map, has_positions_from_map(memory), session);
   }
+  print_views_without_position(memory, session);
   session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
 }
 
@@ -220,6 +243,7 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
                       make_options(arguments, recording.source, skipped, session));
   Dataset missing = recording;
   if (memory_existed) {
+    require_fitting_image(recording, *memoriser.encoder());
     Progress comparing(session, "comparing", recording.entries.size());
     std::function<void(const DatasetEntry&, const Error&)> unread;
     if (!arguments.strict) {

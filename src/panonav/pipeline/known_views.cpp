@@ -125,7 +125,9 @@ bool is_same_picture(const PackedSignature& a, const PackedSignature& b) {
 void throw_different_view(const std::filesystem::path& memory, const std::string& name,
                           const std::string& what) {
   throw FileError(memory.string(),
-                  "holds " + what + " " + name + "; names must be unique within a memory");
+                  "holds " + what + " " + name +
+                      "; names must be unique within a memory: rename the images, or memorise them "
+                      "into a memory of their own and merge both");
 }
 
 }  // namespace panonav
