@@ -179,6 +179,29 @@ TEST_F(Map, ARecordingWithoutPositionsCanBeMappedAgain) {
   const auto again = answer_of(line);
   EXPECT_EQ(again["nodes"], first["nodes"]);
   EXPECT_EQ(again["closures"], first["closures"]);
+  EXPECT_EQ(again["unit"], "view_steps");
+  run_well({"scale", memory(), "--distance", view_name(0), view_name(10), "2m"});
+  const auto position = [&] {
+    const auto pose = answer_of({"show", memory(), view_name(10), "--json"})["pose"];
+    return std::hypot(pose["x_m"].get<double>(), pose["y_m"].get<double>());
+  };
+  const double before_m = position();
+  EXPECT_EQ(answer_of(line)["unit"], "m");
+  EXPECT_NEAR(position(), before_m, 1e-6) << "the scale is kept";
+
+  const std::string report = folder_ / "report";
+  run_well({"map", folder_ / "steps.panonav", folder_ / "run", "--kind", "panorama",
+            "--elevation-deg", "-30", "40", "--report", report});
+  const nlohmann::json run = panels_of(bytes_of(report + "/index.html")).front().data;
+  EXPECT_EQ(run["retained"]["unit"], "view steps");
+
+  fs::create_directory(folder_.path() / "more");
+  for (int i = 0; i < 12; ++i) {
+    write_picture(folder_.path() / "more" / ("more" + view_name(i)), landmark_world(3),
+                  round_trip()[i]);
+  }
+  run_well({"memorise", memory(), folder_ / "more"});
+  expect_refusal(line, "use panonav memorise");
 }
 
 TEST_F(Map, WrongUseIsRefused) {
@@ -208,6 +231,25 @@ TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
   EXPECT_NEAR(scale_with(folder / "ground.panonav", {"--camera-height-m", "0.6"}), 1.0, 0.2);
   expect_refusal({"map", folder / "wheels.panonav", run, "--camera-height-m", "0.6"}, "odometry");
   EXPECT_LT(scale_with(folder / "guess.panonav", {}), 0.7) << "guard: the guess is wrong";
+}
+
+TEST(MapOfADrive, TheHeightOfTheCameraScalesAMapOfImages) {
+  const TemporaryFolder folder;
+  const fs::path run = folder.path() / "run";
+  const std::string memory = folder / "m.panonav";
+  run_well({"simulate", "loop", run, "--path", "tour", "--heading", "path", "--spacing-m", "0.2",
+            "--kind", "panorama", "--columns", "256"});
+  for (const char* table : {"dataset.toml", "poses.csv"}) fs::remove(run / table);
+  run_well({"memorise", memory, run, "--kind", "panorama", "--elevation-deg", "-30", "40"});
+  const auto step_at_height = [&](const char* height_m) {
+    return answer_of({"scale", memory, "--camera-height-m", height_m, "--json"})["view_step_m"]
+        .get<double>();
+  };
+  const double step_m = step_at_height("0.6");
+  EXPECT_NEAR(step_m, 0.2, 0.04) << "narrow rooms make lengths up to 15 % too long";
+  EXPECT_NEAR(step_at_height("1.2"), 2.0 * step_m, 0.02 * step_m) << "a corrected height";
+  EXPECT_EQ(answer_of({"undo", memory, "--json"})["unit"], "m");
+  EXPECT_EQ(answer_of({"undo", memory, "--json"})["unit"], "view_steps");
 }
 
 }  // namespace

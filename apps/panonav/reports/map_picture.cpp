@@ -11,6 +11,7 @@
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
 #include "panonav_viewer/report_page.hpp"
+#include "runs/shown_map.hpp"
 
 namespace panonav::command {
 
@@ -78,12 +79,15 @@ std::optional<RecordedMapComparison> compare_with_ground_truth(const Dataset& re
 }
 
 viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
-  const ComponentNodes nodes = collect_nodes(recording, run);
-  viewer::MapPlot plot{.title = "Map", .layers = {}};
+  Mapper::Result shown = run;
+  shown.map = to_shown_lengths(run.map, run.unit);
+  const ComponentNodes nodes = collect_nodes(recording, shown);
+  viewer::MapPlot plot{.title = "Map", .layers = {}, .unit = to_string(run.unit)};
   std::vector<Point2> map = nodes.map;
   if (is_comparable(nodes.map, nodes.truth)) {
     map = apply_alignment(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
     plot.title = "Map and ground truth";
+    plot.unit = to_string(LengthUnit::metres);
     plot.layers.push_back(
         {.label = "ground truth", .colour = viewer::PlotColour::black, .lines = {nodes.truth}});
     if (is_comparable(nodes.odometry, nodes.truth)) {

@@ -24,8 +24,20 @@ void add_component(recordings::RunMoment& moment, const TopologicalMap& map, std
   }
 }
 
-void GrowingMap::add_to(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
-                        const std::string& name) {
+TopologicalMap to_shown_lengths(TopologicalMap map, LengthUnit unit) {
+  const auto step = median_step_length(map);
+  if (unit == LengthUnit::view_steps && step) scale_lengths(map, 1.0 / *step);
+  return map;
+}
+
+void set_unit(recordings::RunMoment& moment, LengthUnit unit) {
+  moment.length_unit = to_string(unit);
+}
+
+void GrowingMap::add_to(recordings::RunMoment& moment, const TopologicalMap& grown, LengthUnit unit,
+                        bool is_node, const std::string& name) {
+  const TopologicalMap map = to_shown_lengths(grown, unit);
+  set_unit(moment, unit);
   truth_ = moment.truth;
   last_is_node_ = is_node;
   if (is_node) {
@@ -41,7 +53,7 @@ void GrowingMap::add_to(recordings::RunMoment& moment, const TopologicalMap& map
   if (map.nodes.empty()) return;
   if (closures > shown_closure_count_) moment.values.emplace_back("event", "a loop is closed");
   const std::size_t component = map.nodes.back().component;
-  transform_to_component(moment, map, component);
+  transform_to_component(moment, map, unit, component);
   if (closures == shown_closure_count_ &&
       map.nodes.size() <= shown_node_count_ + shown_node_count_ / 20)
     return;
@@ -50,24 +62,29 @@ void GrowingMap::add_to(recordings::RunMoment& moment, const TopologicalMap& map
   add_component(moment, map, component, names_);
 }
 
-void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& map) const {
-  if (map.nodes.empty()) return;
+void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& finished,
+                        LengthUnit unit) const {
+  if (finished.nodes.empty()) return;
+  const TopologicalMap map = to_shown_lengths(finished, unit);
+  set_unit(moment, unit);
   const std::size_t component = find_largest_component(map);
   moment.truth = truth_;
-  transform_to_component(moment, map, component);
+  transform_to_component(moment, map, unit, component);
   moment.values.emplace_back("event", "the map is finished");
   add_component(moment, map, component, names_);
 }
 
 void GrowingMap::transform_to_component(recordings::RunMoment& moment, const TopologicalMap& map,
-                                        std::size_t component) const {
+                                        LengthUnit unit, std::size_t component) const {
   moment.pose.reset();
   if (last_is_node_ && map.nodes.back().component == component) {
     moment.pose = map.nodes.back().pose;
   }
   const auto first = std::ranges::find(map.nodes, component, &TopologicalMap::Node::component);
   const auto& anchor = truths_[static_cast<std::size_t>(first - map.nodes.begin())];
-  if (!moment.truth || !moment.truth->heading_rad || !anchor || !anchor->heading_rad) {
+  // A true pose is in metres, which a map in view steps does not have.
+  if (unit != LengthUnit::metres || !moment.truth || !moment.truth->heading_rad || !anchor ||
+      !anchor->heading_rad) {
     moment.truth.reset();
     return;
   }

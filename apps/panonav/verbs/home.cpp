@@ -3,6 +3,7 @@
 
 #include "cli/verbs.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav/pipeline/view_list.hpp"
@@ -141,7 +142,10 @@ ExitCode home_from_memory(const Arguments& declared, const HomeArguments& argume
                           make_homing_options(declared, arguments.homing, components), components,
                           arguments.homing.views.horizon);
   reject_unused_rise_flags(declared, guide.goal(), *arguments.memory);
-  const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
+  // A position by a map is in another frame than the positions of the recording.
+  const auto pose =
+      has_positions_from_map(file) ? std::nullopt : file.load({&view, 1}).info(view).pose;
+  const Goal goal{guide.goal_name(), pose, guide.goal(),
                   arguments.report ? panorama_from_thumbnail(file, view) : std::nullopt};
   return answer_all(arguments, guide, goal, recording, session);
 }

@@ -2,6 +2,8 @@
 #include <array>
 #include <filesystem>
 #include <map>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "cli/verbs.hpp"
@@ -11,6 +13,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/view_list.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "reports/map_measures.hpp"
 #include "reports/map_picture.hpp"
@@ -120,6 +123,9 @@ void print_unit(const MapArguments& arguments, const Mapper::Result& run, Sessio
   } else if (run.unit == LengthUnit::metres && arguments.mapper.is_scale_known) {
     session.print("Lengths are computed from the images: one unit is " +
                   format_number(arguments.mapper.odometry.scale_m) + " m (--scale-m).");
+  } else if (run.is_former_scale) {
+    session.print("Lengths are in metres, by the scale of the earlier map of " + arguments.memory +
+                  ".");
   } else if (run.unit == LengthUnit::metres) {
     session.print(
         "Lengths are those of the odometry; of images without odometry they are computed from the "
@@ -127,12 +133,11 @@ void print_unit(const MapArguments& arguments, const Mapper::Result& run, Sessio
   } else if (has_positions_from_map(MemoryFile::open(arguments.memory, Access::read_only))) {
     session.print(
         "Lengths are in view steps (median distance between consecutive views). For metres: "
-        "panonav "
-        "scale " +
+        "panonav scale " +
         arguments.memory + " --distance VIEW VIEW LENGTH");
   } else {
     session.print(
-        "The scale of the map is not known (--scale-m, --camera-height-m); the views have the "
+        "The scale of the map is not known (--scale-m, --camera-height-m); it does not change the "
         "positions of the data set.");
   }
 }
@@ -175,6 +180,7 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
                                     : "the map"));
   }
   session.print(arguments.memory + " contains the map and the views of its places.");
+  print_views_without_position(MemoryFile::open(arguments.memory, Access::read_only), session);
   if (arguments.files.tum) {
     session.print(*arguments.files.tum + " contains the poses" +
                   (sizes.size() > 1 ? " of the largest connected component." : "."));
@@ -230,7 +236,8 @@ Mapper::Result map_with_viewers(const MapArguments& arguments, const Dataset& re
         const bool is_node = mapper.add(std::move(encoded.view));
         clock.stage("mapping");
         clock.add_to(encoded.moment);
-        shown.add_to(encoded.moment, mapper.current_map(), is_node, encoded.name);
+        shown.add_to(encoded.moment, mapper.current_map(), mapper.current_unit(), is_node,
+                     encoded.name);
         pending = std::move(encoded.moment);
         progress.advance();
       },
@@ -242,7 +249,7 @@ Mapper::Result map_with_viewers(const MapArguments& arguments, const Dataset& re
       });
   Mapper::Result run = mapper.finish();
   if (pending) {
-    shown.finish(*pending, run.map);
+    shown.finish(*pending, run.map, run.unit);
     record.add(std::move(*pending));
   }
   record.close();
@@ -270,10 +277,14 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
                 const ViewEncoder& encoder, viewer::RunPage& replay_page, Session& session) {
   RunRecord record({.file = arguments.record.file, .view = std::nullopt},
                    std::array{arguments.dataset, arguments.memory}, false, session, {});
-  const std::size_t component = find_largest_component(run.map);
+  if (arguments.record.file && run.unit != LengthUnit::metres && !session.json()) {
+    session.print("Positions in " + *arguments.record.file + " are in view steps, not in metres.");
+  }
+  const TopologicalMap map = to_shown_lengths(run.map, run.unit);
+  const std::size_t component = find_largest_component(map);
   std::map<std::size_t, std::size_t> nodes;  // index of the node by index of its image
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     nodes[run.observations[i]] = i;
     names.push_back(recording.entries[run.observations[i]].file);
   }
@@ -291,15 +302,16 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
         const auto node = nodes.find(i);
         moment.state = node == nodes.end() ? "between places" : "place of the map";
         moment.sure = node != nodes.end();
-        if (moment.sure && run.map.nodes[node->second].component == component) {
-          moment.pose = run.map.nodes[node->second].pose;
+        set_unit(moment, run.unit);
+        if (moment.sure && map.nodes[node->second].component == component) {
+          moment.pose = map.nodes[node->second].pose;
         }
-        if (std::exchange(is_first, false)) add_component(moment, run.map, component, names);
+        if (std::exchange(is_first, false)) add_component(moment, map, component, names);
         if (arguments.report) {
           recordings::RunMoment shown = moment;
           shown.truth.reset();  // its frame differs from the map's
           shown.values =
-              describe_place(run.map, recording.entries[i].file,
+              describe_place(map, recording.entries[i].file,
                              node == nodes.end() ? std::nullopt : std::optional(node->second));
           replay_page.add(shown);
         }
@@ -340,6 +352,28 @@ void reject_options_without_effect(const Arguments& declared, const MapArguments
   }
 }
 
+/// Throws FileError if a new map would take positions by an earlier map from views that are not
+/// images of the recording.
+void require_positions_of_recording(const MapArguments& arguments, const Dataset& recording,
+                                    const MemoryFile& memory) {
+  if (!has_positions_from_map(memory)) return;
+  std::set<std::string> images;
+  for (const DatasetEntry& entry : recording.entries) images.insert(entry.file);
+  std::size_t others = 0;
+  std::string first;
+  for (const ViewRecord& view : list_views(memory)) {
+    if (!view.info.pose || images.contains(view.info.name)) continue;
+    if (others++ == 0) first = view.info.name;
+  }
+  if (others == 0) return;
+  throw FileError(arguments.memory,
+                  "has a map with positions of " + format_count(others, "view") + " not in " +
+                      arguments.dataset + ", such as " + first +
+                      ", which a new map would remove; to map all views, use panonav memorise " +
+                      arguments.memory + " " + arguments.dataset +
+                      "; allowed for panonav map: another memory, or after panonav forget");
+}
+
 ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& session) {
   if (arguments.report) prepare_report_folder(*arguments.report, "map");
   const bool memory_existed = memory_exists(arguments.memory);
@@ -351,6 +385,7 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
   if (memory) {
     require_stored_options(declared, arguments.signature, memory->header().preprocessing, *memory);
     reject_options_without_effect(declared, arguments, recording, memory->header());
+    require_positions_of_recording(arguments, recording, *memory);
   } else {
     const MemoryHeader header =
         make_header_from_recording(recording, arguments.signature, {}, session.executor());
