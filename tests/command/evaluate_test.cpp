@@ -100,6 +100,60 @@ TEST_F(Evaluate, PosesWithoutStampsArePairedByTheirOrder) {
                  "number of estimated poses is 2; allowed: 8");
 }
 
+TEST_F(Evaluate, ViewStepsAreNotComparedWithMetres) {
+  write("truth.tum", lines_of(tum));
+  write("steps.tum", "# unit: view steps\n" + lines_of([](int i, double x, double y) {
+                       return tum(i, 4.0 * x, 4.0 * y);
+                     }));
+  const std::vector<std::string> call{"evaluate", folder_ / "steps.tum", folder_ / "truth.tum"};
+  const auto said = answer_of(with(call, {"--json"}));
+  EXPECT_EQ(said["alignment"]["kind"], "similarity");
+  EXPECT_NEAR(said["alignment"]["scale"], 0.25, 1e-9);
+  EXPECT_NEAR(said["ate_m"]["rmse"], 0.0, 1e-9);
+  EXPECT_TRUE(contains(run_panonav(call).err, "view steps"));
+  for (const char* align : {"rigid", "none"}) {
+    expect_refusal(with(call, {"--align", align}), "allowed: similarity");
+  }
+  const std::vector<std::string> both{"evaluate", folder_ / "steps.tum", folder_ / "steps.tum"};
+  EXPECT_TRUE(contains(run_panonav(both).out, "ATE [view steps]"));
+  EXPECT_TRUE(answer_of(with(both, {"--json"})).contains("ate_steps"));
+}
+
+TEST_F(Evaluate, ImageNumbersAreNoStamps) {
+  write("numbers.tum", "# stamps: image numbers\n" + lines_of([](int i, double x, double y) {
+                         return i == 3 ? "" : tum(i, x, y);
+                       }));
+  write("poses.csv", "file,x_m,y_m,heading_deg\n" + lines_of([](int i, double x, double y) {
+                       return std::to_string(i) + ".png," + std::to_string(x) + "," +
+                              std::to_string(y) + ",0\n";
+                     }));
+  const std::vector<std::string> call{"evaluate", folder_ / "numbers.tum", folder_ / "poses.csv"};
+  const auto said = answer_of(with(call, {"--json"}));
+  EXPECT_EQ(said["paired_by"], "image_number");
+  EXPECT_EQ(said["pairs"], 7);
+  EXPECT_NEAR(said["ate_m"]["rmse"], 0.0, 1e-9);
+  // The stamps 0 to 7 of the truth are seconds, not numbers of images.
+  write("truth.tum", lines_of(tum));
+  expect_refusal({"evaluate", folder_ / "numbers.tum", folder_ / "truth.tum"},
+                 "number of estimated poses is 7; allowed: 8");
+}
+
+TEST_F(Evaluate, PositionsSufficeForTheAte) {
+  write("estimate.tum", lines_of(tum));
+  write("truth.csv", "stamp_s,x_m,y_m\n" + lines_of([](int i, double x, double y) {
+                       return std::to_string(i) + "," + std::to_string(x) + "," +
+                              std::to_string(y + 1) + "\n";
+                     }));
+  const std::vector<std::string> call{"evaluate", folder_ / "estimate.tum", folder_ / "truth.csv"};
+  const auto said = answer_of(with(call, {"--json"}));
+  EXPECT_NEAR(said["ate_m"]["rmse"], 0.0, 1e-9);
+  EXPECT_TRUE(said["rotation_rad"].is_null());
+  EXPECT_TRUE(said["rpe_m"].is_null());
+  const auto text = run_panonav(call).out;
+  EXPECT_TRUE(contains(text, "no headings"));
+  EXPECT_FALSE(contains(text, "rotation [degrees]"));
+}
+
 TEST_F(Evaluate, NoCommonTimeIsNoAnswer) {
   write("truth.tum", lines_of(tum));
   write("later.tum", lines_of([](int i, double x, double y) { return tum(i + 1000, x, y); }));
@@ -107,6 +161,14 @@ TEST_F(Evaluate, NoCommonTimeIsNoAnswer) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(lines(result.err).size(), 1U) << result.err;
   EXPECT_TRUE(contains(result.err, "later.tum"));
+  EXPECT_TRUE(contains(result.err, "--max-stamp-difference-s"));
+  EXPECT_TRUE(contains(result.err, "estimate are 1000 to 1007, those of the truth 0 to 7"));
+  write("half.tum",
+        lines_of([](int i, double x, double y) { return tum(i < 4 ? i : i + 1000, x, y); }));
+  const auto half = run_panonav({"evaluate", folder_ / "half.tum", folder_ / "truth.tum"});
+  EXPECT_TRUE(contains(half.out,
+                       "4 without ground truth within 0.01 s "
+                       "(--max-stamp-difference-s)"));
 }
 
 TEST_F(Evaluate, BrokenFilesAreNamedWithLineAndField) {

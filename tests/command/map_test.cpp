@@ -53,6 +53,8 @@ TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
   }
   EXPECT_EQ(said["nodes"], 100);
   EXPECT_EQ(said["wheels"], false);
+  EXPECT_EQ(contains(bytes_of(folder_ / "m.tum"), "# unit: view steps\n"),
+            said["unit"] == "view_steps");
   std::ifstream tum(folder_ / "m.tum");
   std::size_t lines = 0;
   for (std::string line; std::getline(tum, line);) lines += line.empty() || line[0] == '#' ? 0 : 1;
@@ -231,6 +233,13 @@ TEST(MapOfADrive, TheHeightOfTheCameraTellsMetres) {
   EXPECT_NEAR(scale_with(folder / "ground.panonav", {"--camera-height-m", "0.6"}), 1.0, 0.2);
   expect_refusal({"map", folder / "wheels.panonav", run, "--camera-height-m", "0.6"}, "odometry");
   EXPECT_LT(scale_with(folder / "guess.panonav", {}), 0.7) << "guard: the guess is wrong";
+  // Beside positions in metres, the map keeps its own unit.
+  run_well({"map", folder / "steps.panonav", run, "--wheels", "false"});
+  for (const auto& [memory, kind] :
+       {std::pair{"ground.panonav", "rigid"}, std::pair{"steps.panonav", "similarity"}}) {
+    const json errors = answer_of({"evaluate", folder / memory, run + "/poses.csv", "--json"});
+    EXPECT_EQ(errors["alignment"]["kind"], kind) << memory;
+  }
 }
 
 TEST(MapOfADrive, TheHeightOfTheCameraScalesAMapOfImages) {

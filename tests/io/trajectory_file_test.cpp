@@ -62,7 +62,7 @@ class TrajectoryFormats : public InTemporaryFolder {
 TEST_F(TrajectoryFormats, TumKeepsHeightAndTilt) {
   const auto file = read("# stamp\n1.5 1 2 3 0.5 0.5 0.5 0.5\n2 1 2 3 0 0 0 -1\n");
   EXPECT_EQ(file.format, "TUM");
-  EXPECT_TRUE(file.has_stamps);
+  EXPECT_EQ(file.units, TrajectoryUnits{});
   ASSERT_EQ(file.poses.size(), 2U);
   EXPECT_EQ(file.poses[0], (StampedPose3{1.5, {{1, 2, 3}, {0.5, 0.5, 0.5, 0.5}}}));
   EXPECT_EQ(read_trajectory(folder / "poses")[0].pose.position(), (Point2{1, 2}));
@@ -71,7 +71,7 @@ TEST_F(TrajectoryFormats, TumKeepsHeightAndTilt) {
 TEST_F(TrajectoryFormats, KittiHasTheRowsOfAMatrixAndNoStamps) {
   const auto file = read("1 0 0 0 0 1 0 0 0 0 1 0\n0 0 1 4 -1 0 0 5.5e0 0 -1 0 6\n");
   EXPECT_EQ(file.format, "KITTI");
-  EXPECT_FALSE(file.has_stamps);
+  EXPECT_EQ(file.units.times, TrajectoryUnits::Times::none);
   ASSERT_EQ(file.poses.size(), 2U);
   EXPECT_EQ(file.poses[1].stamp_s, 1.0);
   EXPECT_EQ(file.poses[1].pose.position, (Point3{4, 5.5, 6}));
@@ -116,7 +116,48 @@ TEST_F(TrajectoryFormats, OthersAreRefusedWithWhatIsAllowed) {
     EXPECT_TRUE(contains(line, "KITTI") && contains(line, "EuRoC")) << line;
   }
   EXPECT_TRUE(contains(refusal("0 1 2 1e9 0 0 0 1\n"), "line 1: z is 1e+09"));
-  EXPECT_TRUE(contains(refusal("file,x_m,y_m\na.png,0,1\n"), "has no column"));
+  EXPECT_TRUE(contains(refusal("file,x_m,heading_deg\na.png,0,1\n"), "has no column 'y_m'"));
+}
+
+TEST_F(TrajectoryFormats, UnitsAreWrittenAndReadBack) {
+  using Times = TrajectoryUnits::Times;
+  const std::vector<StampedPose> poses{{0.0, {1, 2, 0.5}}, {3.0, {2, 2, 0.5}}};
+  for (const TrajectoryUnits units :
+       {TrajectoryUnits{}, TrajectoryUnits{Times::stamps, false},
+        TrajectoryUnits{Times::image_numbers, true}, TrajectoryUnits{Times::none, false}}) {
+    for (const char* name : {"units.tum", "units.csv"}) {
+      write_trajectory(folder / name, poses, units);
+      const auto file = read_trajectory_file(folder / name);
+      EXPECT_EQ(file.units, units) << name;
+      ASSERT_EQ(file.poses.size(), 2U);
+      EXPECT_EQ(file.poses[1].pose.position, (Point3{2, 2, 0}));
+      if (units.times == Times::image_numbers) {
+        EXPECT_EQ(file.poses[1].stamp_s, 3.0);
+      }
+      if (units == TrajectoryUnits{}) continue;
+      const auto line = message_of<FileError>([&] { (void)read_trajectory(folder / name); });
+      EXPECT_TRUE(contains(line, units.times == Times::stamps ? "view steps" : "stamps")) << line;
+    }
+  }
+}
+
+TEST_F(TrajectoryFormats, PositionsNeedNoHeadings) {
+  const auto table = read("stamp_s,x_m,y_m\n0,1,2\n1,3,4\n");
+  EXPECT_FALSE(table.has_rotations);
+  EXPECT_EQ(table.poses.at(1).pose, (Pose3{{3, 4, 0}, {}}));
+  EXPECT_TRUE(contains(message_of<FileError>([&] { (void)read_trajectory(folder / "poses"); }),
+                       "has no headings"));
+  // One missing heading leaves out all, and a row without a position is left out.
+  const auto some = read("file,x_m,y_m,heading_deg\na,1,2,90\nb,,,\nc,3,4,\n");
+  EXPECT_FALSE(some.has_rotations);
+  EXPECT_EQ(some.units.times, TrajectoryUnits::Times::image_numbers);
+  ASSERT_EQ(some.poses.size(), 2U);
+  EXPECT_EQ(some.poses[0].pose.rotation, Rotation3{});
+  EXPECT_EQ(some.poses[1].stamp_s, 2.0);
+  const auto leica = read("#timestamp [ns], x [m], y, z\n1403636580838555648,4.6,-1.7,0.7\n");
+  EXPECT_EQ(leica.format, "positions");
+  EXPECT_NEAR(leica.poses.at(0).stamp_s, 1403636580.838555648, 1e-6);
+  EXPECT_EQ(read("1.5 1 2 3\n").poses.at(0), (StampedPose3{1.5, {{1, 2, 3}, {}}}));
 }
 
 }  // namespace

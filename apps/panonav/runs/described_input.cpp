@@ -318,17 +318,19 @@ DescribedInput describe_toml(const std::string& file) {
 }
 
 DescribedInput describe_trajectory(const std::string& file) {
-  const auto [format, has_stamps, poses, repeated] = read_trajectory_file(file);
+  const TrajectoryFile trajectory = read_trajectory_file(file);
+  const auto& [format, units, poses, repeated, has_rotations, is_estimate] = trajectory;
   double length_m = 0.0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     length_m += distance(poses[i - 1].pose.position, poses[i].pose.position);
   }
   std::string summary = format_count(poses.size(), "pose") + " (" + format + " format)";
+  if (!has_rotations) summary += " without headings";
   summary +=
-      has_stamps
+      units.times == TrajectoryUnits::Times::stamps
           ? " in " + format_number(poses.back().stamp_s - poses.front().stamp_s, {}, 4) + " s"
           : " without stamps";
-  summary += " over " + format_number(length_m, "m", 4) + " m";
+  summary += " over " + format_number(length_m, "m", 4) + (units.is_metric ? " m" : " view steps");
   return {.type = "trajectory",
           .summary = summary,
           .bytes = find_file_bytes(file),

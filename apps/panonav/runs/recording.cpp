@@ -378,8 +378,9 @@ std::vector<double> trajectory_stamps(const Dataset& run, const std::string& ver
                                       Session& session) {
   std::vector<double> seconds;
   std::vector<StampedPose> trajectory;
+  const bool has_stamps = find_known_fields(run).stamps;
   for (std::size_t i = 0; i < run.entries.size(); ++i) {
-    seconds.push_back(run.entries[i].stamp_s.value_or(static_cast<double>(i)));
+    seconds.push_back(has_stamps ? *run.entries[i].stamp_s : static_cast<double>(i));
     append_pose(trajectory, {seconds[i], {}}, dataset, run.entries[i].file);
   }
   if (trajectory.size() < seconds.size()) {
@@ -387,11 +388,18 @@ std::vector<double> trajectory_stamps(const Dataset& run, const std::string& ver
                  " of " + format_count(seconds.size(), "image") +
                  " have the stamp of the image before; " + tum + " gets one of each stamp");
   }
-  if (!run.entries.front().stamp_s) {
-    session.note("panonav " + verb + ": " + dataset + " has no column 'stamp_s'; the seconds in " +
-                 tum + " count images from 0");
+  if (!has_stamps) {
+    session.note("panonav " + verb + ": " + dataset +
+                 " has no column 'stamp_s'; instead of stamps, " + tum +
+                 " has image numbers from 0");
   }
   return seconds;
+}
+
+TrajectoryUnits find_trajectory_units(const Dataset& run, LengthUnit lengths) {
+  using Times = TrajectoryUnits::Times;
+  return {.times = find_known_fields(run).stamps ? Times::stamps : Times::image_numbers,
+          .is_metric = lengths == LengthUnit::metres};
 }
 
 bool can_have_table(const std::string& input) {

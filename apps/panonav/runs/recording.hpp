@@ -11,7 +11,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/dataset_readers.hpp"
-#include "panonav/motion/trajectory.hpp"
+#include "panonav/io/trajectory_file.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -126,12 +126,14 @@ void require_stored_band(const PictureArguments& pictures, const MemoryFile& mem
 void append_pose(std::vector<StampedPose>& trajectory, const StampedPose& pose,
                  const std::string& dataset, const std::string& file);
 
-/// Returns the stamp of each entry in seconds for a trajectory file. Entries without stamps get
-/// their index; the session prints a note on these, and on stamps that repeat. Throws FileError if
-/// stamps decrease.
+/// Returns the stamp of each entry in seconds for a trajectory file. Unless all entries have
+/// stamps, they get their index; the session prints a note on this, and on stamps that repeat.
+/// Throws FileError if stamps decrease.
 [[nodiscard]] std::vector<double> trajectory_stamps(const Dataset& run, const std::string& verb,
                                                     const std::string& dataset,
                                                     const std::string& tum, Session& session);
+/// Returns the units of a trajectory with the stamps of `trajectory_stamps`.
+[[nodiscard]] TrajectoryUnits find_trajectory_units(const Dataset& run, LengthUnit lengths);
 
 /// True for data sets and folders of images, whose poses a table gives; false for recordings of
 /// topics and videos.

@@ -151,6 +151,13 @@ VisualMemory load_with_true_poses(const MemoryFile& file) {
   return memory;
 }
 
+void write_poses(const std::string& file, const Lattice& lattice, const VisualMemory& memory) {
+  using Times = TrajectoryUnits::Times;
+  write_trajectory(file, make_trajectory(lattice, memory),
+                   {.times = has_stamps(lattice, memory) ? Times::stamps : Times::none,
+                    .is_metric = lattice.metric});
+}
+
 ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
   auto file = MemoryFile::open(arguments.memory,
                                arguments.no_save ? Access::read_only : Access::read_write);
@@ -168,7 +175,7 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
                                   session.executor(), step_callback);
   session.detail("views arranged");
   if (!arguments.no_save) store_lattice(lattice, memory, file);
-  if (arguments.files.tum) write_trajectory(*arguments.files.tum, make_trajectory(lattice, memory));
+  if (arguments.files.tum) write_poses(*arguments.files.tum, lattice, memory);
   if (arguments.files.graph) {
     write_graph(*arguments.files.graph, to_topological_map(lattice),
                 [&](ViewId view) { return memory.info(view).name; });

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -35,13 +36,15 @@ ordered_json to_json(const TrajectoryError::Summary& errors) {
           {"max", errors.largest}};
 }
 
+constexpr std::array<std::string_view, 3> pairing_names{"stamp", "image_number", "order"};
+
 ordered_json to_json(const EstimateEvaluation& evaluation, const TrajectoryError::Options& options,
                      const std::array<std::string, 2>& formats) {
   const TrajectoryError& error = evaluation.trajectory;
   const Alignment3& alignment = error.truth_from_estimate;
   const Rotation3& q = alignment.rotation;
   ordered_json json{{"formats", formats},
-                    {"paired_by", evaluation.paired_by_stamp ? "stamp" : "order"},
+                    {"paired_by", pairing_names[static_cast<std::size_t>(evaluation.pairing)]},
                     {"pairs", error.pairs},
                     {"left_out", error.left_out},
                     {"alignment",
@@ -58,7 +61,8 @@ ordered_json to_json(const EstimateEvaluation& evaluation, const TrajectoryError
                     {"relative_pairs", error.relative_pairs},
                     {"rpe_m", nullptr},
                     {"rpe_rotation_rad", nullptr}};
-  if (alignment.is_unique) json["rotation_rad"] = to_json(error.rotation_rad);
+  if (alignment.is_unique && evaluation.has_rotations)
+    json["rotation_rad"] = to_json(error.rotation_rad);
   if (error.relative_pairs > 0) {
     json["rpe_m"] = to_json(error.relative_position_m);
     json["rpe_rotation_rad"] = to_json(error.relative_rotation_rad);
@@ -97,10 +101,12 @@ std::string format_line(const std::string& label, const TrajectoryError::Summary
 }
 
 TrajectoryFile read_poses(const std::string& input, const std::optional<std::string>& topic,
-                          std::string_view flag) {
+                          recordings::PoseUse use) {
+  const std::string_view flag =
+      use == recordings::PoseUse::estimate ? "--estimate-topic" : "--truth-topic";
   if (recordings::is_recording(input)) {
     try {
-      return recordings::read_recorded_poses(input, topic);
+      return recordings::read_recorded_poses(input, topic, use);
     } catch (const FileError& error) {
       const std::string_view text = error.what();
       if (!text.ends_with("choose one")) throw;
@@ -118,23 +124,78 @@ TrajectoryEstimate read_estimate(const EvaluateArguments& arguments) {
   if (!arguments.estimate_topic && !recordings::is_recording(arguments.estimate)) {
     return panonav::read_estimate(arguments.estimate);
   }
-  return {read_poses(arguments.estimate, arguments.estimate_topic, "--estimate-topic"), {}, {}};
+  return {read_poses(arguments.estimate, arguments.estimate_topic, recordings::PoseUse::estimate),
+          {},
+          {}};
+}
+
+/// Selects an alignment with scale if estimate and truth are in different units. Throws UsageError
+/// if another alignment is set.
+void choose_alignment(const Arguments& declared, EvaluateArguments& arguments,
+                      const TrajectoryFile& estimate, const TrajectoryFile& truth,
+                      Session& session) {
+  if (!truth.units.is_metric) session.set_length_unit(LengthUnit::view_steps);
+  auto& align = arguments.options.align;
+  if (estimate.units.is_metric == truth.units.is_metric ||
+      align == TrajectoryError::Align::similarity) {
+    return;
+  }
+  const std::string in_steps = truth.units.is_metric ? arguments.estimate : arguments.truth;
+  if (declared.is_set("evaluation", "align")) {
+    throw UsageError("--align is " + std::string(align_name(arguments.options)) +
+                     "; allowed: similarity, as the lengths of " + to_readable_line(in_steps) +
+                     " are in view steps (panonav scale makes metres of the view steps of a "
+                     "memory)");
+  }
+  align = TrajectoryError::Align::similarity;
+  session.note("panonav evaluate: the lengths of " + to_readable_line(in_steps) +
+               " are in view steps, so the alignment includes the scale (--align similarity)");
+}
+
+std::string describe_pairing(const EstimateEvaluation& evaluation,
+                             const std::array<std::string, 2>& formats,
+                             const std::array<TrajectoryUnits, 2>& units) {
+  switch (evaluation.pairing) {
+    case EstimateEvaluation::Pairing::stamp:
+      return "stamp";
+    case EstimateEvaluation::Pairing::image_number:
+      return "the numbers of their images, which have no stamps";
+    case EstimateEvaluation::Pairing::order:
+      break;
+  }
+  const bool is_estimate = units[0].times != TrajectoryUnits::Times::stamps;
+  return "their order in the files, as the " + std::string(is_estimate ? "estimate" : "truth") +
+         " (" + formats[is_estimate ? 0 : 1] + ") has no stamps";
+}
+
+std::string describe_span(const TrajectoryFile& file) {
+  return to_text(file.poses.front().stamp_s) + " to " + to_text(file.poses.back().stamp_s);
 }
 
 void print_errors(const EstimateEvaluation& evaluation, const EvaluateArguments& arguments,
                   Session& session) {
   constexpr int metre_digits = 6;  // as many as evo_ape prints
   const TrajectoryError& error = evaluation.trajectory;
-  session.print(format_line("ATE [m]            ", error.position_m, 1.0, metre_digits));
-  if (error.truth_from_estimate.is_unique) {
+  const std::string unit = to_string(session.length_unit());
+  const auto pad = [](std::string label) {
+    constexpr std::size_t label_width = 19;
+    label.resize(std::max(label.size(), label_width), ' ');
+    return label;
+  };
+  session.print(format_line(pad("ATE [" + unit + "]"), error.position_m, 1.0, metre_digits));
+  if (!evaluation.has_rotations) {
+    session.print("rotation and RPE: unknown, as one of the trajectories has no headings");
+  } else if (error.truth_from_estimate.is_unique) {
     session.print(format_line("rotation [degrees] ", error.rotation_rad, degrees(1.0), 2));
   } else {
     session.print(
         "rotation: unknown, as the positions lie on a line, about which any rotation fits");
   }
   if (error.relative_pairs > 0) {
-    session.print("over " + to_text(arguments.options.relative_distance_m) + " m of path:");
-    session.print(format_line("RPE [m]            ", error.relative_position_m, 1.0, metre_digits));
+    session.print("over " + to_text(arguments.options.relative_distance_m) + " " + unit +
+                  " of path:");
+    session.print(
+        format_line(pad("RPE [" + unit + "]"), error.relative_position_m, 1.0, metre_digits));
     session.print(format_line("RPE [degrees]      ", error.relative_rotation_rad, degrees(1.0), 2));
   }
   if (evaluation.map) {
@@ -146,9 +207,15 @@ void print_errors(const EstimateEvaluation& evaluation, const EvaluateArguments&
   if (evaluation.closures) print_closures(*evaluation.closures, session);
 }
 
-ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
+ExitCode evaluate(const Arguments& declared, EvaluateArguments arguments, Session& session) {
   TrajectoryEstimate estimate = read_estimate(arguments);
-  TrajectoryFile truth = read_poses(arguments.truth, arguments.truth_topic, "--truth-topic");
+  TrajectoryFile truth =
+      read_poses(arguments.truth, arguments.truth_topic, recordings::PoseUse::ground_truth);
+  choose_alignment(declared, arguments, estimate.trajectory, truth, session);
+  const std::string spans = "the stamps of the estimate are " + describe_span(estimate.trajectory) +
+                            ", those of the truth " + describe_span(truth);
+  const std::string truth_name = truth.is_estimate ? "reference" : "ground truth";
+  const std::array units{estimate.trajectory.units, truth.units};
   const std::array<std::string, 2> formats{estimate.trajectory.format, truth.format};
   const std::size_t repeated = estimate.trajectory.repeated + truth.repeated;
   std::optional<EstimateEvaluation> evaluation;
@@ -161,23 +228,27 @@ ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
     return session.no_answer("panonav evaluate: fewer than two poses of " + arguments.estimate +
                              " have a true pose in " + arguments.truth + " within " +
                              to_text(arguments.options.max_stamp_difference_s) +
-                             " s (--max-stamp-difference-s); check that both use the same clock");
+                             " s (--max-stamp-difference-s); " + spans +
+                             "; check that both use the same clock");
   }
   if (repeated > 0) {
     session.note("panonav evaluate: " + format_count(repeated, "pose") +
                  " left out, because the pose before has the same stamp");
   }
   if (session.json()) {
-    session.print(json_line(to_json(*evaluation, arguments.options, formats)));
+    session.print(session.json_line(to_json(*evaluation, arguments.options, formats)));
     return ExitCode::done;
   }
   const TrajectoryError& error = evaluation->trajectory;
-  session.print("estimate: " + formats[0] + ", ground truth: " + formats[1]);
+  const bool is_by_stamp = evaluation->pairing == EstimateEvaluation::Pairing::stamp;
+  session.print("estimate: " + formats[0] + ", " + truth_name + ": " + formats[1]);
   session.print(format_count(error.pairs, "pose") + " compared, " + std::to_string(error.left_out) +
-                " without ground truth; paired by " +
-                (evaluation->paired_by_stamp
-                     ? "stamp"
-                     : "their order in the files, as KITTI poses have no stamps"));
+                " without " + truth_name +
+                (is_by_stamp && error.left_out > 0
+                     ? " within " + to_text(arguments.options.max_stamp_difference_s) +
+                           " s (--max-stamp-difference-s)"
+                     : "") +
+                "; paired by " + describe_pairing(*evaluation, formats, units));
   session.print(describe_alignment(error, arguments.options));
   print_errors(*evaluation, arguments, session);
   return ExitCode::done;
@@ -189,19 +260,21 @@ Run declare_evaluate(Arguments& arguments) {
                        "Estimated trajectory: TUM, KITTI, EuRoC, a CSV table or a recording; or a "
                        "memory file (NAME.panonav) with a map");
   arguments.positional("GROUND_TRUTH", values->truth,
-                       "True trajectory: TUM, KITTI, EuRoC, a CSV table or a recording");
+                       "True trajectory, with or without headings: TUM, KITTI, EuRoC, a CSV table "
+                       "or a recording");
   arguments.option("--estimate-topic NAME", values->estimate_topic,
                    "Topic of the estimated poses in a recording; needed if there are several "
                    "topics with poses");
   arguments.option("--truth-topic NAME", values->truth_topic,
-                   "Topic of the true poses in a recording");
+                   "Topic of the true poses in a recording; /tf: transforms of base_link in the "
+                   "frame map or world. By default, a topic named as ground truth");
   arguments.options("evaluation", values->options);
   arguments.show_in_help({"--align"});
   arguments.reject_options_unless(
       {"--align-reflection"},
       [values] { return values->options.align != TrajectoryError::Align::none; },
       "with --align none");
-  return [values](Session& session) { return evaluate(*values, session); };
+  return [values, &arguments](Session& session) { return evaluate(arguments, *values, session); };
 }
 
 }  // namespace
@@ -213,7 +286,8 @@ Verb evaluate_verb() {
       "Compare an estimated trajectory or map with the true one",
       "Each estimated pose is compared with the true pose of the nearest time stamp; poses without "
       "stamps (KITTI) are compared in their order. Unless --align is none, the estimate is first "
-      "aligned with the true trajectory by least squares, as by evo_ape. The exit code is 1 if "
+      "aligned with the true trajectory by least squares, as by evo_ape; an estimate in view steps "
+      "is also scaled. The exit code is 1 if "
       "fewer than two estimated poses have a corresponding true pose.",
       "  panonav evaluate estimate.tum truth.tum\n"
       "  panonav evaluate estimate.txt euroc/data.csv --align similarity --json\n"

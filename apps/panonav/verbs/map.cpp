@@ -43,19 +43,22 @@ struct MapArguments {
   bool no_thumbnails = false;
 };
 
-/// Returns the stamped poses of the largest component. Images without a stamp get their index as
-/// stamp.
-std::vector<StampedPose> make_trajectory(const Dataset& recording, const Mapper::Result& run,
-                                         const std::string& dataset) {
+/// Writes the poses of the largest component. Images without stamps get their index as stamp.
+void write_map_poses(const Dataset& recording, const Mapper::Result& run,
+                     const MapArguments& arguments) {
   std::vector<StampedPose> trajectory;
   const std::size_t component = find_largest_component(run.map);
+  TrajectoryUnits units = find_trajectory_units(recording, run.unit);
+  const bool has_stamps = units.times == TrajectoryUnits::Times::stamps;
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     if (run.map.nodes[i].component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
-    const double stamp_s = entry.stamp_s.value_or(static_cast<double>(run.observations[i]));
-    append_pose(trajectory, {stamp_s, run.map.nodes[i].pose}, dataset, entry.file);
+    const double stamp_s = has_stamps ? *entry.stamp_s : static_cast<double>(run.observations[i]);
+    append_pose(trajectory, {stamp_s, run.map.nodes[i].pose}, arguments.dataset, entry.file);
   }
-  return trajectory;
+  // Numbers of selected images are not those of the recording.
+  if (!has_stamps && arguments.pictures.part.every) units.times = TrajectoryUnits::Times::none;
+  write_trajectory(*arguments.files.tum, trajectory, units);
 }
 
 std::vector<std::size_t> component_sizes(const TopologicalMap& map) {
@@ -401,8 +404,7 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
   const Mapper::Result run = arguments.record.view
                                  ? map_with_viewers(arguments, recording, mapper, session)
                                  : map_recording(recording, mapper, session);
-  if (arguments.files.tum)
-    write_trajectory(*arguments.files.tum, make_trajectory(recording, run, arguments.dataset));
+  if (arguments.files.tum) write_map_poses(recording, run, arguments);
   if (arguments.files.graph) {
     write_graph(*arguments.files.graph, run.map, [&](ViewId view) {
       const auto found =

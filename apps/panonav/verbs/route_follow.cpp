@@ -122,13 +122,13 @@ void print_frame(const RouteSource& route, const MemoryFile& memory, Session& se
 }
 
 void write_fixes(const std::string& path, const std::vector<FollowedImage>& images,
-                 const std::vector<double>& seconds) {
+                 const std::vector<double>& seconds, const TrajectoryUnits& units) {
   std::vector<StampedPose> trajectory;
   for (const FollowedImage& image : images) {
     if (image.fix)
       append_pose(trajectory, {seconds[image.index], image.fix->pose}, path, image.file);
   }
-  write_trajectory(path, trajectory);
+  write_trajectory(path, trajectory, units);
 }
 
 ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments, Session& session) {
@@ -180,7 +180,9 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   progress.clear();
   record.close();
 
-  if (arguments.tum) write_fixes(*arguments.tum, images, seconds);
+  if (arguments.tum) {
+    write_fixes(*arguments.tum, images, seconds, find_trajectory_units(run, session.length_unit()));
+  }
   const FollowSummary summary = summarise_follow(images, headings_known);
   if (!session.json()) {
     print_summary(summary, images, session);

@@ -290,7 +290,10 @@ class LiveTrack {
     moment_.reset();
   }
   ExitCode finish(LiveRun& loop) {
-    if (arguments_.tum) write_trajectory(*arguments_.tum, trajectory_);
+    if (arguments_.tum) {
+      write_trajectory(*arguments_.tum, trajectory_,
+                       {.is_metric = session_.length_unit() == LengthUnit::metres});
+    }
     record_.close();
     const LiveCounts& counts = loop.finish();
     if (!session_.json()) print_summary(summary_, session_);
@@ -331,13 +334,13 @@ ExitCode track_live(const Arguments& declared, const TrackArguments& arguments,
 
 /// Writes the poses of localised images. `seconds` are the stamps of all images.
 void write_localised_poses(const std::string& path, const std::vector<TrackedImage>& images,
-                           const std::vector<double>& seconds) {
+                           const std::vector<double>& seconds, const TrajectoryUnits& units) {
   std::vector<StampedPose> trajectory;
   for (const TrackedImage& image : images) {
     if (!is_localised(image)) continue;
     append_pose(trajectory, {seconds[image.index], *image.estimate.pose}, path, image.file);
   }
-  write_trajectory(path, trajectory);
+  write_trajectory(path, trajectory, units);
 }
 
 /// Prints a note if the motion is computed from the images.
@@ -402,7 +405,10 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   progress.clear();
   record.close();
 
-  if (arguments.tum) write_localised_poses(*arguments.tum, images, seconds);
+  if (arguments.tum) {
+    write_localised_poses(*arguments.tum, images, seconds,
+                          find_trajectory_units(run, session.length_unit()));
+  }
   const TrackSummary summary = summarise_track(images);
   if (!session.json()) print_summary(summary, session);
   if (const auto* motion = tracker.visual_odometry()) {

@@ -21,7 +21,20 @@ namespace {
 constexpr std::size_t trajectory_limit_bytes = 256U << 20U;
 constexpr std::string_view known_formats =
     "TUM (stamp x y z qx qy qz qw), KITTI (12 numbers of a matrix), EuRoC (nanoseconds,x,y,z,qw,"
-    "qx,qy,qz), or a table with the columns stamp_s,x_m,y_m,heading_deg";
+    "qx,qy,qz), positions (stamp x y z), or a table with the columns stamp_s,x_m,y_m,heading_deg";
+constexpr std::string_view view_steps_line = "# unit: view steps";
+constexpr std::string_view image_numbers_line = "# stamps: image numbers";
+constexpr std::string_view no_stamps_line = "# stamps: none";
+
+using Times = TrajectoryUnits::Times;
+
+/// Sets the units that a comment of `write_trajectory` states; other comments change nothing.
+void read_units(std::string_view comment, TrajectoryUnits& units) {
+  comment = trim_blanks(comment);
+  if (comment == view_steps_line) units.is_metric = false;
+  if (comment == image_numbers_line) units.times = Times::image_numbers;
+  if (comment == no_stamps_line) units.times = Times::none;
+}
 
 /// True if the pose has the stamp of the last one, and counts it.
 bool is_repeated(TrajectoryFile& file, double stamp_s) {
@@ -32,16 +45,36 @@ bool is_repeated(TrajectoryFile& file, double stamp_s) {
 
 TrajectoryFile read_table(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
-  TrajectoryFile file{.format = "CSV", .poses = {}};
+  TrajectoryFile file{.format = "CSV", .units = {}, .poses = {}};
+  file.units.is_metric = !table.has("x_steps");
+  const char* const x = file.units.is_metric ? "x_m" : "x_steps";
+  const char* const y = file.units.is_metric ? "y_m" : "y_steps";
+  std::string time = "stamp_s";
+  if (!table.has(time)) {
+    const bool has_images = table.has("image") || table.has("file");
+    file.units.times = has_images ? Times::image_numbers : Times::none;
+    time = table.has("image") ? "image" : "";
+  }
+  const auto is_empty = [&table](std::size_t row, std::string_view column) {
+    return !table.has(column) || table.text(row, column).empty();
+  };
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const Pose2 pose{table.position(row, "x_m"), table.position(row, "y_m"),
-                     wrap_angle(radians(table.number(row, "heading_deg")))};
-    const double stamp_s = table.number(row, "stamp_s");
+    if (table.has(x) && is_empty(row, x) && is_empty(row, y)) continue;
+    Pose2 pose{table.position(row, x), table.position(row, y), 0.0};
+    if (is_empty(row, "heading_deg")) {
+      file.has_rotations = false;
+    } else {
+      pose.heading_rad = wrap_angle(radians(table.number(row, "heading_deg")));
+    }
+    const double stamp_s = time.empty() ? static_cast<double>(row) : table.number(row, time);
     if (is_repeated(file, stamp_s)) continue;
     if (!file.poses.empty() && stamp_s < file.poses.back().stamp_s) {
-      table.fail(row, "stamp_s", to_text(stamp_s), "the stamp before, or more");
+      table.fail(row, time, to_text(stamp_s), "the stamp before, or more");
     }
     file.poses.push_back({stamp_s, to_pose3(pose)});
+  }
+  if (!file.has_rotations) {
+    for (StampedPose3& each : file.poses) each.pose.rotation = {};
   }
   return file;
 }
@@ -72,28 +105,37 @@ std::optional<NumberLine> parse_line(std::string_view line) {
   }
 }
 
-enum class PoseFormat { tum, kitti, euroc };
-constexpr std::array<std::string_view, 3> format_names{"TUM", "KITTI", "EuRoC"};
-constexpr std::array<std::string_view, 3> format_lines{
+enum class PoseFormat { tum, kitti, euroc, positions };
+constexpr std::array<std::string_view, 4> format_names{"TUM", "KITTI", "EuRoC", "positions"};
+constexpr std::array<std::string_view, 4> format_lines{
     "stamp x y z qx qy qz qw, eight finite numbers",
     "12 finite numbers, the rows of a 3 x 4 matrix",
-    "nanoseconds,x,y,z,qw,qx,qy,qz, eight finite numbers or more"};
+    "nanoseconds,x,y,z,qw,qx,qy,qz, eight finite numbers or more",
+    "stamp x y z, four finite numbers"};
 constexpr std::size_t kitti_numbers = 12;
+constexpr std::size_t position_numbers = 4;
 constexpr std::size_t pose_numbers = 8;  // of TUM, and the least of EuRoC
 
-std::optional<PoseFormat> identify_format(const NumberLine& line) {
+/// True if the line begins with nanoseconds, as those of EuRoC do.
+bool has_nanoseconds(const NumberLine& line) {
   constexpr double min_nanoseconds = 1e12;  // no clock in seconds runs as long
+  return line.has_commas && std::abs(line.numbers[0]) >= min_nanoseconds;
+}
+
+std::optional<PoseFormat> identify_format(const NumberLine& line) {
   if (line.has_commas && line.count >= pose_numbers &&
-      (line.count > pose_numbers || std::abs(line.numbers[0]) >= min_nanoseconds)) {
+      (line.count > pose_numbers || has_nanoseconds(line))) {
     return PoseFormat::euroc;
   }
   if (line.count == kitti_numbers) return PoseFormat::kitti;
   if (line.count == pose_numbers) return PoseFormat::tum;
+  if (line.count == position_numbers) return PoseFormat::positions;
   return std::nullopt;
 }
 
 bool has_format(const NumberLine& line, PoseFormat format) {
   if (format == PoseFormat::euroc) return line.count >= pose_numbers;
+  if (format == PoseFormat::positions) return line.count == position_numbers;
   return line.count == (format == PoseFormat::kitti ? kitti_numbers : pose_numbers);
 }
 
@@ -159,6 +201,9 @@ StampedPose3 read_pose(const NumberLine& line, PoseFormat format, std::size_t in
             {check_position({n[3], n[7], n[11]}, report), read_rotation(line, report)}};
   }
   const Point3 position = check_position({n[1], n[2], n[3]}, report);
+  if (format == PoseFormat::positions) {
+    return {has_nanoseconds(line) ? n[0] / nanoseconds : n[0], {position, {}}};
+  }
   if (format == PoseFormat::euroc) {
     return {n[0] / nanoseconds, {position, normalise({n[4], n[5], n[6], n[7]}, report)}};
   }
@@ -177,10 +222,16 @@ std::optional<TrajectoryFile> read_number_lines(const std::filesystem::path& pat
     rest.remove_prefix(std::min(end + 1, rest.size()));
     ++report.number;
     const std::size_t first = line.find_first_not_of(" \t\r");
-    if (first == std::string_view::npos || line[first] == '#') continue;
+    if (first == std::string_view::npos) continue;
+    if (line[first] == '#') {
+      read_units(line, file.units);
+      continue;
+    }
     const auto numbers = parse_line(line);
     if (!format) {
-      if (!numbers && line.find("_m,") != line.npos) return std::nullopt;  // names of columns
+      const bool is_header = line.find("x_m") != line.npos || line.find("x_steps") != line.npos ||
+                             line.find("_m,") != line.npos;
+      if (!numbers && is_header) return std::nullopt;
       if (numbers) format = identify_format(*numbers);
       if (!format) report.fail(" is not a pose; allowed: " + std::string(known_formats));
     }
@@ -197,7 +248,8 @@ std::optional<TrajectoryFile> read_number_lines(const std::filesystem::path& pat
     file.poses.push_back(pose);
   }
   if (format) file.format = format_names[static_cast<std::size_t>(*format)];
-  file.has_stamps = format != PoseFormat::kitti;
+  if (format == PoseFormat::kitti) file.units.times = Times::none;
+  file.has_rotations = format != PoseFormat::positions;
   return file;
 }
 
@@ -217,9 +269,22 @@ TrajectoryFile read_trajectory_file(const std::filesystem::path& path) {
 
 std::vector<StampedPose> read_trajectory(const std::filesystem::path& path, std::size_t* repeated) {
   const TrajectoryFile file = read_trajectory_file(path);
-  if (!file.has_stamps) {
-    throw FileError(path.string(), "has no stamps (" + file.format +
-                                       " format); allowed: a format with stamps, such as TUM");
+  if (file.units.times != Times::stamps) {
+    const bool counts_images = file.units.times == Times::image_numbers;
+    throw FileError(
+        path.string(),
+        (counts_images ? "has numbers of images instead of stamps (" : "has no stamps (") +
+            file.format + " format); allowed: a format with stamps, such as TUM");
+  }
+  if (!file.has_rotations) {
+    throw FileError(path.string(),
+                    "has no headings; allowed: a format with rotations, such as "
+                    "TUM, or a table with the column 'heading_deg'");
+  }
+  if (!file.units.is_metric) {
+    throw FileError(path.string(),
+                    "has lengths in view steps; allowed: metres (panonav scale "
+                    "scales a memory, from which the file can be written again)");
   }
   if (repeated != nullptr) *repeated += file.repeated;
   std::vector<StampedPose> trajectory;
@@ -229,9 +294,24 @@ std::vector<StampedPose> read_trajectory(const std::filesystem::path& path, std:
   return trajectory;
 }
 
-void write_trajectory(const std::filesystem::path& path, std::span<const StampedPose> trajectory) {
+std::string make_trajectory_header(bool is_table, const TrajectoryUnits& units) {
+  if (is_table) {
+    const std::string time = units.times == Times::stamps          ? "stamp_s"
+                             : units.times == Times::image_numbers ? "image"
+                                                                   : "view";
+    return time + (units.is_metric ? ",x_m,y_m" : ",x_steps,y_steps") + ",heading_deg\n";
+  }
+  std::string text = "# stamp x y z qx qy qz qw\n";
+  if (!units.is_metric) text += std::string(view_steps_line) + "\n";
+  if (units.times == Times::image_numbers) text += std::string(image_numbers_line) + "\n";
+  if (units.times == Times::none) text += std::string(no_stamps_line) + "\n";
+  return text;
+}
+
+void write_trajectory(const std::filesystem::path& path, std::span<const StampedPose> trajectory,
+                      const TrajectoryUnits& units) {
   const bool table = path.extension() == ".csv";
-  std::string text = table ? "stamp_s,x_m,y_m,heading_deg\n" : "# stamp x y z qx qy qz qw\n";
+  std::string text = make_trajectory_header(table, units);
   for (const auto& [stamp_s, pose] : trajectory) {
     if (table) {
       text += to_text(stamp_s) + "," + to_text(pose.x_m) + "," + to_text(pose.y_m) + "," +

@@ -47,11 +47,14 @@ std::size_t count_rejected_springs(const Lattice& lattice) {
       lattice.springs, [](const auto& spring) { return spring.weight < min_spring_weight; }));
 }
 
-std::vector<StampedPose> make_trajectory(const Lattice& lattice, const VisualMemory& memory) {
-  const auto has_stamp = [&](const Lattice::Node& node) {
+bool has_stamps(const Lattice& lattice, const VisualMemory& memory) {
+  return std::ranges::all_of(lattice.nodes, [&](const Lattice::Node& node) {
     return memory.info(node.view).stamp_s.has_value();
-  };
-  const bool stamped = std::ranges::all_of(lattice.nodes, has_stamp);
+  });
+}
+
+std::vector<StampedPose> make_trajectory(const Lattice& lattice, const VisualMemory& memory) {
+  const bool stamped = has_stamps(lattice, memory);
   std::vector<StampedPose> trajectory;
   for (const Lattice::Node& node : lattice.nodes) {
     if (node.component != 0) continue;

@@ -29,6 +29,9 @@ void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFil
 /// Returns the number of springs with a weight below `min_spring_weight`.
 [[nodiscard]] std::size_t count_rejected_springs(const Lattice& lattice);
 
+/// True if all arranged views have a stamp.
+[[nodiscard]] bool has_stamps(const Lattice& lattice, const VisualMemory& memory);
+
 /// Returns the poses of the largest component as a trajectory, ordered by stamp. If any view has no
 /// stamp, the view ids serve as stamps. Throws ContractError if two views have the same stamp.
 [[nodiscard]] std::vector<StampedPose> make_trajectory(const Lattice& lattice,

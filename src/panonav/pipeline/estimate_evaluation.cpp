@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -19,6 +20,7 @@ TrajectoryEstimate read_map(const std::filesystem::path& path) {
   const VisualMemory memory = file.load();
   TrajectoryEstimate estimate;
   estimate.trajectory.format = "map";
+  estimate.trajectory.units.is_metric = read_map_unit(file) == LengthUnit::metres;
   auto& poses = estimate.trajectory.poses;
   for (const TopologicalMap::Node& node : map->nodes) {
     const auto& stamp_s = memory.info(node.view).stamp_s;
@@ -35,6 +37,14 @@ TrajectoryEstimate read_map(const std::filesystem::path& path) {
   std::ranges::sort(poses, {}, &StampedPose3::stamp_s);
   estimate.map = std::move(map);
   return estimate;
+}
+
+EstimateEvaluation::Pairing choose_pairing(TrajectoryUnits::Times estimate,
+                                           TrajectoryUnits::Times truth) {
+  using Times = TrajectoryUnits::Times;
+  if (estimate != truth || estimate == Times::none) return EstimateEvaluation::Pairing::order;
+  return estimate == Times::stamps ? EstimateEvaluation::Pairing::stamp
+                                   : EstimateEvaluation::Pairing::image_number;
 }
 
 void number_poses(std::vector<StampedPose3>& poses) {
@@ -63,10 +73,18 @@ TrajectoryEstimate read_estimate(const std::filesystem::path& path) {
 std::optional<EstimateEvaluation> evaluate_estimate(TrajectoryEstimate estimate,
                                                     TrajectoryFile truth,
                                                     const TrajectoryError::Options& options) {
+  using Pairing = EstimateEvaluation::Pairing;
   EstimateEvaluation evaluation;
-  evaluation.paired_by_stamp = estimate.trajectory.has_stamps && truth.has_stamps;
+  if (estimate.trajectory.units.is_metric != truth.units.is_metric &&
+      options.align != TrajectoryError::Align::similarity) {
+    throw ContractError("align", "without a scale",
+                        "similarity, as either the estimate or the truth is in view steps");
+  }
+  evaluation.pairing = choose_pairing(estimate.trajectory.units.times, truth.units.times);
+  TrajectoryError::Options matching = options;
+  if (evaluation.pairing != Pairing::stamp) matching.max_stamp_difference_s = 0.0;
   auto& poses = estimate.trajectory.poses;
-  if (!evaluation.paired_by_stamp) {
+  if (evaluation.pairing == Pairing::order) {
     require(poses.size() == truth.poses.size(), "number of estimated poses",
             static_cast<double>(poses.size()),
             to_text(static_cast<double>(truth.poses.size())) +
@@ -74,14 +92,16 @@ std::optional<EstimateEvaluation> evaluate_estimate(TrajectoryEstimate estimate,
     number_poses(poses);
     number_poses(truth.poses);
   }
-  auto error = trajectory_error(poses, truth.poses, options);
+  auto error = trajectory_error(poses, truth.poses, matching);
   if (!error) return std::nullopt;
   evaluation.trajectory = std::move(*error);
-  const double max_difference_s = options.max_stamp_difference_s;
+  evaluation.has_rotations = estimate.trajectory.has_rotations && truth.has_rotations;
+  if (!evaluation.has_rotations) evaluation.trajectory.relative_pairs = 0;
+  const double max_difference_s = matching.max_stamp_difference_s;
   if (is_planar(poses) && is_planar(truth.poses)) {
     evaluation.map = compare_shapes(poses, truth.poses, max_difference_s);
   }
-  if (estimate.map) {
+  if (estimate.map && truth.units.is_metric) {
     evaluation.closures = count_closures(*estimate.map, [&](ViewId view) -> std::optional<Point2> {
       const std::vector<StampedPose3> seen{{estimate.stamp_s.at(view), {}}};
       const auto pair = pair_by_stamp(seen, truth.poses, max_difference_s);

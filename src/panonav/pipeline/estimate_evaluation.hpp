@@ -19,8 +19,17 @@ struct TrajectoryEstimate {
 
 /// Errors of an estimated trajectory or map.
 struct EstimateEvaluation {
-  TrajectoryError trajectory;   ///< errors of the poses
-  bool paired_by_stamp = true;  ///< false: by the order of the poses, as a file has no stamps
+  /// Criterion by which estimated and true poses are paired.
+  enum class Pairing {
+    stamp,         ///< by the nearest stamp
+    image_number,  ///< by the number of the image, as both files have numbers instead of stamps
+    order          ///< by the order of the poses, as a file has no stamps
+  };
+  TrajectoryError trajectory;        ///< errors of the poses, in the unit of the true poses
+  Pairing pairing = Pairing::stamp;  ///< of estimated and true poses
+  /// False: the estimate or the truth has only positions, so there are no errors of rotation and no
+  /// relative errors.
+  bool has_rotations = true;
   /// Agreement of the positions in the plane; nullopt if they are not in one plane or
   /// `is_comparable` is false.
   std::optional<MapComparison> map;
@@ -32,9 +41,10 @@ struct EstimateEvaluation {
 /// `Mapper`. Throws FileError, also if a view of the map has no stamp.
 [[nodiscard]] TrajectoryEstimate read_estimate(const std::filesystem::path& path);
 
-/// Compares an estimate with the true poses. If one of them has no stamps, poses are paired by
-/// their order, and ContractError is thrown unless both have equally many. Returns nullopt for
-/// fewer than two pairs. Throws OptionError. Cost: that of `compare_positions`.
+/// Compares an estimate with the true poses. If only one of them has stamps, or one has neither
+/// stamps nor image numbers, poses are paired by their order, and ContractError is thrown unless
+/// both have equally many; also if only one is metric and the alignment has no scale. Returns
+/// nullopt for fewer than two pairs. Throws OptionError. Cost: that of `compare_positions`.
 [[nodiscard]] std::optional<EstimateEvaluation> evaluate_estimate(
     TrajectoryEstimate estimate, TrajectoryFile truth,
     const TrajectoryError::Options& options = {});

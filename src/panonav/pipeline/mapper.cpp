@@ -139,6 +139,7 @@ Mapper::Result Mapper::finish() {
   file_.change([&] {
     file_.link(links);
     file_.save_map(map_name, result_.map);
+    store_own_map_unit(file_, result_.unit);
     learn_and_store_models(file_);
   });
   return result_;

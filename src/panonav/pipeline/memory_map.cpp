@@ -26,6 +26,7 @@ namespace {
 
 /// Parameter that is set if the positions of the views come from a map; its value is their unit.
 constexpr const char* unit_parameter = "map_unit";
+constexpr const char* own_unit_parameter = "own_map_unit";
 constexpr const char* metres_text = "metres";
 constexpr const char* view_steps_text = "view_steps";  // followed by the assumed metres of a step
 /// Distance between components that have no common frame, in median steps. It exceeds the distance
@@ -345,6 +346,17 @@ void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit, double a
     store_length_unit(memory, unit, assumed_unit_m);
     learn_and_store_models(memory);
   });
+}
+
+void store_own_map_unit(MemoryFile& memory, LengthUnit unit) {
+  memory.set_parameter(own_unit_parameter,
+                       unit == LengthUnit::metres ? metres_text : view_steps_text);
+}
+
+LengthUnit read_map_unit(const MemoryFile& memory) {
+  if (has_positions_from_map(memory)) return read_length_unit(memory);
+  return memory.parameter(own_unit_parameter) == view_steps_text ? LengthUnit::view_steps
+                                                                 : LengthUnit::metres;
 }
 
 std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::string, Pose2>& odometry,

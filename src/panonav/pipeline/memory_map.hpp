@@ -89,4 +89,10 @@ std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::strin
 /// set. Throws FileError.
 void remove_positions_from_map(MemoryFile& memory);
 
+/// Stores the unit of a map beside views whose positions are of a data set, in metres.
+void store_own_map_unit(MemoryFile& memory, LengthUnit unit);
+/// Returns the unit of the map's own lengths, which can differ from that of the positions
+/// (`read_length_unit`) if these are of a data set.
+[[nodiscard]] LengthUnit read_map_unit(const MemoryFile& memory);
+
 }  // namespace panonav

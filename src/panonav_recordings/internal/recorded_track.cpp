@@ -8,14 +8,9 @@
 
 namespace panonav::recordings {
 
-namespace {
-
-/// Removes a leading slash: ROS 1 writes both "/odom" and "odom".
 std::string normalise_frame_name(std::string_view name) {
   return std::string(name.starts_with('/') ? name.substr(1) : name);
 }
-
-}  // namespace
 
 bool RecordedTrack::has_stamps() const {
   return samples_.empty() ||
@@ -46,6 +41,12 @@ void RecordedTrack::sort(std::span<const RecordedTimes> times) {
   const auto middle = intervals_ns.begin() + static_cast<std::ptrdiff_t>(intervals_ns.size() / 2);
   std::ranges::nth_element(intervals_ns, middle);
   max_gap_ns_ = std::clamp(std::min(*middle, 2 * second_ns) * 3 / 2, second_ns, 3 * second_ns);
+}
+
+std::vector<std::int64_t> RecordedTrack::stamps_ns() const {
+  std::vector<std::int64_t> stamps;
+  for (const Sample& each : samples_) stamps.push_back(each.times.stamp_ns);
+  return stamps;
 }
 
 std::optional<TimeSpan> RecordedTrack::span() const {

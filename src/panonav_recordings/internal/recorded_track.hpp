@@ -14,6 +14,9 @@
 
 namespace panonav::recordings {
 
+/// Removes a leading slash: ROS 1 writes both "/odom" and "odom".
+[[nodiscard]] std::string normalise_frame_name(std::string_view name);
+
 /// Poses over time.
 class RecordedTrack {
  public:
@@ -26,6 +29,8 @@ class RecordedTrack {
   /// Sorts the poses by the stamps of `times`, which are in the order of their `order`. From poses
   /// of one stamp only the one recorded last is kept.
   void sort(std::span<const RecordedTimes> times);
+  /// Returns the stamps of all poses. Must be sorted.
+  [[nodiscard]] std::vector<std::int64_t> stamps_ns() const;
   [[nodiscard]] const ros::Pose& last() const { return samples_.back().pose; }
   /// Returns the stamps of the first and the last pose; nullopt without poses. Must be sorted.
   [[nodiscard]] std::optional<TimeSpan> span() const;
