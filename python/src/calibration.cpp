@@ -89,7 +89,8 @@ void bind_mirrors(py::module_& m) {
             {.model = make_mirror_model(model, parameters, rim_elevation_rad, mirror.rim_radius_px),
              .inner_radius_px = inner_radius_px,
              .direction = parse_direction(direction),
-             .forward_angle_rad = forward_angle_rad});
+             .forward_angle_rad = forward_angle_rad,
+             .is_model_assumed = parameters.empty()});
       },
       py::arg("mirror"), py::arg("model") = "equiangular", py::arg("parameters") = py::dict(),
       py::kw_only(), py::arg("rim_elevation_rad") = py::none(),

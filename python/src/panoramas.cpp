@@ -99,6 +99,8 @@ void bind_cameras(py::module_& m) {
           "Direction of increasing azimuth in the image: 'clockwise' or 'counter-clockwise'.")
       .def_readonly("forward_angle_rad", &Camera::forward_angle_rad,
                     "Mirror: image angle of forward, counter-clockwise from the right.")
+      .def_readonly("has_assumed_elevations", &Camera::has_assumed_elevations,
+                    "True if the shape of the mirror was assumed: no lengths from the ground.")
       .def_readonly("forward_column", &Camera::forward_column,
                     "Equirectangular: column of the forward direction, as a fraction of the width.")
       .def_property_readonly(

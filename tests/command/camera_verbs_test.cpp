@@ -40,10 +40,10 @@ class CameraVerbs : public ::testing::Test {
 TEST_F(CameraVerbs, CalibrateFindsTheSimulatedMirror) {
   const auto said = answer_of({"calibrate", picture(0), picture(1), picture(2), "-o",
                                out_ / "camera.toml", "--overlay", out_ / "overlay.png", "--json"});
-  EXPECT_EQ(keys_of(said),
-            (std::set<std::string>{"images", "width_px", "height_px", "centre_u_px", "centre_v_px",
-                                   "rim_radius_px", "inner_radius_px", "inner_radius_found",
-                                   "quality", "residual_px", "deviation_over_images", "camera"}));
+  EXPECT_EQ(keys_of(said), (std::set<std::string>{"images", "width_px", "height_px", "centre_u_px",
+                                                  "centre_v_px", "rim_radius_px", "inner_radius_px",
+                                                  "inner_radius_found", "quality", "residual_px",
+                                                  "deviation_over_images", "assumed", "camera"}));
   EXPECT_EQ(said["images"], 3);
   const Camera truth = simulation::make_simulated_mirror_camera();
   const Camera found = read_camera(out_ / "camera.toml").camera;
@@ -54,6 +54,45 @@ TEST_F(CameraVerbs, CalibrateFindsTheSimulatedMirror) {
   EXPECT_NEAR(found.inner_radius_px, truth.inner_radius_px, 1.5);
   EXPECT_EQ(found.image_size, truth.image_size);
   EXPECT_EQ(read_image(out_ / "overlay.png").size(), truth.image_size);
+}
+
+TEST_F(CameraVerbs, AssumedShapesOfMirrorsAreNamedAndGiveNoMetres) {
+  const std::string camera = out_ / "camera.toml";
+  const auto assumed_with = [&](const std::vector<std::string>& more) {
+    const auto call = with({"calibrate", picture(0), picture(1), "-o", camera, "--json"}, more);
+    const json said = answer_of(call);
+    EXPECT_EQ(read_camera(camera).camera.has_assumed_elevations, !said["assumed"].empty());
+    return said["assumed"];
+  };
+  const std::vector<std::string> all{
+      "--profile",     "hyperboloidal", "--mirror-a-mm",       "28.095",
+      "--mirror-b-mm", "23.4125",       "--rim-elevation-deg", "20"};
+  EXPECT_EQ(assumed_with(all), json::array());
+  EXPECT_EQ(assumed_with({"--profile", "unified", "--xi", "0.9"}), (json{"rim_elevation_deg"}));
+  EXPECT_EQ(assumed_with({}), (json{"profile", "inner_elevation_deg", "rim_elevation_deg"}));
+  const auto text =
+      run_panonav({"calibrate", picture(0), "-o", camera, "--profile", "hyperboloidal"});
+  EXPECT_TRUE(contains(text.out,
+                       "assumed: --mirror-a-mm 28.095, --mirror-b-mm 23.4125, "
+                       "--rim-elevation-deg 20"))
+      << text.out;
+
+  const std::string plain = out_ / "plain";
+  fs::create_directory(plain);
+  for (int i = 0; i < 3; ++i) fs::copy(picture(i), plain);
+  const std::string memory = out_ / "map.panonav";
+  const std::vector<std::string> images{memory, plain, "--kind", "mirror", "--camera", camera};
+  expect_refusal(with(with({"map"}, images), {"--camera-height-m", "0.6"}),
+                 "whose shape was assumed");
+  EXPECT_FALSE(fs::exists(memory));
+  run_well(with({"memorise"}, images));
+  // Other cameras are named, with the elevations that both show.
+  const auto other =
+      run_panonav({"localise", memory, picture(0), "--kind", "mirror", "--camera", true_camera()});
+  EXPECT_TRUE(contains(other.err, "is not that of the reference images")) << other.err;
+  EXPECT_TRUE(contains(other.err, "degrees")) << other.err;
+  const auto same = run_panonav({"localise", memory, picture(0)});
+  EXPECT_FALSE(contains(same.err, "reference images")) << same.err;
 }
 
 TEST_F(CameraVerbs, CalibrationsOfOtherProgramsAreConvertedAndWritten) {

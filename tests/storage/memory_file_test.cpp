@@ -40,6 +40,7 @@ TEST_F(MemoryFileContent, HeadersComeBack) {
     headers.push_back(mirror_header());
     headers.back().source.camera->model = model;
     if (std::holds_alternative<UnifiedModel>(model)) {
+      headers.back().source.camera->has_assumed_elevations = true;
       headers.back().source.camera->affine = {1.01, 0.0, -0.002};
       headers.back().source.camera->distortion = {0.01, 0.0, 1e-3, 0.0, 0.0};
     }

@@ -1,10 +1,12 @@
 #include "runs/recording.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <string_view>
 
+#include "panonav/camera/model_parameters.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
@@ -52,11 +54,6 @@ std::optional<ElevationBand> parse_elevation_band(const PictureArguments& pictur
   return ElevationBand{radians(low), radians(high)};
 }
 
-bool states_layout(const PictureArguments& pictures) {
-  return pictures.kind || pictures.camera || pictures.columns || pictures.forward_column ||
-         pictures.elevation_deg;
-}
-
 PictureSource make_mirror_source(const PictureArguments& pictures,
                                  const std::optional<ElevationBand>& band, Session& session) {
   if (!pictures.camera) {
@@ -83,6 +80,11 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
 }
 
 }  // namespace
+
+bool states_layout(const PictureArguments& pictures) {
+  return pictures.kind || pictures.camera || pictures.columns || pictures.forward_column ||
+         pictures.elevation_deg;
+}
 
 void declare_gpano(Arguments& arguments, bool& ignore_gpano) {
   arguments.flag("--ignore-gpano", ignore_gpano,
@@ -220,6 +222,44 @@ std::optional<PictureSource> make_picture_source(const PictureArguments& picture
 
 namespace {
 
+/// Returns the elevations of the rows of panoramas; nullopt if they are not known.
+std::optional<ElevationBand> find_used_band(const PictureSource& source) {
+  if (source.kind == PictureKind::panorama) return source.layout.elevations;
+  if (source.layout.kept_elevations) return source.layout.kept_elevations;
+  if (source.camera) return visible_elevations(*source.camera);
+  return default_equirectangular_band;
+}
+
+/// Prints a note if the images are of a camera that shows other elevations than the reference
+/// images, whose layout is `reference`.
+void note_other_camera(const PictureSource& images, const PictureSource& reference,
+                       const std::string& input, Session& session) {
+  if (!images.camera) return;
+  const bool has_reference_camera = reference.camera.has_value();
+  if (has_reference_camera && reference.camera->model == images.camera->model) return;
+  const auto used = find_used_band(reference);
+  if (!used) return;  // refused when the first image is compared
+  const ElevationBand seen = visible_elevations(*images.camera);
+  const double low_rad = std::max(used->bottom_rad, seen.bottom_rad);
+  const double high_rad = std::min(used->top_rad, seen.top_rad);
+  constexpr double tolerance_rad = 1e-3;
+  const bool has_all =
+      low_rad < used->bottom_rad + tolerance_rad && high_rad > used->top_rad - tolerance_rad;
+  const auto in_degrees = [](double a_rad, double b_rad) {
+    return format_number(degrees(a_rad), "deg") + " to " + format_number(degrees(b_rad), "deg") +
+           " degrees";
+  };
+  session.note(
+      "the camera of " + to_readable_line(input) + " (" +
+      std::string(model_name(images.camera->model)) + ") is not that of the reference images (" +
+      (has_reference_camera ? std::string(model_name(reference.camera->model)) : "panoramas") +
+      "); " +
+      (has_all ? "it shows all their elevations, " + in_degrees(low_rad, high_rad)
+               : "of their elevations, " + in_degrees(used->bottom_rad, used->top_rad) +
+                     ", both show " + in_degrees(low_rad, high_rad) +
+                     "; the other rows are filled with the nearest visible row"));
+}
+
 /// True if the first picture is a file that cannot be read or does not fit the layout, so that an
 /// error will be the only line.
 bool is_refused_later(const Dataset& opened) {
@@ -310,6 +350,7 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
     }
     note_unusable(opened, session);
     if (!remembered && !is_refused_later(opened)) note_default_band(opened.source, session);
+    if (remembered) note_other_camera(opened.source, *remembered, input, session);
     return opened;
   } catch (const OptionError& error) {
     throw UsageError(replace_option_names(error.what()));

@@ -53,6 +53,9 @@ struct RunArguments {
   std::vector<std::string> further_videos;  ///< as in `PictureArguments`
 };
 
+/// True if a flag says anything about the layout of the images.
+[[nodiscard]] bool states_layout(const PictureArguments& pictures);
+
 /// Adds --ignore-gpano.
 void declare_gpano(Arguments& arguments, bool& ignore_gpano);
 /// Adds --kind, --camera, --columns-run, --forward-column, --elevation-deg and --ignore-gpano.

@@ -11,48 +11,12 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "runs/file_content.hpp"
+#include "runs/mirror_options.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {
 
 namespace {
-
-/// Properties of a mirror that cannot be found from images: its profile and the robot's forward
-/// direction.
-struct MirrorOptions {
-  int profile = 0;
-  double inner_elevation_deg = -60.0;
-  double rim_elevation_deg = 20.0;
-  double mirror_a_mm = HyperboloidalModel{}.a_mm;
-  double mirror_b_mm = HyperboloidalModel{}.b_mm;
-  double xi = UnifiedModel{}.xi;
-  int direction = 0;
-  double forward_angle_deg = 0.0;
-};
-
-void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
-  using T = MirrorOptions;
-  constexpr OptionTable table{
-      choice<&T::profile>("Shape of the mirror; dual-fisheye: no mirror, but two fisheye lenses "
-                          "side by side in one image",
-                          "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
-      option<&T::inner_elevation_deg>(
-          "Elevation at the inner radius of the mirror (only for equiangular)", -90, 90),
-      option<&T::rim_elevation_deg>("Elevation at the mirror's rim", -90, 90),
-      option<&T::mirror_a_mm>("Parameter a of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
-      option<&T::mirror_b_mm>("Parameter b of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
-      option<&T::xi>("Mirror parameter of the unified model", 0, 10),
-      choice<&T::direction>(
-          "Direction in which the image rotates when the robot rotates to the left: clockwise if "
-          "the camera points up into the mirror, counter-clockwise if the camera points down. For "
-          "dual-fisheye: clockwise, or counter-clockwise if the image is mirrored",
-          "clockwise", "counter-clockwise"),
-      option<&T::forward_angle_deg>(
-          "Direction in the image that is the robot's forward direction: 0 is right, 90 is up",
-          -360, 360),
-  };
-  table.visit(options, visitor);
-}
 
 constexpr int dual_fisheye_profile = 3;
 
@@ -148,22 +112,9 @@ std::vector<Image> read_images(const CalibrateArguments& arguments, std::vector<
   return images;
 }
 
-CameraModel make_mirror_model(const MirrorOptions& options, double rim_radius_px) {
-  const double rim_rad = radians(options.rim_elevation_deg);
-  switch (options.profile) {
-    case 1:
-      return fit_focal_length(
-          HyperboloidalModel{.a_mm = options.mirror_a_mm, .b_mm = options.mirror_b_mm},
-          rim_radius_px, rim_rad);
-    case 2:
-      return fit_focal_length(UnifiedModel{.xi = options.xi}, rim_radius_px, rim_rad);
-    default:
-      return EquiangularModel{radians(options.inner_elevation_deg), rim_rad};
-  }
-}
-
 ordered_json to_json(const CalibrateArguments& arguments, std::size_t images,
-                     const MirrorCircle& mirror, const Camera& camera) {
+                     const MirrorCircle& mirror, const Camera& camera,
+                     const std::vector<MirrorAssumption>& assumed) {
   ordered_json json{{"images", images},
                     {"width_px", mirror.image_size.width},
                     {"height_px", mirror.image_size.height},
@@ -175,7 +126,9 @@ ordered_json to_json(const CalibrateArguments& arguments, std::size_t images,
                     {"quality", mirror.quality},
                     {"residual_px", mirror.residual_px},
                     {"deviation_over_images", nullptr},
+                    {"assumed", ordered_json::array()},
                     {"camera", arguments.out}};
+  for (const MirrorAssumption& each : assumed) json["assumed"].push_back(each.option);
   if (const auto spread = agreement(mirror)) {
     json["deviation_over_images"] = {{"images", spread->images},
                                      {"centre_u_px", spread->centre_u_px},
@@ -185,8 +138,8 @@ ordered_json to_json(const CalibrateArguments& arguments, std::size_t images,
   return json;
 }
 
-void print_text(const Arguments& declared, const CalibrateArguments& arguments, bool several,
-                const MirrorCircle& mirror, const Camera& camera, Session& session) {
+void print_text(const std::vector<MirrorAssumption>& assumed, const CalibrateArguments& arguments,
+                bool several, const MirrorCircle& mirror, const Camera& camera, Session& session) {
   session.print(session.bold("mirror found") + ": centre " + format_fixed(mirror.centre.u_px, 1) +
                 ", " + format_fixed(mirror.centre.v_px, 1) + " px, rim radius " +
                 format_fixed(mirror.rim_radius_px, 1) + " px, inner radius " +
@@ -203,14 +156,12 @@ void print_text(const Arguments& declared, const CalibrateArguments& arguments, 
                   format_fixed(spread->centre_v_px, 2) + " px and the radius by " +
                   format_fixed(spread->rim_radius_px, 2) + " px (standard deviations)");
   }
-  if (!declared.is_set("mirror")) {
-    session.print(
-        "The mirror's profile cannot be found from images. panonav assumes that the elevation "
-        "increases evenly from " +
-        format_number(arguments.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
-        format_number(arguments.mirror.rim_elevation_deg) +
-        " at the rim. If you know the profile of the mirror, set --profile, --rim-elevation-deg "
-        "and related options.");
+  if (!assumed.empty()) {
+    std::string text;
+    for (const MirrorAssumption& each : assumed) text += (text.empty() ? "" : ", ") + each.text;
+    session.print("Images do not show the shape of the mirror; assumed: " + text +
+                  ". Lengths cannot be computed from the ground (--camera-height-m) with such a "
+                  "camera file. If you know the mirror, set these options.");
   }
   session.suggest({"panonav", "unwrap", arguments.inputs.front(), "--camera", arguments.out, "-o",
                    several ? "panoramas" : "panorama.png"},
@@ -402,21 +353,23 @@ ExitCode calibrate(const Arguments& declared, const CalibrateArguments& argument
   }
   if (is_scattered(*mirror)) return refuse_scattered_rim(*mirror, session);
   const double forward_rad = radians(arguments.mirror.forward_angle_deg);
+  const auto assumed = list_assumptions(declared, arguments.mirror);
   const Camera camera = camera_from_mirror(
       *mirror, {.model = make_mirror_model(arguments.mirror, mirror->rim_radius_px),
                 .inner_radius_px = arguments.inner_radius_px,
                 .direction = arguments.mirror.direction == 0 ? ColumnDirection::clockwise
                                                              : ColumnDirection::counter_clockwise,
-                .forward_angle_rad = forward_rad});
+                .forward_angle_rad = forward_rad,
+                .is_model_assumed = !assumed.empty()});
   if (arguments.overlay) {
     const Image overlay = draw_mirror(views.front(), *mirror, forward_rad);
     write_png(*arguments.overlay, overlay.view());
   }
   write_result(arguments, {camera, std::nullopt, {}}, session);
   if (session.json()) {
-    session.print(json_line(to_json(arguments, images.size(), *mirror, camera)));
+    session.print(json_line(to_json(arguments, images.size(), *mirror, camera, assumed)));
   } else {
-    print_text(declared, arguments, images.size() > arguments.inputs.size(), *mirror, camera,
+    print_text(assumed, arguments, images.size() > arguments.inputs.size(), *mirror, camera,
                session);
   }
   return ExitCode::done;

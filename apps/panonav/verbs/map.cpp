@@ -338,6 +338,8 @@ void reject_options_without_effect(const Arguments& declared, const MapArguments
                     "the ground; allowed with --camera-height-m: panoramas with elevation_deg, "
                     "equirectangular images, and mirror images with a camera");
   }
+  if (declared.is_set("visual_odometry", "camera_height_m"))
+    require_known_elevations(recording.source, arguments.dataset);
   if (declared.is_set("visual_odometry", "camera_height_m") && wheels) {
     throw FileError(arguments.dataset,
                     "has odometry, which gives the lengths of all steps; allowed with "

@@ -78,6 +78,9 @@ struct Camera {
   /// Lens distortion of a unified model, before `affine`: k1, k2, p1, p2, k3 of OpenCV, for offsets
   /// from the centre divided by the focal length.
   std::array<double, 5> distortion{};
+  /// True if the elevations of the pixels were assumed, not measured, as the mirror's shape is
+  /// unknown. Lengths from the image of the ground would be wrong by an unknown factor.
+  bool has_assumed_elevations = false;
   friend bool operator==(const Camera&, const Camera&) = default;
 };
 

@@ -36,6 +36,7 @@ Camera camera_from_mirror(const MirrorCircle& mirror, const MirrorKnowledge& kno
   camera.inner_radius_px = knowledge.inner_radius_px.value_or(mirror.inner_radius_px.value_or(0.0));
   camera.direction = knowledge.direction;
   camera.forward_angle_rad = knowledge.forward_angle_rad;
+  camera.has_assumed_elevations = knowledge.is_model_assumed;
   validate(camera);
   return camera;
 }

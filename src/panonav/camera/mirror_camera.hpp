@@ -17,6 +17,7 @@ struct MirrorKnowledge {
   std::optional<double> inner_radius_px = std::nullopt;
   ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
   double forward_angle_rad = 0.0;                          ///< see Camera
+  bool is_model_assumed = false;  ///< the shape of the mirror or its elevations are a guess
 };
 
 /// Makes the camera of a mirror found in an image. Throws ContractError when model and circle do

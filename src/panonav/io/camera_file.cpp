@@ -20,6 +20,7 @@ namespace panonav {
 namespace {
 
 constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
+constexpr std::array<std::string_view, 2> elevation_origins{"known", "assumed"};
 
 int read_whole_number(TomlFields& fields, std::string_view field) {
   const double value = fields.required_number(field);
@@ -106,6 +107,7 @@ CameraFile read_camera(const std::filesystem::path& path, CameraMount mount) {
     camera.direction =
         *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
   }
+  camera.has_assumed_elevations = fields.choice("elevations", elevation_origins).value_or(0) == 1;
   const auto mask = fields.text("mask");
   fields.finish();
   try {
@@ -159,6 +161,11 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
   text += "columns = \"" +
           std::string(direction_names[camera.direction == ColumnDirection::clockwise ? 0 : 1]) +
           "\"\n";
+  if (camera.has_assumed_elevations) {
+    text +=
+        "# The shape of the mirror was assumed, so lengths must not be computed from the ground.\n"
+        "elevations = \"assumed\"\n";
+  }
   if (file.mask) {
     const std::string name = path.stem().string() + "_mask.png";
     write_png(path.parent_path() / name, file.mask->view());

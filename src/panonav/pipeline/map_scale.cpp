@@ -95,6 +95,7 @@ std::optional<double> compare_lengths(const TopologicalMap& known, const Topolog
 
 GroundScale measure_ground_scale(const MemoryFile& memory, double camera_height_m,
                                  const std::function<void(std::size_t)>& compared) {
+  require_known_elevations(memory.header().source, memory.path().string());
   GroundLengths ground(camera_height_m);
   const VisualMemory views = memory.load();
   const auto pairs = select_pairs(memory.map(map_name).value_or(TopologicalMap{}));

@@ -33,7 +33,7 @@ struct GroundScale {
 /// images shows below a camera at this height. The order of the views is not used. The scale is the
 /// median of the ratios; it is uncertain with fewer than 8 pairs, or if its deviation is above 10 %
 /// (chosen). Calls `compared` for each pair, with the number of all. Throws ContractError unless
-/// the height is above 0; FileError. Cost: 1 to 15 ms a pair.
+/// the height is above 0; FileError, also as `require_known_elevations`. Cost: 1 to 15 ms a pair.
 [[nodiscard]] GroundScale measure_ground_scale(
     const MemoryFile& memory, double camera_height_m,
     const std::function<void(std::size_t)>& compared = {});

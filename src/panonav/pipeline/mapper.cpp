@@ -42,7 +42,11 @@ Mapper::Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
       file_(std::move(memory)),
       encoder_(file_.header(), source.value_or(file_.header().source)),
       node_views_(file_.header().shape, file_.header().full_scale, file_.header().elevations),
-      mapper_(node_views_, options.mapping, options.odometry, options.closure, options.graph) {}
+      mapper_(node_views_, options.mapping, options.odometry, options.closure, options.graph) {
+  if (options.odometry.camera_height_m > 0.0) {
+    require_known_elevations(source.value_or(file_.header().source), file_.path().string());
+  }
+}
 
 Mapper::EncodedView Mapper::encode(const Observation& observation) const {
   const ReferenceInfo info{observation.name, observation.pose, observation.stamp_s};

@@ -359,6 +359,15 @@ LengthUnit read_map_unit(const MemoryFile& memory) {
                                                                  : LengthUnit::metres;
 }
 
+void require_known_elevations(const PictureSource& source, const std::string& input) {
+  if (!source.camera || !source.camera->has_assumed_elevations) return;
+  throw FileError(input,
+                  "has images of a mirror whose shape was assumed (elevations = \"assumed\" in the "
+                  "camera file), so lengths from the ground would be wrong by an unknown factor; "
+                  "state the shape of the mirror in panonav calibrate, or scale the map by a known "
+                  "distance (panonav scale, the option 'distance')");
+}
+
 std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::string, Pose2>& odometry,
                                    Executor& executor, const std::function<void()>& mapped) {
   const VisualMemory views = memory.load();

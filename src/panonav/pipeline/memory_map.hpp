@@ -95,4 +95,8 @@ void store_own_map_unit(MemoryFile& memory, LengthUnit unit);
 /// (`read_length_unit`) if these are of a data set.
 [[nodiscard]] LengthUnit read_map_unit(const MemoryFile& memory);
 
+/// Throws FileError about `input` if the elevations of the camera are assumed: lengths from the
+/// image of the ground would be wrong by an unknown factor.
+void require_known_elevations(const PictureSource& source, const std::string& input);
+
 }  // namespace panonav

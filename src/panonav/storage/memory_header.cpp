@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
 constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
+constexpr std::array<std::string_view, 2> elevation_origins{"known", "assumed"};
 
 void require_band(const std::optional<ElevationBand>& band, std::string_view field) {
   if (!band) return;
@@ -273,6 +274,8 @@ void visit_camera(Fields& fields, AnyCamera& camera) {
   fields.choice(prefix + "direction", direction_names, camera.direction);
   fields.field(prefix + "forward_angle_rad", camera.forward_angle_rad);
   fields.field(prefix + "forward_column", camera.forward_column);
+  fields.visit_choice_with_default(prefix + "elevations", elevation_origins,
+                                   camera.has_assumed_elevations, false);
 }
 
 // Reads or writes all fields of the header except the camera and its mask.
