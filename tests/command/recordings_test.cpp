@@ -282,7 +282,8 @@ TEST_F(Recordings, BecomeTheDataSetThatTheyWere) {
                   {"odometry", true},
                   {"positions", true},
                   {"headings", true},
-                  {"tilts", true}}));
+                  {"tilts", true},
+                  {"layout_flags", json::array()}}));
   const Dataset a = read_dataset(tilted);
   const Dataset b = read_dataset(back);
   EXPECT_EQ(a.source, b.source);
@@ -300,6 +301,24 @@ TEST_F(Recordings, BecomeTheDataSetThatTheyWere) {
     EXPECT_NEAR(is.tilt->roll_rad, was.tilt->roll_rad, 1e-12);
     EXPECT_NEAR(is.tilt->pitch_rad, was.tilt->pitch_rad, 1e-12);
   }
+}
+
+TEST_F(Recordings, TheFlagsOfTheLayoutAreNamed) {
+  const fs::path turned = *folder_ / "turned";
+  write_walk(turned, *world_, grid_poses(2), false);
+  Dataset dataset = read_dataset(turned);
+  dataset.source.layout.direction = ColumnDirection::counter_clockwise;
+  dataset.source.layout.forward_column = 0.25;
+  write_dataset(dataset);
+  const std::string recording = *folder_ / "turned.mcap";
+  const auto said = answer_of({"convert", turned, recording, "--json"});
+  std::vector<std::string> call{"convert", recording, *folder_ / "turned_back"};
+  for (const auto& flag : said["layout_flags"]) call.push_back(flag);
+  run_well(call);
+  EXPECT_EQ(read_dataset(*folder_ / "turned_back").source, dataset.source);
+  EXPECT_TRUE(
+      contains(run_panonav({"convert", turned, *folder_ / "turned2.mcap"}).out,
+               "add: --kind panorama --columns-run counter-clockwise --forward-column 0.25"));
 }
 
 TEST_F(Recordings, PicturesAloneGetASecondEach) {

@@ -266,6 +266,11 @@ TEST_F(Views, ExportOfLargePanoramasFindsTheSameViews) {
   }
 }
 
+TEST_F(Views, APageIsNoFolder) {
+  expect_refusal({"gallery", memory, "-o", folder / "views.html"}, "allowed: a folder");
+  EXPECT_FALSE(fs::exists(folder / "views.html"));
+}
+
 TEST_F(Views, ExportWithoutThumbnailsSaysThatNothingComesBack) {
   const fs::path out = folder / "out";
   const auto result = run_panonav({"export", bare(), "-o", out});

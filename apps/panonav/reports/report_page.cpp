@@ -49,6 +49,12 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
   namespace fs = std::filesystem;
   std::error_code error;
   const bool exists = fs::exists(folder, error);
+  const std::string extension = folder.extension().string();
+  if (!exists && (extension == ".html" || extension == ".htm")) {
+    throw FileError(folder.string(), "is the name of a page; allowed: a folder, such as " +
+                                         folder.stem().string() + ", which gets the page " +
+                                         std::string(page));
+  }
   const bool is_earlier_report = is_made_by(folder / page, "panonav " + std::string(verb));
   if (exists && (!fs::is_directory(folder, error) ||
                  (!is_earlier_report && !is_replaceable(folder, std::string(page))))) {

@@ -2,6 +2,7 @@
 
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/recording.hpp"
 #include "panonav_recordings/recording_conversion.hpp"
@@ -31,6 +32,30 @@ std::string describe_fields(const Dataset::Fields& done) {
   return text;
 }
 
+/// Returns the flags that read the images of a recording in the layout of the data set, because a
+/// recording does not contain the layout.
+std::vector<std::string> list_layout_flags(const PictureSource& source,
+                                           const ConvertArguments& arguments) {
+  if (source.kind == PictureKind::mirror) {
+    const std::string file =
+        arguments.pictures.camera.value_or((fs::path(arguments.input) / "camera.toml").string());
+    return {"--kind", "mirror", "--camera", fs::exists(file) ? file : "CAMERA_FILE"};
+  }
+  const bool is_sphere = source.kind == PictureKind::equirectangular;
+  std::vector<std::string> flags{"--kind", is_sphere ? "equirectangular" : "panorama"};
+  if (source.layout.direction == ColumnDirection::counter_clockwise) {
+    flags.insert(flags.end(), {"--columns-run", "counter-clockwise"});
+  }
+  if (source.layout.forward_column != PictureLayout{}.forward_column) {
+    flags.insert(flags.end(), {"--forward-column", to_text(source.layout.forward_column)});
+  }
+  if (const auto& band = is_sphere ? source.layout.kept_elevations : source.layout.elevations) {
+    flags.insert(flags.end(), {"--elevation-deg", to_text(to_exact_degrees(band->bottom_rad)),
+                               to_text(to_exact_degrees(band->top_rad))});
+  }
+  return flags;
+}
+
 ExitCode convert(const ConvertArguments& arguments, Session& session) {
   const bool is_mcap_output = fs::path(arguments.output).extension() == ".mcap";
   if (!is_mcap_output && (has_dataset_file(arguments.input) || can_have_table(arguments.input))) {
@@ -49,6 +74,10 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
       is_mcap_output ? recordings::convert_to_recording(dataset, arguments.output, advance)
                      : recordings::convert_to_dataset(dataset, arguments.output, advance);
   progress.clear();
+  const bool has_layout =
+      is_mcap_output && (has_dataset_file(arguments.input) || states_layout(arguments.pictures));
+  const auto layout_flags =
+      has_layout ? list_layout_flags(dataset.source, arguments) : std::vector<std::string>{};
   if (session.json()) {
     session.print(json_line(ordered_json{{"input", arguments.input},
                                          {"output", arguments.output},
@@ -57,7 +86,8 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
                                          {"odometry", done.odometry},
                                          {"positions", done.positions},
                                          {"headings", done.headings},
-                                         {"tilts", done.tilts}}));
+                                         {"tilts", done.tilts},
+                                         {"layout_flags", layout_flags}}));
     return ExitCode::done;
   }
   session.print(session.bold(format_count(dataset.entries.size(), "image")) + " of " +
@@ -65,6 +95,12 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
   if (is_mcap_output && !done.stamps) {
     session.print(
         "Some images have no stamp. The images are stored with an interval of one second.");
+  }
+  if (has_layout) {
+    std::string flags;
+    for (const std::string& each : layout_flags) flags += " " + quote_for_shell(each);
+    session.print("A recording does not contain the layout of its images. To use " +
+                  arguments.output + ", add:" + flags);
   }
   return ExitCode::done;
 }

@@ -1,3 +1,4 @@
+#include "cli/option_values.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/memory_export.hpp"
@@ -11,14 +12,21 @@ struct ExportArguments {
   std::string out;
 };
 
-std::string list_missing_values(const MemoryExport& done) {
-  std::string lost;
-  for (const auto& [is_there, what] : {std::pair{done.positions, "positions"},
-                                       {done.headings, "headings"},
-                                       {done.stamps, "stamps"}}) {
-    if (!is_there) lost += (lost.empty() ? "" : ", ") + std::string(what);
+/// Lists the values that the data set does not have, each with the reason.
+std::string list_missing_values(const MemoryExport& done, const MemoryFile& memory) {
+  std::vector<std::string> missing;
+  if (!done.positions && memory.info().views_with_position > 0 &&
+      read_length_unit(memory) == LengthUnit::view_steps) {
+    missing.emplace_back(
+        "positions and headings (they are in view steps, and a data set has metres: panonav "
+        "scale)");
+  } else if (!done.positions) {
+    missing.emplace_back("positions and headings (no view has a position)");
+  } else if (!done.headings) {
+    missing.emplace_back("headings (no view has one)");
   }
-  return lost;
+  if (!done.stamps) missing.emplace_back("stamps (not all views have one)");
+  return join_texts(missing);
 }
 
 void print_export(const MemoryExport& done, const MemoryFile& memory, const std::string& out,
@@ -52,11 +60,10 @@ void print_export(const MemoryExport& done, const MemoryFile& memory, const std:
                   " with other names than their views, because file names cannot contain "
                   "the names of these views; views.csv lists both names.");
   }
-  const std::string lost = list_missing_values(done);
-  if (!lost.empty()) {
-    session.print(
-        "The data set does not contain these values, because some views do not have them: " + lost +
-        "; views.csv lists the known values.");
+  const std::string missing = list_missing_values(done, memory);
+  if (!missing.empty()) {
+    session.print("The data set does not contain " + missing +
+                  "; views.csv lists all known values.");
   }
   const bool more = info.links + info.maps + info.routes > 0;
   if (more) session.print("Links, maps and routes are not exported.");
@@ -88,7 +95,8 @@ ExitCode export_all(const ExportArguments& arguments, Session& session) {
 Run declare_export(Arguments& arguments) {
   auto values = std::make_shared<ExportArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.required_option("-o,--out FOLDER", values->out, "New or empty folder");
+  arguments.required_option("-o,--out FOLDER", values->out,
+                            "New or empty folder; another one is refused");
   arguments.declare_outputs({"--out"});
   return [values](Session& session) { return export_all(*values, session); };
 }

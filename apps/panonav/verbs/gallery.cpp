@@ -191,8 +191,8 @@ Run declare_gallery(Arguments& arguments) {
   auto values = std::make_shared<GalleryArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.required_option("-o,--out FOLDER", values->out,
-                            "Folder for the page; it must be new or empty, or contain an earlier "
-                            "gallery, which is replaced");
+                            "Folder in which gallery.html is written; it must be new or empty, or "
+                            "contain an earlier gallery, which is replaced");
   declare_selection(arguments, values->selection);
   arguments.declare_outputs({"--out"});
   return [values](Session& session) { return gallery(*values, session); };
