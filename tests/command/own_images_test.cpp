@@ -54,16 +54,23 @@ std::vector<std::string> split_command(const std::string& command) {
 
 TEST_F(OwnImages, LeadFromTheMemoryToTrackingRoutesAndMetres) {
   memorise();
-  const auto tracked = run_panonav({"track", memory(), walk()});
+  const std::string tum = folder / "track.tum";
+  const auto tracked = run_panonav({"track", memory(), walk(), "--tum", tum});
   EXPECT_EQ(tracked.exit_code, 0) << tracked.err;
   EXPECT_TRUE(contains(tracked.out, "view steps")) << tracked.out;
   EXPECT_FALSE(contains(tracked.out, " m  ")) << tracked.out;
+  EXPECT_TRUE(contains(bytes_of(tum), "# unit: view steps\n# stamps: image numbers\n"));
+  EXPECT_TRUE(contains(run_panonav({"export", memory(), "-o", folder / "out"}).out,
+                       "positions and headings (they are in view steps"));
   const json recorded = answer_of({"route", "record", memory(), walk(), "--json"});
   EXPECT_TRUE(recorded.contains("length_steps"));
   EXPECT_FALSE(recorded.contains("length_m"));
   EXPECT_TRUE(recorded["bytes_per_km"].is_null());
-  const auto followed = run_panonav({"route", "follow", memory(), walk(), "--json"});
+  const std::string table = folder / "follow.csv";
+  const auto followed =
+      run_panonav({"route", "follow", memory(), walk(), "--json", "--tum", table});
   EXPECT_EQ(followed.exit_code, 0) << followed.err;
+  EXPECT_EQ(lines(bytes_of(table)).front(), "image,x_steps,y_steps,heading_deg");
   expect_refusal({"route", "record", memory(), walk(), "--name", "other", "--every-m", "1"},
                  "--every-m");
   const json scaled =

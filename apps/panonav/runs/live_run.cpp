@@ -152,6 +152,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
     throw UsageError("set --kind to the type of the images of " + input);
   }
   if (!remembered) note_default_band(*stated, session);
+  if (stated && remembered) note_other_camera(*stated, *remembered, input, session);
   recordings::LiveOptions options;
   options.note = [&session](const std::string& line) { session.note(line); };
   if (live.camera_width) options.size = ImageSize{*live.camera_width, *live.camera_height};

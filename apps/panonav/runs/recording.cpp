@@ -230,36 +230,6 @@ std::optional<ElevationBand> find_used_band(const PictureSource& source) {
   return default_equirectangular_band;
 }
 
-/// Prints a note if the images are of a camera that shows other elevations than the reference
-/// images, whose layout is `reference`.
-void note_other_camera(const PictureSource& images, const PictureSource& reference,
-                       const std::string& input, Session& session) {
-  if (!images.camera) return;
-  const bool has_reference_camera = reference.camera.has_value();
-  if (has_reference_camera && reference.camera->model == images.camera->model) return;
-  const auto used = find_used_band(reference);
-  if (!used) return;  // refused when the first image is compared
-  const ElevationBand seen = visible_elevations(*images.camera);
-  const double low_rad = std::max(used->bottom_rad, seen.bottom_rad);
-  const double high_rad = std::min(used->top_rad, seen.top_rad);
-  constexpr double tolerance_rad = 1e-3;
-  const bool has_all =
-      low_rad < used->bottom_rad + tolerance_rad && high_rad > used->top_rad - tolerance_rad;
-  const auto in_degrees = [](double a_rad, double b_rad) {
-    return format_number(degrees(a_rad), "deg") + " to " + format_number(degrees(b_rad), "deg") +
-           " degrees";
-  };
-  session.note(
-      "the camera of " + to_readable_line(input) + " (" +
-      std::string(model_name(images.camera->model)) + ") is not that of the reference images (" +
-      (has_reference_camera ? std::string(model_name(reference.camera->model)) : "panoramas") +
-      "); " +
-      (has_all ? "it shows all their elevations, " + in_degrees(low_rad, high_rad)
-               : "of their elevations, " + in_degrees(used->bottom_rad, used->top_rad) +
-                     ", both show " + in_degrees(low_rad, high_rad) +
-                     "; the other rows are filled with the nearest visible row"));
-}
-
 /// True if the first picture is a file that cannot be read or does not fit the layout, so that an
 /// error will be the only line.
 bool is_refused_later(const Dataset& opened) {
@@ -318,6 +288,34 @@ void SkippedImages::add(const std::exception_ptr& failure) {
     if (!is_about_damaged_picture(error.what()) || ++skipped_count_ == image_count_) throw;
     session_.note("skipped: " + to_readable_line(error.what()));
   }
+}
+
+void note_other_camera(const PictureSource& images, const PictureSource& reference,
+                       const std::string& input, Session& session) {
+  if (!images.camera) return;
+  const bool has_reference_camera = reference.camera.has_value();
+  if (has_reference_camera && reference.camera->model == images.camera->model) return;
+  const auto used = find_used_band(reference);
+  if (!used) return;  // refused when the first image is compared
+  const ElevationBand seen = visible_elevations(*images.camera);
+  const double low_rad = std::max(used->bottom_rad, seen.bottom_rad);
+  const double high_rad = std::min(used->top_rad, seen.top_rad);
+  constexpr double tolerance_rad = 1e-3;
+  const bool has_all =
+      low_rad < used->bottom_rad + tolerance_rad && high_rad > used->top_rad - tolerance_rad;
+  const auto in_degrees = [](double a_rad, double b_rad) {
+    return format_number(degrees(a_rad), "deg") + " to " + format_number(degrees(b_rad), "deg") +
+           " degrees";
+  };
+  session.note(
+      "the camera of " + to_readable_line(input) + " (" +
+      std::string(model_name(images.camera->model)) + ") is not that of the reference images (" +
+      (has_reference_camera ? std::string(model_name(reference.camera->model)) : "panoramas") +
+      "); " +
+      (has_all ? "it shows all their elevations, " + in_degrees(low_rad, high_rad)
+               : "of their elevations, " + in_degrees(used->bottom_rad, used->top_rad) +
+                     ", both show " + in_degrees(low_rad, high_rad) +
+                     "; the other rows are filled with the nearest visible row"));
 }
 
 void note_default_band(const PictureSource& source, Session& session) {

@@ -98,6 +98,11 @@ class SkippedImages {
   Session& session_;
 };
 
+/// Prints a note if the images of `input` are of a camera with another model than that of the
+/// reference images, with the elevations that both show.
+void note_other_camera(const PictureSource& images, const PictureSource& reference,
+                       const std::string& input, Session& session);
+
 /// Prints a note if the images are equirectangular and no elevation band is stated for them.
 void note_default_band(const PictureSource& source, Session& session);
 
