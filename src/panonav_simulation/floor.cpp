@@ -1,159 +1,34 @@
 #include "panonav_simulation/floor.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav_simulation/internal/columns.hpp"
 #include "panonav_simulation/internal/mesh_library.hpp"
 #include "panonav_simulation/internal/shapes.hpp"
-#include "panonav_simulation/internal/solids.hpp"
 
 namespace panonav::simulation {
 
 namespace {
 
-// A point where a vertical line crosses a surface.
-struct Crossing {
-  float z = 0.0F;
-  std::uint32_t surface = 0;  // number among the scene's Solids
-  bool is_level = false;      // at most 30 degrees steep
-  bool faces_up = false;
-};
-
-// Vertical lines on a raster, and where they cross the surfaces of a scene.
-class Columns {
- public:
-  Columns(const Scene& scene, bool may_be_room) : low_(scene.floor_low) {
-    constexpr double min_cell_m = 0.1;
-    constexpr double max_columns = 250000.0;
-    const double width_m = scene.floor_high.x_m - low_.x_m;
-    const double depth_m = scene.floor_high.y_m - low_.y_m;
-    cell_m_ = std::max({min_cell_m, std::sqrt(width_m * depth_m / max_columns),
-                        std::max(width_m, depth_m) / max_columns});
-    columns_ = std::max(1, static_cast<int>(width_m / cell_m_));
-    rows_ = std::max(1, static_cast<int>(depth_m / cell_m_));
-    crossings_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
-    const Solids solids(scene);
-    solids.for_each_triangle([&](const Solids::Triangle& triangle, std::size_t surface) {
-      if (may_be_room && surface == is_room_.size())
-        is_room_.push_back(solids.contains_everything(surface));
-      const Mesh& mesh = scene.meshes[triangle[0]];
-      const auto& t = mesh.triangles[triangle[1]];
-      add(mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]],
-          static_cast<std::uint32_t>(surface));
-    });
-    for (auto& column : crossings_)
-      std::ranges::stable_sort(column, {}, [](const Crossing& c) { return c.z; });
-  }
-
-  // Returns the heights of the lowest surfaces with room for the robot above them, of each column
-  // whose neighbours at the robot's radius are as high: tops of walls are too narrow. Empty if
-  // these are less than a tenth of all columns: tops of a few things without ground.
-  [[nodiscard]] std::vector<double> find_standing_heights(const FreeSpaceOptions& robot) const {
-    std::vector<std::optional<double>> heights;
-    for (const auto& column : crossings_)
-      heights.push_back(find_standing_height(column, robot.robot_height_m));
-    const int reach = static_cast<int>(std::ceil(robot.robot_radius_m / cell_m_));
-    std::vector<double> wide;
-    for (int j = 0; j < rows_; ++j) {
-      for (int i = 0; i < columns_; ++i) {
-        const auto& height = heights[index(i, j)];
-        const auto is_as_high = [&](int di, int dj) {
-          if (i + di < 0 || i + di >= columns_ || j + dj < 0 || j + dj >= rows_) return false;
-          const auto& other = heights[index(i + di, j + dj)];
-          return other && std::abs(*other - *height) <= robot.step_height_m;
-        };
-        if (height && is_as_high(reach, 0) && is_as_high(-reach, 0) && is_as_high(0, reach) &&
-            is_as_high(0, -reach))
-          wide.push_back(*height);
-      }
-    }
-    constexpr std::size_t min_share = 10;
-    return min_share * wide.size() < heights.size() ? std::vector<double>{} : wide;
-  }
-
- private:
-  [[nodiscard]] std::size_t index(int i, int j) const {
-    return static_cast<std::size_t>(j) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(i);
-  }
-
-  void add(const Vector3& a, const Vector3& b, const Vector3& c, std::uint32_t surface) {
-    const double ux = b.x_m - a.x_m;
-    const double uy = b.y_m - a.y_m;
-    const double vx = c.x_m - a.x_m;
-    const double vy = c.y_m - a.y_m;
-    const double normal_z = ux * vy - uy * vx;
-    if (normal_z == 0.0) return;
-    const double uz = b.z_m - a.z_m;
-    const double vz = c.z_m - a.z_m;
-    const double length = std::hypot(uy * vz - uz * vy, uz * vx - ux * vz, normal_z);
-    constexpr double min_cosine = 0.866;  // 30 degrees
-    const bool is_level = std::abs(normal_z) >= min_cosine * length;
-    const auto [x_low, x_high] = std::minmax({a.x_m, b.x_m, c.x_m});
-    const auto [y_low, y_high] = std::minmax({a.y_m, b.y_m, c.y_m});
-    const int i_end = last_centre(x_high - low_.x_m, columns_);
-    const int j_end = last_centre(y_high - low_.y_m, rows_);
-    for (int j = first_centre(y_low - low_.y_m, rows_); j <= j_end; ++j) {
-      for (int i = first_centre(x_low - low_.x_m, columns_); i <= i_end; ++i) {
-        const double px = low_.x_m + (i + 0.5) * cell_m_ - a.x_m;
-        const double py = low_.y_m + (j + 0.5) * cell_m_ - a.y_m;
-        const double s = (px * vy - py * vx) / normal_z;
-        const double t = (ux * py - uy * px) / normal_z;
-        if (s < 0.0 || t < 0.0 || s + t > 1.0) continue;
-        crossings_[index(i, j)].push_back(
-            {static_cast<float>(a.z_m + s * uz + t * vz), surface, is_level, normal_z > 0.0});
-      }
-    }
-  }
-
-  [[nodiscard]] int first_centre(double from_m, int count) const {
-    return static_cast<int>(std::clamp(std::ceil(from_m / cell_m_ - 0.5), 0.0, count + 0.0));
-  }
-  [[nodiscard]] int last_centre(double to_m, int count) const {
-    return static_cast<int>(std::clamp(std::floor(to_m / cell_m_ - 0.5), -1.0, count - 1.0));
-  }
-
-  [[nodiscard]] std::optional<double> find_standing_height(const std::vector<Crossing>& column,
-                                                           double room_m) const {
-    constexpr float same_m = 1e-3F;  // surfaces this near are one
-    for (std::size_t i = 0; i < column.size(); ++i) {
-      if (!column[i].is_level) continue;
-      std::size_t next = i + 1;
-      while (next < column.size() && column[next].z <= column[i].z + same_m) ++next;
-      if (next == column.size()) return column[i].z;
-      if (static_cast<double>(column[next].z - column[i].z) < room_m) continue;
-      // Going up, a closed surface is entered where it faces down and left where it faces up.
-      const auto is_entered = [&](const Crossing& above) {
-        int entered = 0;
-        for (std::size_t k = 0; k < next; ++k) {
-          if (column[k].surface == above.surface) entered += column[k].faces_up ? -1 : 1;
-        }
-        const bool is_room = above.surface < is_room_.size() && is_room_[above.surface];
-        return above.faces_up && entered > 0 && !is_room;
-      };
-      const bool is_solid =
-          std::any_of(column.begin() + static_cast<std::ptrdiff_t>(next), column.end(), is_entered);
-      if (!is_solid) return column[i].z;
-    }
-    return std::nullopt;
-  }
-
-  Point2 low_;
-  double cell_m_ = 0.1;
-  int columns_ = 1;
-  int rows_ = 1;
-  std::vector<std::vector<Crossing>> crossings_;
-  std::vector<bool> is_room_;  // of each surface; empty: none is
-};
-
 double floor_area_m2(const Scene& scene) {
   return (scene.floor_high.x_m - scene.floor_low.x_m) *
          (scene.floor_high.y_m - scene.floor_low.y_m);
+}
+
+// Returns the cell size of the map of free space: the set one, or a larger one for large floors.
+double choose_cell_m(const Scene& scene, const FreeSpaceOptions& options,
+                     const FloorKnowledge& known) {
+  constexpr double max_cells = 4e6;
+  if (known.is_cell_known) return options.cell_m;
+  return std::max({options.cell_m, std::sqrt(floor_area_m2(scene) / max_cells),
+                   (scene.floor_high.x_m - scene.floor_low.x_m) / 1e5,
+                   (scene.floor_high.y_m - scene.floor_low.y_m) / 1e5});
 }
 
 // Tries floors of one scene and keeps the best.
@@ -173,12 +48,7 @@ class FloorSearch {
   void try_floor(const Scene& scene, double height_m) {
     FreeSpaceOptions options = options_;
     options.floor_height_m = height_m;
-    if (!known_.is_cell_known) {
-      constexpr double max_cells = 4e6;
-      options.cell_m = std::max({options.cell_m, std::sqrt(floor_area_m2(scene) / max_cells),
-                                 (scene.floor_high.x_m - scene.floor_low.x_m) / 1e5,
-                                 (scene.floor_high.y_m - scene.floor_low.y_m) / 1e5});
-    }
+    options.cell_m = choose_cell_m(scene, options, known_);
     try {
       Floor floor{options, FreeSpace(scene, options), scene.floor_low, scene.floor_high};
       auto& best = floor.space.is_inside_solid() && !known_.may_be_room ? inside_ : outside_;
@@ -229,12 +99,9 @@ void add_ground(Scene& scene, double height_m) {
              place, "ground", 0);
 }
 
-}  // namespace
-
-std::vector<double> find_floor_heights(const Scene& scene, const FreeSpaceOptions& options,
-                                       bool may_be_room) {
-  const Columns columns(scene, may_be_room);
-  std::vector<double> heights = columns.find_standing_heights(options);
+// Returns up to three of the heights, see the header.
+std::vector<double> select_floor_heights(std::vector<double> heights,
+                                         const FreeSpaceOptions& options) {
   std::ranges::sort(heights);
   const std::size_t total = heights.size();
   std::vector<double> result;
@@ -262,16 +129,46 @@ std::vector<double> find_floor_heights(const Scene& scene, const FreeSpaceOption
   return result;
 }
 
-FreeSpace find_free_space(Scene& scene, FreeSpaceOptions& options, const FloorKnowledge& known) {
-  validate(options);
-  validate(scene);
-  Scene extended = scene;
-  extend_floor(extended);
-  const auto find_heights = [&](const Scene& in) {
-    return known.is_height_known ? std::vector{options.floor_height_m}
-                                 : find_floor_heights(in, options, known.may_be_room);
-  };
-  std::vector<double> extended_heights = find_heights(extended);
+// Finds the floor on a ground that is not level, within the area of `scene` or, without room there,
+// of `extended`. Sets the ground of `scene` and adds a warning; nullopt if the ground is level, the
+// height of the floor is set, or the robot can stand nowhere.
+std::optional<FloorSearch::Floor> find_sloping_floor(Scene& scene, const Scene& extended,
+                                                     const Columns& columns,
+                                                     const FreeSpaceOptions& options,
+                                                     const FloorKnowledge& known) {
+  Scene sloping = extended;
+  sloping.ground =
+      columns.find_sloping_ground(extended, options, choose_cell_m(extended, options, known));
+  if (sloping.ground == nullptr) return std::nullopt;
+  if (known.is_height_known) {
+    scene.warnings.push_back("the ground slopes, but the robot stays at the set floor height " +
+                             to_text(options.floor_height_m) + " m");
+    return std::nullopt;
+  }
+  const double middle_m = 0.5 * (sloping.ground->lowest_m() + sloping.ground->highest_m());
+  FloorSearch search(options, known);
+  Scene within = sloping;
+  within.floor_low = scene.floor_low;
+  within.floor_high = scene.floor_high;
+  search.try_floor(within, middle_m);
+  if (!search.has_room()) search.try_floor(sloping, middle_m);
+  if (!search.has_floor_outside()) return std::nullopt;
+  FloorSearch::Floor floor = search.take_best();
+  scene.ground = std::move(sloping.ground);
+  if (const auto slope_deg = std::lround(degrees(floor.space.max_slope_rad())); slope_deg > 0) {
+    scene.warnings.push_back("the ground slopes by up to " + std::to_string(slope_deg) +
+                             " degrees; the camera follows its height but stays upright, where a "
+                             "real robot would tilt");
+  }
+  return floor;
+}
+
+// Finds the floor at one height.
+FloorSearch::Floor find_level_floor(const Scene& scene, Scene extended, const Columns& columns,
+                                    const FreeSpaceOptions& options, const FloorKnowledge& known) {
+  std::vector<double> extended_heights =
+      known.is_height_known ? std::vector{options.floor_height_m}
+                            : select_floor_heights(columns.find_standing_heights(options), options);
   const double ground_m = known.is_height_known ? options.floor_height_m : extent(scene)->first.z_m;
   if (extended_heights.empty()) {
     add_ground(extended, ground_m);
@@ -280,7 +177,9 @@ FreeSpace find_free_space(Scene& scene, FreeSpaceOptions& options, const FloorKn
   Scene within = extended;
   within.floor_low = scene.floor_low;
   within.floor_high = scene.floor_high;
-  std::vector<double> heights = find_heights(within);
+  std::vector<double> heights = known.is_height_known
+                                    ? extended_heights
+                                    : find_floor_heights(within, options, known.may_be_room);
   if (heights.empty()) heights = extended_heights;
   const double highest_m =
       *std::ranges::min_element(extended_heights) + 0.5 * options.robot_height_m;
@@ -300,11 +199,28 @@ FreeSpace find_free_space(Scene& scene, FreeSpaceOptions& options, const FloorKn
     add_ground(extended, ground_m);
     search.try_floor(extended, ground_m);
   }
-  FloorSearch::Floor best = search.take_best();
-  options = best.options;
-  scene.floor_low = best.low;
-  scene.floor_high = best.high;
-  return std::move(best.space);
+  return search.take_best();
+}
+
+}  // namespace
+
+std::vector<double> find_floor_heights(const Scene& scene, const FreeSpaceOptions& options,
+                                       bool may_be_room) {
+  return select_floor_heights(Columns(scene, may_be_room).find_standing_heights(options), options);
+}
+
+FreeSpace find_free_space(Scene& scene, FreeSpaceOptions& options, const FloorKnowledge& known) {
+  validate(options);
+  validate(scene);
+  Scene extended = scene;
+  extend_floor(extended);
+  const Columns columns(extended, known.may_be_room);
+  auto floor = find_sloping_floor(scene, extended, columns, options, known);
+  if (!floor) floor = find_level_floor(scene, std::move(extended), columns, options, known);
+  options = floor->options;
+  scene.floor_low = floor->low;
+  scene.floor_high = floor->high;
+  return std::move(floor->space);
 }
 
 }  // namespace panonav::simulation

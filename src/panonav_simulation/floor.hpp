@@ -21,13 +21,13 @@ struct FloorKnowledge {
                                                      const FreeSpaceOptions& options,
                                                      bool may_be_room = false);
 
-/// Finds the free space of a scene that was read from a file. Sets `options.floor_height_m` to the
-/// height with the largest free area, of those up to half the robot's height above the lowest one,
-/// since higher ones are tops of things; enlarges `options.cell_m` for floors of more than 4
-/// million cells. If there is no room within `floor_low .. floor_high`, this area is extended by
-/// half its size (2 .. 10 m), where the ground continues, or everywhere if the scene has no ground.
-/// Tops of things and, after them, positions inside of a solid are the last choice. Throws as
-/// FreeSpace.
+/// Finds the free space of a scene that was read from a file. If the ground is not level, the robot
+/// follows it: `scene.ground` is set, and `options.floor_height_m` to the middle of its heights; a
+/// line in `scene.warnings` states the largest slope. Otherwise sets that height to the one with
+/// the largest free area, of those up to half the robot's height above the lowest one. Enlarges
+/// `options.cell_m` for floors of more than 4 million cells. Without room within `floor_low ..
+/// floor_high`, extends this area by half its size (2 .. 10 m), where the ground continues. Tops of
+/// things and, after them, positions inside of a solid are the last choice. Throws as FreeSpace.
 [[nodiscard]] FreeSpace find_free_space(Scene& scene, FreeSpaceOptions& options,
                                         const FloorKnowledge& known);
 

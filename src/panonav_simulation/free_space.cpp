@@ -44,6 +44,32 @@ std::string format_point(Point2 p) {
   return "(" + to_text(p.x_m) + ", " + to_text(p.y_m) + ")";
 }
 
+// Returns 1 for the cells of the raster with a surface between step and robot height.
+std::vector<std::uint8_t> find_obstacles(const Scene& scene, const Raster& raster,
+                                         const FreeSpaceOptions& options) {
+  if (scene.ground != nullptr) {
+    return find_cells_above_ground(scene, raster, *scene.ground, options.step_height_m,
+                                   options.robot_height_m);
+  }
+  const double z = options.floor_height_m;
+  return find_occupied_cells(scene, raster, z + options.step_height_m, z + options.robot_height_m);
+}
+
+// Returns 1 for the cells of the raster with ground at their centre.
+std::vector<std::uint8_t> find_ground_cells(const Ground& ground, const Raster& raster) {
+  std::vector<std::uint8_t> cells;
+  for (int j = 0; j < raster.rows; ++j) {
+    for (int i = 0; i < raster.columns; ++i) {
+      cells.push_back(ground.plane_at({raster.low.x_m + (i + 0.5) * raster.cell_m,
+                                       raster.low.y_m + (j + 0.5) * raster.cell_m})
+                              .is_ground
+                          ? 1
+                          : 0);
+    }
+  }
+  return cells;
+}
+
 }  // namespace
 
 FreeSpaceOptions free_space_options(double robot_radius_m, double camera_height_m) {
@@ -98,10 +124,12 @@ FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
            static_cast<std::size_t>(cell.i + margin);
   };
   const double z = options.floor_height_m;
-  const auto obstacles =
-      find_occupied_cells(scene, raster, z + options.step_height_m, z + options.robot_height_m);
-  const auto floor =
-      find_occupied_cells(scene, raster, z - options.step_height_m, z + options.step_height_m);
+  const Ground* const ground = scene.ground.get();
+  const auto obstacles = find_obstacles(scene, raster, options);
+  const auto floor = ground != nullptr
+                         ? find_ground_cells(*ground, raster)
+                         : find_occupied_cells(scene, raster, z - options.step_height_m,
+                                               z + options.step_height_m);
   const bool has_floor = std::find(floor.begin(), floor.end(), 1) != floor.end();
   const auto distances = compute_distances_to_cells(obstacles, raster);
 
@@ -123,7 +151,17 @@ FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
                  (!has_floor || floor[raster_index(cell)] != 0) && is_drivable(scene, centre(cell));
     }
   }
-  keep_connected_component(scene, z + 0.5 * (options.step_height_m + options.robot_height_m), seed);
+  keep_connected_component(
+      scene, (ground != nullptr ? 0.0 : z) + 0.5 * (options.step_height_m + options.robot_height_m),
+      seed);
+  for (const std::uint32_t k : free_cells_) {
+    if (ground == nullptr) break;
+    const auto columns = static_cast<std::uint32_t>(columns_);
+    const Ground::Plane plane =
+        ground->plane_at(centre({static_cast<int>(k % columns), static_cast<int>(k / columns)}));
+    max_slope_rad_ = std::max(
+        max_slope_rad_, static_cast<double>(std::atan(std::hypot(plane.slope_x, plane.slope_y))));
+  }
 }
 
 std::vector<std::vector<std::uint32_t>> FreeSpace::find_connected_components() const {
@@ -152,7 +190,8 @@ std::vector<std::vector<std::uint32_t>> FreeSpace::find_connected_components() c
   return components;
 }
 
-// Keeps one component; `z_m` is the height of the robot's middle in the scene.
+// Keeps one component; `z_m` is the height of the robot's middle in the scene, above the ground if
+// there is one.
 void FreeSpace::keep_connected_component(const Scene& scene, double z_m,
                                          std::optional<Point2> seed) {
   auto components = find_connected_components();
@@ -164,7 +203,8 @@ void FreeSpace::keep_connected_component(const Scene& scene, double z_m,
       const std::size_t probe = (2 * n + 1) * component.size() / (2 * counts.size());
       const int k = static_cast<int>(component[probe]);
       const Point2 at = centre({k % columns_, k / columns_});
-      counts[n] = solids.count_around({at.x_m, at.y_m, z_m});
+      const double ground_m = scene.ground != nullptr ? scene.ground->height_m(at) : 0.0;
+      counts[n] = solids.count_around({at.x_m, at.y_m, ground_m + z_m});
     }
     std::ranges::sort(counts);
     return counts[counts.size() / 2];

@@ -34,9 +34,9 @@ void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
 /// The free space of a robot in a scene: positions inside `floor_low .. floor_high` and the
 /// `drivable` areas, if any; with a surface to stand on within the step height of the floor, unless
 /// the scene has no floor at all; and without a surface between step height and robot height within
-/// the robot's radius. Only one connected component is kept: the one that contains `seed`; without
-/// `seed` the largest inside of the fewest solids (a table is one; a building with inner walls is
-/// none).
+/// the robot's radius. On the scene's ground, if it has one, these heights are measured from it.
+/// Only one connected component is kept: the one with `seed`; without it the largest inside of the
+/// fewest solids (a table is one).
 ///
 /// Computed on a map of square cells. Distances to obstacles are never overestimated and
 /// underestimated by at most 1.5 cells. Building costs O(cells + triangle area).
@@ -58,6 +58,8 @@ class FreeSpace {
   [[nodiscard]] double area_m2() const noexcept;  ///< of all free cells
   /// True if the free positions are inside of a solid, because nothing outside is free.
   [[nodiscard]] bool is_inside_solid() const noexcept { return is_inside_solid_; }
+  /// Returns the largest slope of the scene's ground at a free position; 0 without a ground.
+  [[nodiscard]] double max_slope_rad() const noexcept { return max_slope_rad_; }
   /// Returns the lower left corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 low() const noexcept { return low_; }
   /// Returns the upper right corner of the map: that of the scene's floor.
@@ -97,6 +99,7 @@ class FreeSpace {
   int columns_ = 0;
   int rows_ = 0;
   bool is_inside_solid_ = false;
+  double max_slope_rad_ = 0.0;
   std::vector<std::uint8_t> obstacle_;
   std::vector<std::uint8_t> free_;
   std::vector<float> clearance_m_;

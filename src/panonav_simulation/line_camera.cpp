@@ -66,6 +66,7 @@ std::vector<float> capture_line(const Renderer& renderer, const Pose2& pose,
                                 const LineCamera& camera, std::uint64_t seed) {
   const double c = std::cos(pose.heading_rad);
   const double s = std::sin(pose.heading_rad);
+  const double height_m = renderer.ground_height_m(pose.position()) + camera.height_m;
   constexpr std::size_t rays_each = rays_per_axis * rays_per_axis;
   std::vector<float> values(camera.pixels.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -73,7 +74,7 @@ std::vector<float> capture_line(const Renderer& renderer, const Pose2& pose,
       const MirrorRay& ray = camera.rays[i * rays_each + k];
       const Vector3 origin{pose.x_m + c * ray.origin.x_m - s * ray.origin.y_m,
                            pose.y_m + s * ray.origin.x_m + c * ray.origin.y_m,
-                           camera.height_m + ray.origin.z_m};
+                           height_m + ray.origin.z_m};
       const Direction3 direction{c * ray.direction.x - s * ray.direction.y,
                                  s * ray.direction.x + c * ray.direction.y, ray.direction.z};
       values[i] += renderer.radiance_along(origin, direction, camera.spread_rad) / rays_each;

@@ -217,9 +217,29 @@ class WorldReader {
         if (inner.origin.object.empty()) inner.origin.object = name.empty() ? "road" : name;
         add_renderable([&] { visuals_.add_road(part, context.world_from_scope, inner.origin); });
       });
-    } else if (is_element_named(part, {"actor", "population"})) {
+    } else if (kind == "actor") {
+      sdf_context_.try_to_add(thing, object, [&] { add_actor(part, placed_by, name, context); });
+    } else if (kind == "population") {
       sdf_context_.warn(object, thing + " is left out: panonav shows nothing of this kind");
     }
+  }
+
+  // Adds the skin of an actor where its first trajectory begins; at its own pose if it has none.
+  // Waypoints are poses in the world, which replace the pose of the actor, as in Gazebo.
+  void add_actor(pugi::xml_node actor, pugi::xml_node placed_by, const std::string& name,
+                 const ElementContext& context) {
+    const pugi::xml_node skin = actor.child("skin");
+    if (!skin) throw UnusablePart{"it has no skin"};
+    SdfOrigin origin = context.origin;
+    if (origin.object.empty()) origin.object = name;
+    const pugi::xml_node waypoint =
+        actor.child("script").child("trajectory").child("waypoint").child("pose");
+    const Affine3 world_from_actor =
+        waypoint ? read_pose(waypoint)
+                 : world_from(find_pose_element(placed_by) ? placed_by : actor,
+                              context.world_from_scope, context);
+    add_renderable([&] { visuals_.add_skin(skin, world_from_actor, origin); });
+    sdf_context_.warn(origin.object, "actors do not move; they stand where their path begins");
   }
 
   // Returns the root of the file that an <include> names, and its path; an empty path for
@@ -253,7 +273,7 @@ class WorldReader {
     const pugi::xml_node part = root.find_child([](pugi::xml_node child) {
       return is_element_named(child, {"model", "light", "actor"});
     });
-    if (!part) throw UnusablePart{"its file holds neither a model nor a light"};
+    if (!part) throw UnusablePart{"its file holds no model, light or actor"};
     opened_.push_back(file);
     add_part(part, include, inner_context);
     opened_.pop_back();

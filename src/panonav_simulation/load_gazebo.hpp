@@ -25,15 +25,14 @@ struct GazeboOptions {
 /// GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH and SDF_PATH, in this order.
 [[nodiscard]] std::vector<std::filesystem::path> gazebo_model_folders_of_environment();
 
-/// Reads a scene from a Gazebo world (SDF 1.0 and later; also a file with a single model):
-/// visuals with their poses, scales, colours and textures, and roads; one object per top-level
-/// model. Approximations: coloured lamps become white ones of the same brightness; point and spot
-/// lights shine to all sides; if their sum is brighter than white on the floor, all lights are
-/// scaled down. Visuals that are more than half transparent and invisible parts (collisions,
-/// joints, plugins) are left out. Parts that are missing, faulty or unknown (actors, height maps)
-/// are left out with one line each in Scene::warnings. `model://sun` and `model://ground_plane`
-/// need no folder. Throws FileError if the world is missing, no XML or contains nothing
-/// visible.
+/// Reads a scene from a Gazebo world (SDF 1.0 and later; also a file with a single model): visuals
+/// with poses, scales, colours and textures, heightmaps, roads, and skins of actors, which do not
+/// move; one object per model. Approximations: coloured lamps become white ones of the
+/// same brightness; lights shine to all sides; if their sum is brighter than white on the floor,
+/// all are scaled down. Visuals that are more than half transparent and invisible parts
+/// (collisions, joints, plugins) are left out. Parts that are missing, faulty or unknown are left
+/// out with one line each in Scene::warnings. `model://sun` and `model://ground_plane` need no
+/// folder. Throws FileError if the world is missing, no XML or contains nothing visible.
 [[nodiscard]] Scene load_gazebo(const std::filesystem::path& world,
                                 const GazeboOptions& options = {});
 

@@ -26,8 +26,9 @@ constexpr float lens_brightness = 0.01F;
 // Position and rotation of the robot in the scene, precomputed to create many rays.
 class RayFactory {
  public:
-  explicit RayFactory(const Viewpoint& viewpoint)
-      : at_{viewpoint.pose.x_m, viewpoint.pose.y_m, viewpoint.height_m},
+  RayFactory(const Viewpoint& viewpoint, const Renderer& renderer)
+      : at_{viewpoint.pose.x_m, viewpoint.pose.y_m,
+            renderer.ground_height_m(viewpoint.pose.position()) + viewpoint.height_m},
         x_(scene_from_robot(viewpoint, {1.0, 0.0, 0.0})),
         y_(scene_from_robot(viewpoint, {0.0, 1.0, 0.0})),
         z_(scene_from_robot(viewpoint, {0.0, 0.0, 1.0})) {}
@@ -101,6 +102,7 @@ struct Renderer::Implementation {
   Implementation(const Scene& scene, const RendererOptions& options, Executor& executor)
       : channels(options.channels),
         background(scene.background),
+        ground(scene.ground),
         lit(validate_and_subdivide(scene)),
         tracer(lit.vertices, lit.indices, options.instructions) {
     bake_light(scene, tracer, options.shadows, light_spacing_m(scene), lit, executor);
@@ -151,6 +153,7 @@ struct Renderer::Implementation {
 
   int channels;
   std::array<float, 3> background;
+  std::shared_ptr<const Ground> ground;
   LitTriangles lit;
   RayTracer tracer;
   std::vector<MaterialSampler> materials;
@@ -212,6 +215,11 @@ float Renderer::radiance_along(const Vector3& origin, const Direction3& directio
   return std::clamp(to_grey(colour.data(), implementation_->channels), 0.0F, 1.0F);
 }
 
+double Renderer::ground_height_m(Point2 position) const noexcept {
+  const Ground* const ground = implementation_->ground.get();
+  return ground != nullptr ? ground->height_m(position) : 0.0;
+}
+
 double Renderer::distance_along(const Vector3& origin, const Direction3& direction) const {
   const RayHit hit = implementation_->tracer.first_hit(unit_ray(origin, direction));
   if (hit.triangle == RayHit::no_triangle) return std::numeric_limits<double>::infinity();
@@ -243,7 +251,7 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
                                                                     std::sin(azimuth)};
     }
   }
-  const RayFactory make_ray(viewpoint);
+  const RayFactory make_ray(viewpoint, *this);
   const auto out = panorama.values();
   const auto draw_rows = [&](std::size_t begin, std::size_t end, std::size_t) {
     std::vector<Ray> rays(rays_per_row);
@@ -289,8 +297,10 @@ class CameraRays {
     std::optional<float> body;
   };
 
-  CameraRays(const Viewpoint& viewpoint, const Camera& camera)
-      : camera_(camera), dual_(std::get_if<DualFisheyeModel>(&camera.model)), make_ray_(viewpoint) {
+  CameraRays(const Viewpoint& viewpoint, const Camera& camera, const Renderer& renderer)
+      : camera_(camera),
+        dual_(std::get_if<DualFisheyeModel>(&camera.model)),
+        make_ray_(viewpoint, renderer) {
     if (std::holds_alternative<HyperboloidalModel>(camera.model)) mirror_.emplace(camera);
     for (std::size_t i = 0; dual_ && i < 2; ++i) {
       const double half_m = 0.5 * dual_->baseline_m;
@@ -349,7 +359,7 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
   validate(viewpoint);
   panonav::validate(camera);
   require_rays(rays_per_axis);
-  const CameraRays camera_rays(viewpoint, camera);
+  const CameraRays camera_rays(viewpoint, camera, *this);
   const int n = rays_per_axis;
   const auto channels = static_cast<std::size_t>(implementation_->channels);
   const auto width = static_cast<std::size_t>(camera.image_size.width);

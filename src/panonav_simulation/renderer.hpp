@@ -16,7 +16,7 @@ namespace panonav::simulation {
 /// Pose of the camera in the scene. Its axis is vertical if the robot is not tilted.
 struct Viewpoint {
   Pose2 pose;              ///< of the robot on the floor, in the scene's x and y
-  double height_m = 0.6;   ///< of the single viewpoint above the floor
+  double height_m = 0.6;   ///< of the single viewpoint above the ground
   double roll_rad = 0.0;   ///< about the robot's x axis, applied before the pitch
   double pitch_rad = 0.0;  ///< about the robot's y axis; positive lowers the front
 };
@@ -93,6 +93,9 @@ class Renderer {
   /// Returns the distance in metres to the nearest surface along the ray; infinity if there is
   /// none.
   [[nodiscard]] double distance_along(const Vector3& origin, const Direction3& direction) const;
+
+  /// Returns the height of the scene's ground at a position; 0 if the scene has none.
+  [[nodiscard]] double ground_height_m(Point2 position) const noexcept;
 
  private:
   struct Implementation;

@@ -74,6 +74,10 @@ void raise_scene(Scene& scene, double height_m) {
     for (Vector3& vertex : mesh.vertices) vertex.z_m += height_m;
   }
   for (PointLight& light : scene.lights) light.position.z_m += height_m;
+  if (scene.ground == nullptr) return;
+  Ground raised = *scene.ground;
+  raised.raise(height_m);
+  scene.ground = std::make_shared<const Ground>(std::move(raised));
 }
 
 void scale_light(Scene& scene, double factor) {

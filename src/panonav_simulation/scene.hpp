@@ -9,6 +9,7 @@
 #include "panonav/core/image.hpp"
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
+#include "panonav_simulation/ground.hpp"
 
 namespace panonav::simulation {
 
@@ -85,11 +86,12 @@ struct Scene {
   std::array<float, 3> background{0.75F, 0.8F, 0.85F};  ///< colour of rays that hit nothing
   Point2 floor_low;                                     ///< smallest x and y of the robot's floor
   Point2 floor_high;                                    ///< largest x and y of the robot's floor
-  std::vector<FloorArea> drivable;                      ///< empty: the whole floor
-  std::vector<Point2> tour;           ///< a closed round trip through free space; may be empty
-  double robot_radius_m = 0.2;        ///< of the robot for which the scene is made
-  double camera_height_m = 0.6;       ///< of the robot for which the scene is made
-  std::vector<std::string> warnings;  ///< e.g. missing textures; shown once by the command
+  std::shared_ptr<const Ground> ground;  ///< what robots follow; null: level at one height
+  std::vector<FloorArea> drivable;       ///< empty: the whole floor
+  std::vector<Point2> tour;              ///< a closed round trip through free space; may be empty
+  double robot_radius_m = 0.2;           ///< of the robot for which the scene is made
+  double camera_height_m = 0.6;          ///< of the robot for which the scene is made
+  std::vector<std::string> warnings;     ///< e.g. missing textures; shown once by the command
 };
 
 /// Throws ContractError, which names the mesh and its fault: an index out of range, not as many
@@ -98,7 +100,7 @@ struct Scene {
 void validate(const Scene& scene);
 using panonav::validate;  // for options
 
-/// Moves everything in the scene up by `height_m`, lamps as well.
+/// Moves everything in the scene up by `height_m`, lamps and ground as well.
 void raise_scene(Scene& scene, double height_m);
 
 /// Scales all light by `factor`, > 0: lamps, distant and ambient light, emission and the

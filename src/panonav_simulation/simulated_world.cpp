@@ -304,9 +304,14 @@ SimulatedWorld::SimulatedWorld(const std::string& scene, SimulatedWorldOptions o
         .is_height_known = find_set_option("free_space", "floor_height_m").has_value(),
         .is_cell_known = find_set_option("free_space", "cell_m").has_value(),
         .may_be_room = !is_gazebo_file(scene)};
+    const std::size_t reported = scene_.warnings.size();
     free_space_ = std::make_shared<const FreeSpace>(find_free_space(scene_, robot, known));
+    for (std::size_t i = reported; i < scene_.warnings.size(); ++i) {
+      scene_.warnings[i] = scene + ": " + scene_.warnings[i];
+      if (on_warning) on_warning(scene_.warnings[i]);
+    }
   }
-  // The robot and its camera move at a fixed height above z = 0.
+  // The robot and its camera move at a fixed height above z = 0 or above the scene's ground.
   if (robot.floor_height_m != 0.0) raise_scene(scene_, -robot.floor_height_m);
   renderer_ = std::make_shared<const Renderer>(scene_, RendererOptions{}, executor);
 }

@@ -69,7 +69,8 @@ class SimulatedWorld {
  public:
   /// `scene` is the name of a built-in scene, or a Gazebo world or mesh file, which is first read
   /// in a separate process because damaged files may crash the reader. The floor of a file is found
-  /// by `find_free_space`, unless the user set its height, and becomes z = 0 of the scene. Throws
+  /// by `find_free_space`, unless the user set its height, and becomes z = 0 of the scene; robots
+  /// follow a ground that is not level, with an upright camera. Throws
   /// OptionError on a name that is neither, and if the user set options for a file that vary only
   /// built-in scenes (scene_seed, moved_objects, moved_seed); FileError; else as `FreeSpace` and
   /// `Renderer`.

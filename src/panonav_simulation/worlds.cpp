@@ -49,19 +49,19 @@ Scene read_gazebo_world(const std::filesystem::path& data, const std::string& na
 
 namespace {
 
-bool is_built_in(const std::string& name) {
+bool is_built_in_scene(const std::string& name) {
   return std::ranges::find(scene_names(), name) != scene_names().end();
 }
 
 }  // namespace
 
 bool has_scene(const std::filesystem::path& data, const std::string& name) {
-  return is_built_in(name) || !filter_available_worlds(data, {name}).empty();
+  return is_built_in_scene(name) || !filter_available_worlds(data, {name}).empty();
 }
 
 Scene make_or_read_scene(const std::filesystem::path& data, const std::string& name,
                          const SceneVariation& variation) {
-  if (is_built_in(name)) return make_scene(name, variation);
+  if (is_built_in_scene(name)) return make_scene(name, variation);
   Scene scene = read_gazebo_world(data, name);
   if (variation.light != 1.0) scale_light(scene, variation.light);
   return scene;

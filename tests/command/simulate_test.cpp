@@ -256,6 +256,33 @@ TEST_F(Simulate, TheCameraStandsOnTheFloorThatIsFound) {
   EXPECT_GT(std::abs(level.at(16, 12) - level.at(16, 19)), 20) << "the wall is not seen";
 }
 
+TEST_F(Simulate, RobotsFollowAHeightmapAndANoticeStatesItsSlope) {
+  Image heights(65, 65);  // rises by 2 m over 20 m to the east
+  for (int v = 0; v < 65; ++v) {
+    for (int u = 0; u < 65; ++u) heights.at(u, v) = static_cast<std::uint8_t>(2 * u);
+  }
+  write_png(folder / "heights.png", heights.view());
+  const auto world = folder.write(
+      "land.world",
+      "<sdf version='1.6'><world name='land'><model name='land'><link name='l'><visual name='v'>"
+      "<geometry><heightmap><uri>heights.png</uri><size>20 20 2</size></heightmap></geometry>"
+      "</visual></link></model></world></sdf>");
+  const auto answer =
+      answer_of(with_small({"simulate", world, folder / "run", "--random", "20", "--json"}));
+  ASSERT_EQ(answer["warnings"].size(), 1U);
+  EXPECT_TRUE(contains(answer["warnings"][0].get<std::string>(),
+                       "land.world: the ground slopes by up to 6 degrees"));
+  EXPECT_GT(answer["free_area_m2"].get<double>(), 350.0);
+  double low_m = 10.0;
+  double high_m = -10.0;
+  for (const auto& entry : read_dataset(folder / "run").entries) {
+    low_m = std::min(low_m, entry.pose->x_m);
+    high_m = std::max(high_m, entry.pose->x_m);
+  }
+  EXPECT_LT(low_m, -5.0);
+  EXPECT_GT(high_m, 5.0);
+}
+
 TEST_F(Simulate, WarningsOfAWorldComeBeforeItsFailure) {
   const auto world =
       folder.write("room.world", ground_world("<include><uri>model://not_here</uri></include>" +

@@ -238,5 +238,48 @@ TEST(Roads, AreStripsAlongTheirPoints) {
                                 "road \"street\" is left out: it has fewer than two points"));
 }
 
+TEST(Actors, StandWhereTheirPathBegins) {
+  const testing::TemporaryFolder folder;
+  folder.write("man.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 2\nf 1 2 4\nf 1 3 4\n");
+  const auto load = [&](const std::string& actor) {
+    return load_gazebo(folder.write(
+        "w.world", "<sdf version='1.6'><world name='w'>" + actor +
+                       "<model name='m'><link name='l'><visual name='v'><geometry><box><size>1 1 1"
+                       "</size></box></geometry></visual></link></model></world></sdf>"));
+  };
+  const std::string skin = "<skin><filename>man.obj</filename><scale>0.5</scale></skin>";
+  const Scene walking =
+      load("<actor name='man'><pose>9 9 9 0 0 0</pose>" + skin +
+           "<animation name='walk'><filename>absent.bvh</filename></animation><script><trajectory "
+           "id='0' type='walk'><waypoint><time>0</time><pose>3 4 0.5 0 0 1.5707963267948966</pose>"
+           "</waypoint><waypoint><time>5</time><pose>8 8 0 0 0 0</pose></waypoint></trajectory>"
+           "</script></actor>");
+  ASSERT_EQ(walking.meshes.size(), 2U);
+  EXPECT_EQ(walking.meshes[0].object, "man");
+  const auto bounds = [](const Scene& scene) {
+    Scene man;
+    man.meshes.push_back(scene.meshes[0]);
+    return extent(man).value();
+  };
+  EXPECT_NEAR(bounds(walking).first.x_m, 2.5, 1e-9);
+  EXPECT_NEAR(bounds(walking).second.y_m, 4.5, 1e-9);
+  EXPECT_NEAR(bounds(walking).second.z_m, 1.5, 1e-9);
+  ASSERT_EQ(walking.warnings.size(), 1U);
+  EXPECT_TRUE(testing::contains(walking.warnings[0], "model \"man\": actors do not move"));
+  // Without a path, at its own pose.
+  const Scene standing = load("<actor name='man'><pose>9 9 9 0 0 0</pose>" + skin + "</actor>");
+  EXPECT_NEAR(bounds(standing).first.x_m, 9.0, 1e-9);
+  // One whose skin cannot be read is left out.
+  folder.write("damaged.dae", "<COLLADA>");
+  for (const std::string file : {"absent.dae", "damaged.dae"}) {
+    const Scene without =
+        load("<actor name='man'><skin><filename>" + file + "</filename></skin></actor>");
+    EXPECT_EQ(without.meshes.size(), 1U);
+    ASSERT_EQ(without.warnings.size(), 1U);
+    EXPECT_TRUE(testing::contains(without.warnings[0], "actor \"man\" is left out: "));
+    EXPECT_TRUE(testing::contains(without.warnings[0], file));
+  }
+}
+
 }  // namespace
 }  // namespace panonav::simulation

@@ -46,6 +46,20 @@ Image read_image(const std::filesystem::path& path, const ImageLimits& limits) {
   return decode_image(bytes, path.string(), limits);
 }
 
+GreyLevels read_grey_levels(const std::filesystem::path& path, const ImageLimits& limits) {
+  const auto bytes = read_file(path, image_limit_bytes);
+  const std::string name = path.string();
+  if (image_format(bytes, name) == ImageFormat::png) {
+    if (auto levels = detail::decode_png_of_16_bits(bytes, name, limits)) return *std::move(levels);
+  }
+  const Image image = decode_image(bytes, name, limits);
+  const Image grey = to_grey(image.view());
+  GreyLevels levels{grey.width(), grey.height(), {}};
+  for (const std::uint8_t value : grey.pixels())
+    levels.values.push_back(static_cast<std::uint16_t>(257 * value));
+  return levels;
+}
+
 ImageSize read_image_size(const std::filesystem::path& path, const ImageLimits& limits) {
   const auto bytes = read_file(path, image_limit_bytes);
   const std::string name = path.string();

@@ -28,6 +28,19 @@ struct ImageLimits {
 /// it crash.
 [[nodiscard]] Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
 
+/// Grey levels of a picture with 16 bits each.
+struct GreyLevels {
+  int width = 0;                      ///< pixels per row
+  int height = 0;                     ///< number of rows
+  std::vector<std::uint16_t> values;  ///< row-major, rows from the top; 65535 is white
+};
+
+/// Reads a PNG or JPEG file as `read_image` does, but keeps the 16 bits of grey PNG files and does
+/// not turn the picture. Values of fewer bits are scaled to 0 .. 65535, colours become grey. Throws
+/// FileError as `read_image`.
+[[nodiscard]] GreyLevels read_grey_levels(const std::filesystem::path& path,
+                                          const ImageLimits& limits = {});
+
 /// A format of picture files.
 enum class ImageFormat {
   png,  ///< lossless

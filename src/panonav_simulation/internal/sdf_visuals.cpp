@@ -4,6 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "panonav/io/image_file.hpp"
+#include "panonav_simulation/internal/heightmap.hpp"
 #include "panonav_simulation/internal/material_script.hpp"
 #include "panonav_simulation/internal/shapes.hpp"
 
@@ -127,7 +129,12 @@ void SdfVisuals::add_road(pugi::xml_node road, const Affine3& world_from_road,
 void SdfVisuals::add_shape(pugi::xml_node shape, pugi::xml_node visual,
                            const Affine3& world_from_visual, const SdfOrigin& origin) {
   const std::string_view kind = shape.name();
-  if (kind == "mesh") return add_mesh_file(shape, visual, world_from_visual, origin);
+  if (kind == "heightmap") return add_heightmap(shape, visual, world_from_visual, origin);
+  if (kind == "mesh") {
+    const auto scale = read_size(shape, "scale", 3, 1.0);
+    return add_mesh_file(
+        shape, visual, world_from_visual * Affine3::scaling(scale[0], scale[1], scale[2]), origin);
+  }
   const auto mesh = make_shape(shape);
   if (!mesh) return;
   Affine3 world_from_shape = world_from_visual;
@@ -143,30 +150,92 @@ void SdfVisuals::add_shape(pugi::xml_node shape, pugi::xml_node visual,
   if (kind == "plane") planes_.push_back(scene.meshes.size() - 1);
 }
 
-void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
+void SdfVisuals::add_skin(pugi::xml_node skin, const Affine3& world_from_actor,
+                          const SdfOrigin& origin) {
+  const double scale = read_number(skin, "scale", 1.0);
+  add_mesh_file(skin, {}, world_from_actor * Affine3::scaling(scale, scale, scale), origin);
+}
+
+// Adds a terrain. Its textures change at the heights of <blend>, without a transition. <sampling>
+// is ignored, because it only adds points between those of the image, on nearly the same surface.
+void SdfVisuals::add_heightmap(pugi::xml_node shape, pugi::xml_node visual,
                                const Affine3& world_from_visual, const SdfOrigin& origin) {
+  const fs::path path = find_file(shape, "heightmap", origin);
+  const GreyLevels image = read_grey_levels(path);
+  if (image.width < 2 || image.height < 2)
+    throw UnusablePart{path.string() + " has fewer than 2 x 2 pixels"};
+  if (std::max(image.width, image.height) > max_heightmap_side) {
+    context_.warn(origin.object, path.string() + " has " + std::to_string(image.width) + " x " +
+                                     std::to_string(image.height) + " pixels; at most " +
+                                     std::to_string(max_heightmap_side) + " per side are used");
+  }
+  const auto size = read_size(shape, "size", 3, 1.0);
+  if (!(size[0] > 0.0 && size[1] > 0.0)) throw UnusablePart{"its size in x or y is not above 0"};
+  std::vector<double> borders_m;
+  std::vector<double> tiles_m;
+  std::vector<std::string> textures;
+  for (const pugi::xml_node& texture : shape.children("texture")) {
+    textures.push_back(child_text(texture, "diffuse"));
+    tiles_m.push_back(read_number(texture, "size", 10.0));
+    if (!(tiles_m.back() > 0.0)) throw UnusablePart{"the size of a texture is not above 0"};
+  }
+  if (textures.empty()) {
+    textures.emplace_back();
+    tiles_m.push_back(1.0);
+  }
+  for (const pugi::xml_node& blend : shape.children("blend")) {
+    if (borders_m.size() + 1 < textures.size())
+      borders_m.push_back(read_number(blend, "min_height", 0.0));
+  }
+  std::ranges::sort(borders_m);
+  tiles_m.resize(borders_m.size() + 1);
+  Affine3 visual_from_terrain;
+  if (const pugi::xml_node pos = shape.child("pos")) {
+    const auto p = read_size(shape, "pos", 3, 0.0);
+    visual_from_terrain.translation = {p[0], p[1], p[2]};
+  }
+  const Mesh terrain = make_heightmap_mesh(image, {size[0], size[1], size[2]});
+  const std::vector<Mesh> ranges = split_at_heights(terrain, borders_m, tiles_m);
+  for (std::size_t i = 0; i < ranges.size(); ++i) {
+    if (ranges[i].triangles.empty()) continue;
+    Material material = apply_material({}, visual, origin);
+    set_texture(material, textures[i], origin);
+    context_.scene.materials.push_back(std::move(material));
+    place_mesh(context_.scene, ranges[i], world_from_visual * visual_from_terrain, origin.object,
+               static_cast<int>(context_.scene.materials.size()) - 1);
+  }
+}
+
+// Returns the path of the file that a shape names. Throws UnusablePart.
+fs::path SdfVisuals::find_file(pugi::xml_node shape, const std::string& what,
+                               const SdfOrigin& origin) {
   std::string uri = child_text(shape, "uri");
   if (uri.empty()) uri = child_text(shape, "filename");
   const auto path = context_.find(uri, origin);
   if (!path)
-    throw UnusablePart{"its mesh " + quote(uri) + " was not found in " +
+    throw UnusablePart{"its " + what + " " + quote(uri) + " was not found in " +
                        context_.files.list_folders()};
   if (context_.before_mesh) context_.before_mesh(*path);
+  return *path;
+}
+
+void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
+                               const Affine3& world_from_mesh, const SdfOrigin& origin) {
+  const fs::path path = find_file(shape, "mesh", origin);
   const pugi::xml_node submesh = shape.child("submesh");
   const std::string name = child_text(submesh, "name");
   std::vector<const FileMesh*> shown;
   // Gazebo takes the coordinates of all formats as they are, with z up; it ignores <up_axis>.
-  for (const FileMesh& part : meshes_.read(*path, UpAxis::z)) {
+  for (const FileMesh& part : meshes_.read(path, UpAxis::z)) {
     if (name.empty() || part.node == name || part.geometry == name) shown.push_back(&part);
   }
-  if (shown.empty()) throw UnusablePart{path->string() + " has no part " + quote(name)};
-  const auto scale = read_size(shape, "scale", 3, 1.0);
-  Affine3 world_from_mesh = world_from_visual * Affine3::scaling(scale[0], scale[1], scale[2]);
+  if (shown.empty()) throw UnusablePart{path.string() + " has no part " + quote(name)};
   const std::string centre = child_text(submesh, "center");
-  if (!name.empty() && (centre == "true" || centre == "1"))
-    world_from_mesh = world_from_mesh * make_centring_map(shown);
+  const bool is_centred = !name.empty() && (centre == "true" || centre == "1");
+  const Affine3 world_from_parts =
+      is_centred ? world_from_mesh * make_centring_map(shown) : world_from_mesh;
   for (const FileMesh* part : shown) {
-    place_mesh(context_.scene, part->mesh, world_from_mesh, origin.object,
+    place_mesh(context_.scene, part->mesh, world_from_parts, origin.object,
                get_or_add_material(*part, visual, origin));
   }
 }

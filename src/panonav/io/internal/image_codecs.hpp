@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,10 @@ void check_image_size(ImageSize size, std::string_view name, const ImageLimits& 
 
 [[nodiscard]] Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
                                const ImageLimits& limits);
+/// Returns the values of a grey PNG with 16 bits; nullopt for other kinds of PNG.
+[[nodiscard]] std::optional<GreyLevels> decode_png_of_16_bits(std::span<const std::uint8_t> bytes,
+                                                              std::string_view name,
+                                                              const ImageLimits& limits);
 [[nodiscard]] ImageSize png_size(std::span<const std::uint8_t> bytes, std::string_view name,
                                  const ImageLimits& limits);
 [[nodiscard]] std::vector<std::uint8_t> encode_png(ImageView image);

@@ -1,6 +1,7 @@
 #include <png.h>
 
 #include <algorithm>
+#include <bit>
 #include <csetjmp>
 #include <cstring>
 #include <string>
@@ -79,6 +80,16 @@ bool set_transforms(Reader& reader, int& channels) {
   return true;
 }
 
+// Requests the stored 16 bits of a grey image, in the byte order of this machine.
+bool set_transforms_of_16_bits(Reader& reader) {
+  if (setjmp(png_jmpbuf(reader.png))) return false;
+  png_set_strip_alpha(reader.png);
+  if constexpr (std::endian::native == std::endian::little) png_set_swap(reader.png);
+  png_set_interlace_handling(reader.png);
+  png_read_update_info(reader.png, reader.info);
+  return true;
+}
+
 bool read_pixels(Reader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
@@ -118,6 +129,16 @@ ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_
   if (!try_open(reader, size)) fail(reader, name);
   check_image_size(size, name, limits);
   return size;
+}
+
+// Deflate packs at most 1032 to 1, so a larger picture cannot be in this file; no memory is
+// allocated for it.
+void require_plausible_size(ImageSize size, std::span<const std::uint8_t> bytes,
+                            std::string_view name) {
+  const auto min_bits = static_cast<std::int64_t>(size.width) * size.height;
+  if (min_bits / 8 / 1032 > static_cast<std::int64_t>(bytes.size())) {
+    throw FileError(name, "damaged PNG: the file ends too early");
+  }
 }
 
 struct Writer {
@@ -179,12 +200,7 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
                  const ImageLimits& limits) {
   Reader reader;
   const ImageSize size = open(reader, bytes, name, limits);
-  // Deflate packs at most 1032 to 1, so a larger picture cannot be in this file; no memory is
-  // allocated for it.
-  const auto min_bits = static_cast<std::int64_t>(size.width) * size.height;
-  if (min_bits / 8 / 1032 > static_cast<std::int64_t>(bytes.size())) {
-    throw FileError(name, "damaged PNG: the file ends too early");
-  }
+  require_plausible_size(size, bytes, name);
   int channels = 0;
   if (!set_transforms(reader, channels)) fail(reader, name);
   if (channels != 1 && channels != 3) throw FileError(name, "damaged PNG: unknown colour type");
@@ -194,6 +210,26 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
   for (int v = 0; v < size.height; ++v) rows[v] = &image.at(0, v);
   if (!read_pixels(reader, rows.data())) fail(reader, name);
   return apply_exif_orientation(std::move(image), read_exif_orientation(reader.exif));
+}
+
+std::optional<GreyLevels> decode_png_of_16_bits(std::span<const std::uint8_t> bytes,
+                                                std::string_view name, const ImageLimits& limits) {
+  Reader reader;
+  const ImageSize size = open(reader, bytes, name, limits);
+  constexpr int bits = 16;
+  if (png_get_bit_depth(reader.png, reader.info) != bits ||
+      (png_get_color_type(reader.png, reader.info) & PNG_COLOR_MASK_COLOR) != 0)
+    return std::nullopt;
+  require_plausible_size(size, bytes, name);
+  if (!set_transforms_of_16_bits(reader)) fail(reader, name);
+  const auto width = static_cast<std::size_t>(size.width);
+  GreyLevels levels{size.width, size.height, {}};
+  levels.values.resize(width * static_cast<std::size_t>(size.height));
+  std::vector<png_bytep> rows(static_cast<std::size_t>(size.height));
+  for (std::size_t v = 0; v < rows.size(); ++v)
+    rows[v] = reinterpret_cast<png_bytep>(&levels.values[v * width]);
+  if (!read_pixels(reader, rows.data())) fail(reader, name);
+  return levels;
 }
 
 std::vector<std::uint8_t> encode_png(ImageView image) {
