@@ -27,9 +27,9 @@ Dataset open_video(const std::filesystem::path& path, const PictureSource& sourc
   return read_videos(paths, source, options.selection);
 }
 
-Dataset open_foreign_pictures(const std::filesystem::path& path, const PictureSource& source,
-                              const InputOptions& options) {
-  Dataset opened = read_foreign_pictures(path, source);
+Dataset open_foreign_picture(const std::filesystem::path& path, const PictureSource& source,
+                             const InputOptions& options) {
+  Dataset opened = read_foreign_picture(path, source);
   select_pictures(opened, options.selection);
   return opened;
 }
@@ -51,7 +51,8 @@ void register_recordings() {
   register_dataset_reader({"recording", true, is_recording, open_recording});
   register_dataset_reader({"video", false, is_video, open_video});
   register_dataset_reader(
-      {"folder of WebP, HEIC or AVIF images", false, is_foreign_picture, open_foreign_pictures});
+      {"WebP, HEIC or AVIF image", false, is_foreign_picture, open_foreign_picture});
+  register_foreign_picture_store(make_foreign_picture_store);
   register_dataset_reader({"stream", false, is_standard_input, open_standard_input});
 }
 

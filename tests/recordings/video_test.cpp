@@ -11,9 +11,13 @@
 #include <thread>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/executor.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/io/dataset_readers.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/internal/foreign_pictures.hpp"
 #include "support/comma_locale.hpp"
@@ -252,24 +256,57 @@ TEST_F(Video, FilesOfTwoLensesAreSetSideBySide) {
 TEST_F(Video, FoldersOfWebPAreReadAsThoseOfPng) {
   fs::create_directory(folder / "web");
   (void)make("web/w%d.webp", "-c:v libwebp -lossless 1 -f image2");
-  EXPECT_TRUE(is_foreign_picture(folder / "web"));
-  const Dataset web = read_foreign_pictures(folder / "web", {});
+  register_foreign_picture_store(make_foreign_picture_store);
+  const auto open = [&] { return open_input(folder / "web", {.source = PictureSource{}}); };
+  const Dataset web = open();
   ASSERT_EQ(web.entries.size(), count);
   EXPECT_EQ(web.entries[9].file, "w10.webp");  // numbers from 1 on
   for (const int i : {9, 0, 19}) {
     EXPECT_EQ(read_picture(web.entries[static_cast<std::size_t>(i)]), noise(i)) << i;
   }
-  EXPECT_EQ(read_picture(read_foreign_pictures(folder / "web" / "w3.webp", {}).entries.at(0)),
+  EXPECT_EQ(read_picture(read_foreign_picture(folder / "web" / "w3.webp", {}).entries.at(0)),
             noise(2));
-  // Beside others they are left out and named.
+  // With those of other kinds, in the order of names; what is no image is named.
   fs::copy_file(folder / "n0.png", folder / "web" / "a.png");
-  EXPECT_FALSE(is_foreign_picture(folder / "web"));
-  const Dataset mixed = open_input(folder / "web", {.source = PictureSource{}});
-  EXPECT_EQ(mixed.entries.size(), 1U);
+  const Image jpeg = noise(5);
+  write_file(folder / "web" / "w3_b.jpg", encode_jpeg(jpeg.view()));
+  std::ofstream(folder / "web" / "notes.txt") << "text";
+  Dataset mixed = open();
+  ASSERT_EQ(mixed.entries.size(), count + 2U);
+  EXPECT_EQ(mixed.entries[0].file, "a.png");
+  EXPECT_EQ(mixed.entries[3].file, "w3.webp");
+  EXPECT_EQ(mixed.entries[4].file, "w3_b.jpg");
+  EXPECT_EQ(mixed.entries[5].file, "w4.webp");
+  EXPECT_EQ(read_picture(mixed.entries[0]), noise(0));
+  EXPECT_EQ(read_picture(mixed.entries[5]), noise(3));
   ASSERT_FALSE(mixed.warnings.empty());
-  EXPECT_TRUE(contains(mixed.warnings[0],
-                       "left out, WebP, HEIC or AVIF (convert them to PNG or JPEG) (20): w1.webp"))
-      << mixed.warnings[0];
+  EXPECT_EQ(mixed.warnings[0], "left out, no PNG or JPEG: notes.txt");
+  // A damaged one is taken out and named, of any kind, and in any position.
+  const std::string whole = bytes_of(folder / "web" / "w1.webp");
+  write_file(folder / "web" / "w1.webp", std::string_view(whole).substr(0, 40));
+  std::ofstream(folder / "web" / "w2.png") << "no image";
+  mixed = open();
+  Executor executor(1);
+  leave_out_unusable_pictures(mixed, executor);
+  EXPECT_EQ(mixed.entries.size(), count + 1U);
+  ASSERT_EQ(mixed.unusable.size(), 2U);
+  EXPECT_EQ(mixed.unusable[0].file, "w1.webp");
+  EXPECT_EQ(mixed.unusable[1].file, "w2.png");
+}
+
+TEST_F(Video, TablesMayNameWebP) {
+  fs::create_directory(folder / "set");
+  (void)make("set/w%d.webp", "-c:v libwebp -lossless 1 -f image2");
+  fs::copy_file(folder / "n0.png", folder / "set" / "a.png");
+  std::ofstream(folder / "set" / "dataset.toml")
+      << "[images]\nkind = \"panorama\"\n[list]\nfile = \"images.csv\"\n";
+  std::ofstream(folder / "set" / "images.csv") << "file\nw2.webp\na.png\nw1.webp\n";
+  register_foreign_picture_store(make_foreign_picture_store);
+  const Dataset set = open_input(folder / "set", {});
+  ASSERT_EQ(set.entries.size(), 3U);
+  EXPECT_EQ(read_picture(set.entries[0]), noise(1));
+  EXPECT_EQ(read_picture(set.entries[1]), noise(0));
+  EXPECT_EQ(read_picture(set.entries[2]), noise(0));
 }
 
 TEST_F(Video, ChaptersAreOneVideo) {

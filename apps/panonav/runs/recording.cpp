@@ -12,6 +12,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
+#include "panonav/io/dataset_readers.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/media_kind.hpp"
 #include "panonav/io/panorama_reader.hpp"
@@ -268,9 +269,12 @@ namespace {
 bool is_about_damaged_picture(std::string_view message) {
   for (auto at = message.find(": "); at != message.npos; at = message.find(": ", at + 1)) {
     const fs::path file(message.substr(0, at));
-    if (identify_media_file(file) != MediaKind::picture) continue;
+    const MediaKind kind = identify_media_file(file);
+    if (kind != MediaKind::picture && kind != MediaKind::foreign_picture) continue;
     try {
-      static_cast<void>(check_image(file));
+      std::vector<DatasetEntry> entries = read_single_picture(file, {}).entries;
+      set_foreign_picture_stores(entries);
+      static_cast<void>(read_picture(entries.front()));
     } catch (const FileError&) {
       return true;
     }

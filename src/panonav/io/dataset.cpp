@@ -13,6 +13,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
+#include "panonav/io/dataset_readers.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/internal/csv_table.hpp"
 #include "panonav/io/internal/toml_fields.hpp"
@@ -188,6 +189,7 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
     }
     entries.push_back(std::move(entry));
   }
+  set_foreign_picture_stores(entries);
   return entries;
 }
 
@@ -195,12 +197,17 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
   Dataset dataset{folder, std::move(source), {}, {}};
   std::error_code error;
   std::vector<std::string> names;
+  const bool with_foreign = can_read_foreign_pictures();
+  const auto is_readable = [&](const fs::path& path) {
+    return is_folder_picture(path) || (with_foreign && !is_hidden(path) &&
+                                       identify_media_file(path) == MediaKind::foreign_picture);
+  };
   fs::recursive_directory_iterator file(folder, error);
   for (; !error && file != fs::recursive_directory_iterator(); file.increment(error)) {
     std::error_code unknown;
     const std::string name = file->path().lexically_relative(folder).string();
     const bool is_folder = file->is_directory(unknown) && !file->is_symlink(unknown);
-    if (file->is_regular_file(unknown) && is_folder_picture(file->path())) {
+    if (file->is_regular_file(unknown) && is_readable(file->path())) {
       names.push_back(name);
     } else if (!is_folder) {
       dataset.left_out.push_back(escape_name(name));
@@ -220,6 +227,7 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
     entry.file = escape_name(name);
     dataset.entries.push_back(std::move(entry));
   }
+  set_foreign_picture_stores(dataset.entries);
   return dataset;
 }
 

@@ -111,7 +111,8 @@ struct Dataset {
 void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 
 /// Reads a folder of PNG and JPEG pictures (`is_folder_picture`) without dataset.toml, in natural
-/// order of their names ("view_9" before "view_10"). Throws FileError if it contains none.
+/// order of their names ("view_9" before "view_10"); with them those of other formats for which a
+/// store is registered (`register_foreign_picture_store`). Throws FileError if it contains none.
 [[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
                                           PictureSource source);
 /// Reads a folder with the images of all folders below it ("morning/view_1"); symbolic links are

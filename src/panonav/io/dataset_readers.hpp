@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -55,6 +56,18 @@ void register_dataset_reader(const DatasetReader& reader);
 /// Returns the reader registered first among those that recognise the path; `nullopt` if there is
 /// none.
 [[nodiscard]] std::optional<DatasetReader> find_dataset_reader(const std::filesystem::path& path);
+/// Makes a store whose picture i is the file `files[i]`, of the kind
+/// `MediaKind::foreign_picture`.
+using ForeignPictureStoreMaker =
+    std::shared_ptr<const PictureStore> (*)(std::vector<std::filesystem::path> files);
+/// Sets how pictures are read that are neither PNG nor JPEG, in folders and in tables of data sets;
+/// without it, they are left out of folders. Several threads may call.
+void register_foreign_picture_store(ForeignPictureStoreMaker maker);
+/// True if a maker of such stores is registered.
+[[nodiscard]] bool can_read_foreign_pictures();
+/// Sets the stores of the entries whose files are foreign pictures, if a maker is registered.
+void set_foreign_picture_stores(std::vector<DatasetEntry>& entries);
+
 /// True if a reader of this name is registered.
 [[nodiscard]] bool has_dataset_reader(const std::string& name);
 

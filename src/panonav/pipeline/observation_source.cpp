@@ -6,6 +6,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/media_kind.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/motion/path.hpp"
 
@@ -52,7 +53,9 @@ namespace {
 ImageSize check_picture(const DatasetEntry& entry, const PictureSource& source, bool head_only,
                         std::string& fault) {
   try {
-    const ImageSize size = head_only ? read_image_size(entry.path) : check_image(entry.path);
+    const ImageSize size = entry.store ? read_picture(entry).size()
+                           : head_only ? read_image_size(entry.path)
+                                       : check_image(entry.path);
     require_picture_size(source, size);
     return size;
   } catch (const FileError& error) {
@@ -63,6 +66,11 @@ ImageSize check_picture(const DatasetEntry& entry, const PictureSource& source, 
     fault = error.what();
   }
   return {};
+}
+
+/// True if the picture is a file of its own, also one that a store decodes.
+bool is_file_of_one_picture(const DatasetEntry& entry) {
+  return !entry.store || identify_media_file(entry.path) == MediaKind::foreign_picture;
 }
 
 /// Returns the size that most pictures have, the first of these if there are several; 0 is no size.
@@ -81,7 +89,7 @@ ImageSize find_most_frequent_size(const std::vector<ImageSize>& sizes) {
 
 void leave_out_unusable_pictures(Dataset& dataset, Executor& executor, bool heads_only) {
   auto& entries = dataset.entries;
-  if (entries.size() < 2 || entries.front().store) return;
+  if (entries.size() < 2 || !std::ranges::all_of(entries, is_file_of_one_picture)) return;
   std::vector<std::string> faults(entries.size());
   std::vector<ImageSize> sizes(entries.size());
   executor.for_each_chunk(entries.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {

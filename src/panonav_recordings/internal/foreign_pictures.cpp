@@ -1,6 +1,5 @@
 #include "panonav_recordings/internal/foreign_pictures.hpp"
 
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <utility>
@@ -35,48 +34,19 @@ class ForeignPictures final : public PictureStore {
   std::vector<fs::path> files_;
 };
 
-/// Returns the foreign pictures of a folder; empty if it has a description or other pictures.
-std::vector<fs::path> list_foreign_pictures(const fs::path& folder) {
-  std::error_code error;
-  std::vector<fs::path> files;
-  for (const char* name : {"dataset.toml", "metadata.yaml"}) {
-    if (fs::exists(folder / name, error)) return {};
-  }
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const fs::path& file = entry->path();
-    if (is_folder_picture(file)) return {};
-    if (!is_hidden(file) && identify_media_file(file) == MediaKind::foreign_picture)
-      files.push_back(file);
-  }
-  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
-    return is_naturally_less(a.filename().string(), b.filename().string());
-  });
-  return files;
-}
-
 }  // namespace
 
 bool is_foreign_picture(const fs::path& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) return !list_foreign_pictures(path).empty();
   return identify_media_file(path) == MediaKind::foreign_picture;
 }
 
-Dataset read_foreign_pictures(const fs::path& path, PictureSource source) {
-  std::error_code error;
-  const bool is_folder = fs::is_directory(path, error);
-  const std::vector<fs::path> files = is_folder ? list_foreign_pictures(path) : std::vector{path};
-  if (files.empty()) throw FileError(path.string(), "contains no WebP, HEIC or AVIF image");
-  const auto store = std::make_shared<const ForeignPictures>(files);
-  Dataset dataset{is_folder ? path : path.parent_path(), std::move(source), {}, {}};
-  for (const fs::path& file : files) {
-    DatasetEntry& entry = dataset.entries.emplace_back();
-    entry.file = escape_name(file.filename().string());
-    entry.path = file;
-    entry.store = store;
-    entry.store_index = dataset.entries.size() - 1;
-  }
+std::shared_ptr<const PictureStore> make_foreign_picture_store(std::vector<fs::path> files) {
+  return std::make_shared<const ForeignPictures>(std::move(files));
+}
+
+Dataset read_foreign_picture(const fs::path& path, PictureSource source) {
+  Dataset dataset = read_single_picture(path, std::move(source));
+  dataset.entries.front().store = make_foreign_picture_store({path});
   return dataset;
 }
 
