@@ -282,6 +282,17 @@ TEST_F(CameraVerbs, RecordingsAreCalibratedAndUnwrappedAsTheirPicturesAre) {
   const json by_pictures = calibrate({picture(0), picture(1), picture(2)});
   EXPECT_EQ(calibrate({run}), by_pictures);
   EXPECT_EQ(calibrate({recording}), by_pictures);
+  // A damaged image of a folder is skipped and named.
+  const std::filesystem::path mixed = std::string(out_ / "mixed");
+  std::filesystem::create_directory(mixed);
+  for (int i = 0; i < 3; ++i)
+    std::filesystem::copy_file(picture(i), mixed / ("p" + std::to_string(2 * i) + ".png"));
+  std::string damaged = bytes_of(picture(1));
+  damaged[damaged.size() - 30] ^= 1;  // in the pixels
+  std::ofstream(mixed / "p1.png", std::ios::binary) << damaged;
+  const auto result = run_panonav({"calibrate", mixed, "-o", out_ / "c.toml", "--json"});
+  EXPECT_EQ(json::parse(result.out), by_pictures);
+  EXPECT_TRUE(contains(result.err, "skipped: " + (mixed / "p1.png").string())) << result.err;
 
   run_well({"unwrap", picture(1), "--camera", true_camera(), "-o", out_ / "one.png"});
   const auto said = answer_of({"unwrap", run, "-o", out_ / "by_folder", "--json"});

@@ -52,6 +52,24 @@ TEST_F(Catchment, CountsAllPairsAndKeepsItsBooks) {
   EXPECT_GE(areas[0]["places"].get<double>(), 1.0) << "who is at home stays there";
 }
 
+TEST_F(Catchment, DamagedImagesAreSkippedAndNamed) {
+  const std::string damaged_file = run + "/" + view_name(7);
+  std::string damaged = bytes_of(damaged_file);
+  damaged[damaged.size() - 30] ^= 1;  // in the pixels
+  std::ofstream(damaged_file, std::ios::binary) << damaged;
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{}, std::vector<std::string>{"--turn-randomly", "3"}}) {
+    const auto result = run_panonav(with({"catchment", run, "--json"}, more));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    const auto answer = json::parse(result.out);
+    EXPECT_EQ(answer["goals"], 24);
+    EXPECT_EQ(answer["places"], 24);
+    const auto first = result.err.find("skipped: " + damaged_file);
+    EXPECT_NE(first, std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find("skipped: ", first + 1), std::string::npos) << "once";
+  }
+}
+
 TEST_F(Catchment, OneStageIsTheRuleItselfAndStagesAreRunOneAfterTheOther) {
   const auto plain = answer_of({"catchment", run, "--published", "5", "--json"});
   const auto one = answer_of({"catchment", run, "--published", "5", "--stages", "5", "--json"});

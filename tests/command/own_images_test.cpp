@@ -295,6 +295,10 @@ TEST_F(OwnImages, EveryVerbSkipsUnusableImages) {
   expect_skipped(with({"unwrap", walk(), "-o", folder / "unwrapped"}, layout));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "unwrapped"), {}), 40);
   expect_skipped({"convert", walk(), folder / "walk.mcap"});
+  expect_skipped(with({"catchment", walk(), "--ahead", "2"}, layout));
+  const auto tried = expect_skipped({"try", walk(), "-o", folder / "tried", "--json"});
+  EXPECT_TRUE(contains(tried.out, "\"view_020b.png\"")) << tried.out;
+  EXPECT_TRUE(contains(tried.err, "skipped: " + (walk() / "view_020b.png").string()));
   // One image that is named is refused, and nothing is left behind.
   const std::string bad = walk() / "view_007b.png";
   expect_refusal({"localise", memory(), bad}, "view_007b.png");

@@ -64,43 +64,42 @@ std::vector<Image> read_samples(const Dataset& recording, const std::string& inp
   return samples;
 }
 
-/// Reads all images as panoramas and notes those that cannot be read.
+/// Reads all images as panoramas; prints why images are skipped.
 std::vector<Observation> read_panoramas(const Dataset& recording, const PictureSource& source,
                                         Trial& trial, Session& session) {
   const PanoramaReader reader(source, choose_panorama_shape(source, {}));
-  struct Read {
-    std::optional<Observation> observation;
-  };
   std::vector<Observation> observations;
   Progress progress(session, "reading", recording.entries.size());
   std::optional<PanoramaShape> shape;
   process_in_order(
       recording.entries.size(), session.executor(),
-      [&](std::size_t i) -> Read {
-        try {
-          Observation observation = read_observation(recording.entries[i]);
-          const Tilt tilt = observation.tilt.value_or(Tilt{});
-          observation.picture = reader.convert(std::get<Image>(observation.picture).view(), tilt);
-          observation.tilt.reset();
-          return {std::move(observation)};
-        } catch (const Error&) {
-          return {};
-        }
+      [&](std::size_t i) {
+        Observation observation = read_observation(recording.entries[i]);
+        const Tilt tilt = observation.tilt.value_or(Tilt{});
+        observation.picture = reader.convert(std::get<Image>(observation.picture).view(), tilt);
+        observation.tilt.reset();
+        return observation;
       },
-      [&](std::size_t i, Read&& read) {
+      [&](std::size_t i, Observation&& observation) {
         progress.advance();
-        if (!read.observation) {
-          trial.unread.push_back(recording.entries[i].file);
-          return;
-        }
-        const auto& panorama = std::get<Panorama>(read.observation->picture);
+        const auto& panorama = std::get<Panorama>(observation.picture);
         const PanoramaShape own{panorama.rows(), panorama.columns()};
         if (shape && *shape != own) {
           trial.unread.push_back(recording.entries[i].file);
           return;
         }
         shape = own;
-        observations.push_back(std::move(*read.observation));
+        observations.push_back(std::move(observation));
+      },
+      [&](std::size_t i, const std::exception_ptr& failure) {
+        progress.clear();
+        trial.unread.push_back(recording.entries[i].file);
+        try {
+          std::rethrow_exception(failure);
+        } catch (const Error& error) {
+          session.note("skipped: " + to_readable_line(error.what()));
+        }
+        progress.advance();
       });
   return observations;
 }
@@ -280,6 +279,7 @@ Trial run_trial(const std::vector<std::string>& inputs, const fs::path& folder, 
   const std::string& input = inputs.front();
   trial.inputs = inputs;
   PictureArguments pictures;
+  pictures.check = PictureArguments::Check::heads;  // others are skipped as they are read
   pictures.further_videos.assign(inputs.begin() + 1, inputs.end());
   Dataset recording = has_dataset_file(input)
                           ? open_recording(input, pictures, std::nullopt, session)

@@ -49,7 +49,7 @@ void visit_options(LensesOptions& options, OptionVisitor& visitor) {
 
 struct CalibrateArguments {
   std::vector<std::string> inputs;
-  PictureArguments pictures;  // topics and part of a recording
+  PictureArguments pictures{.check = PictureArguments::Check::heads};  // topics and part
   std::string out;
   std::optional<std::string> overlay;
   std::optional<std::string> mount;
@@ -85,29 +85,33 @@ std::vector<DatasetEntry> choose_entries(const std::string& input,
   return selected;
 }
 
-/// Reads all images and appends their names to `names`. Throws FileError if sizes differ.
+/// Reads all images and appends their names to `names`. Images of a folder that cannot be read are
+/// skipped and named. Throws FileError if sizes differ.
 std::vector<Image> read_images(const CalibrateArguments& arguments, std::vector<std::string>& names,
                                Session& session) {
-  std::vector<DatasetEntry> entries;
-  for (const std::string& input : arguments.inputs) {
-    for (DatasetEntry& entry : choose_entries(input, arguments, session)) {
-      entries.push_back(std::move(entry));
-    }
-  }
   std::vector<Image> images;
-  Progress progress(session, "reading", entries.size());
-  for (const DatasetEntry& entry : entries) {
-    names.push_back(entry.store ? entry.file : entry.path.string());
-    images.push_back(read_picture(entry));
-    const auto size = images.back().size();
-    const auto first = images.front().size();
-    if (size != first) {
+  for (const std::string& input : arguments.inputs) {
+    const std::vector<DatasetEntry> entries = choose_entries(input, arguments, session);
+    Progress progress(session, "reading", entries.size());
+    SkippedImages skipped(entries.size(), session);
+    for (const DatasetEntry& entry : entries) {
+      progress.advance();
+      try {
+        images.push_back(read_picture(entry));
+      } catch (const FileError&) {
+        progress.clear();
+        skipped.add(std::current_exception());
+        continue;
+      }
+      names.push_back(entry.store ? entry.file : entry.path.string());
+      const auto size = images.back().size();
+      const auto first = images.front().size();
+      if (size == first) continue;
       throw FileError(names.back(), "size is " + std::to_string(size.width) + " x " +
                                         std::to_string(size.height) +
                                         "; allowed: " + std::to_string(first.width) + " x " +
                                         std::to_string(first.height) + ", as in " + names.front());
     }
-    progress.advance();
   }
   return images;
 }

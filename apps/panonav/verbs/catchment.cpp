@@ -238,10 +238,29 @@ CatchmentSettings check_settings(const Arguments& declared, const CatchmentArgum
   return settings;
 }
 
+/// Reads the views of a recording; images that cannot be read are skipped and named.
+RecordedViews read_usable_views(const Dataset& recording, const CatchmentArguments& arguments,
+                                const std::optional<std::uint64_t>& turn_seed, Session& session) {
+  SkippedImages skipped(recording.entries.size(), session);
+  return read_views(recording, arguments.homing.views, turn_seed, session.executor(),
+                    make_progress_callback(session),
+                    [&](const std::exception_ptr& failure) { skipped.add(failure); });
+}
+
+/// Keeps the images of which there are views.
+void keep_viewed(Dataset& recording, const RecordedViews& views) {
+  std::size_t next = 0;
+  std::erase_if(recording.entries, [&](const DatasetEntry& entry) {
+    const bool is_viewed = next < views.files.size() && views.files[next] == entry.file;
+    next += is_viewed ? 1 : 0;
+    return !is_viewed;
+  });
+}
+
 ExitCode catchment(const Arguments& declared, const CatchmentArguments& arguments,
                    Session& session) {
   const CatchmentSettings settings = check_settings(declared, arguments);
-  const auto recording =
+  auto recording =
       arguments.ahead ? open_recording(arguments.dataset, arguments.pictures, std::nullopt, session)
                       : read_dataset_with_columns(arguments.dataset, arguments.pictures,
                                                   std::nullopt, pose_columns, pose_values, session);
@@ -251,19 +270,19 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
   if (arguments.report) prepare_report_folder(*arguments.report, "catchment");
 
   if (arguments.ahead) {
-    const auto views = read_views(recording, arguments.homing.views, arguments.turn_seed,
-                                  session.executor(), make_progress_callback(session));
+    const auto views = read_usable_views(recording, arguments, arguments.turn_seed, session);
     reject_unused_rise_flags(declared, views.views.front(), arguments.dataset);
     return measure_travel_direction(arguments, views, settings.homing, session);
   }
-  const auto goals = read_views(recording, arguments.homing.views, std::nullopt, session.executor(),
-                                make_progress_callback(session));
+  const auto goals = read_usable_views(recording, arguments, std::nullopt, session);
+  keep_viewed(recording, goals);
   require_poses(goals, arguments.dataset);
   reject_unused_rise_flags(declared, goals.views.front(), arguments.dataset);
   const std::size_t goal = choose_goal(arguments, goals);
   const auto places =
-      read_views(second ? *second : recording, arguments.homing.views, arguments.turn_seed,
-                 session.executor(), make_progress_callback(session));
+      second || arguments.turn_seed
+          ? read_usable_views(second ? *second : recording, arguments, arguments.turn_seed, session)
+          : goals;
   const std::string& places_name = arguments.current ? *arguments.current : arguments.dataset;
   require_poses(places, places_name);
   if (goals.views.front().rows() != places.views.front().rows()) {
@@ -295,6 +314,7 @@ Run declare_catchment(Arguments& arguments) {
       "--current DATASET", values->current,
       "Data set of the current views, also with positions and headings; default: DATASET");
   declare_pictures(arguments, values->pictures);
+  values->pictures.check = PictureArguments::Check::heads;
   arguments.option("--up-to-m", values->settings.up_to_m,
                    "Average the results of all pairs of views up to this distance");
   arguments.option(

@@ -134,29 +134,35 @@ void summarise_pairs(const std::vector<PairVector>& vectors, const CatchmentSett
 
 RecordedViews read_views(const Dataset& recording, const HomingViewOptions& options,
                          const std::optional<std::uint64_t>& rotation_seed, Executor& executor,
-                         const WorkProgress& progress) {
+                         const WorkProgress& progress,
+                         const std::function<void(const std::exception_ptr&)>& skip) {
+  struct RotatedView {
+    HomingView view;
+    double rotation_rad = 0.0;
+  };
   const HomingEncoder encoder(recording.source, options);
   const std::size_t total = recording.entries.size();
   RecordedViews result;
-  result.rotation_rad.resize(total);
   if (progress) progress("reading", 0, total);
   process_in_order(
       total, executor,
       [&](std::size_t index) {
         Panorama panorama = encoder.panorama(read_observation(recording.entries[index]));
+        double rotation_rad = 0.0;
         if (rotation_seed) {
           Random random(*rotation_seed, index);
           const auto columns = static_cast<std::uint64_t>(panorama.columns());
           const auto rotation_columns = static_cast<int>(random.index(columns));
           panorama = rotate_columns(panorama, rotation_columns);
-          result.rotation_rad[index] =
+          rotation_rad =
               wrap_angle(2.0 * std::numbers::pi * rotation_columns / static_cast<double>(columns));
         }
-        return encoder.view(panorama);
+        return RotatedView{encoder.view(panorama), rotation_rad};
       },
-      [&](std::size_t index, HomingView&& view) {
+      [&](std::size_t index, RotatedView&& rotated) {
         const DatasetEntry& entry = recording.entries[index];
-        if (index > 0 && view.rows() != result.views.front().rows()) {
+        HomingView& view = rotated.view;
+        if (!result.views.empty() && view.rows() != result.views.front().rows()) {
           throw FileError(entry.path.string(),
                           "rows is " + std::to_string(view.rows()) +
                               "; allowed: " + std::to_string(result.views.front().rows()) +
@@ -164,7 +170,13 @@ RecordedViews read_views(const Dataset& recording, const HomingViewOptions& opti
         }
         result.files.push_back(entry.file);
         result.poses.push_back(entry.pose);
+        result.rotation_rad.push_back(rotated.rotation_rad);
         result.views.push_back(std::move(view));
+        if (progress) progress("reading", 1, total);
+      },
+      [&](std::size_t, const std::exception_ptr& failure) {
+        if (!skip) std::rethrow_exception(failure);
+        skip(failure);
         if (progress) progress("reading", 1, total);
       });
   return result;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <optional>
 #include <string>
@@ -29,10 +30,13 @@ using WorkProgress =
     std::function<void(const std::string& work, std::size_t steps, std::size_t total)>;
 
 /// Reads all images on all threads. With a seed, rotates the robot by a random whole number of
-/// columns before each image.
-[[nodiscard]] RecordedViews read_views(const Dataset& recording, const HomingViewOptions& options,
-                                       const std::optional<std::uint64_t>& rotation_seed,
-                                       Executor& executor, const WorkProgress& progress = {});
+/// columns before each image. Calls `skip` with the error of an image that cannot be read, which
+/// then has no view; without `skip`, throws it.
+[[nodiscard]] RecordedViews read_views(
+    const Dataset& recording, const HomingViewOptions& options,
+    const std::optional<std::uint64_t>& rotation_seed, Executor& executor,
+    const WorkProgress& progress = {},
+    const std::function<void(const std::exception_ptr&)>& skip = {});
 
 /// Options of a survey of two recordings.
 struct CatchmentSettings {
