@@ -62,6 +62,65 @@ TEST_F(RouteTracking, SaysThatAnotherPlaceIsNotOnThisRoute) {
   EXPECT_FALSE(tracker.pose().has_value());
 }
 
+// Limits learnt from a route hold in other worlds: of the lines from elsewhere at most one in a
+// hundred is answered, and the lines from the route are.
+TEST(RouteLimits, RefuseOtherWorldsAndKeepTheirOwn) {
+  constexpr std::uint64_t worlds = 6;
+  constexpr int trials = 25;
+  std::vector<ToyWorld> rooms;
+  for (std::uint64_t world = 0; world < worlds; ++world) {
+    rooms.push_back(pillared_room(900 + 7 * world));
+  }
+  Random random(11);
+  const auto draw_pose = [&] {
+    return Pose2{random.uniform(-1.8, 1.8), random.uniform(-0.3, 0.3),
+                 random.uniform(-std::numbers::pi, std::numbers::pi)};
+  };
+  int foreign = 0;
+  int own = 0;
+  for (std::size_t world = 0; world < worlds; ++world) {
+    RoutePanorama route;
+    for (int i = 0; i <= 40; ++i) {
+      const Pose2 pose{0.1 * i - 2.0, 0.1 * std::sin(0.2 * i), 0.0};
+      route.append(pose, rooms[world].line(pose));
+    }
+    const RouteTracker tracker(route);
+    EXPECT_GT(tracker.min_detail_correlation(), 0.0);
+    for (std::size_t other = 0; other < worlds; ++other) {
+      for (int trial = 0; trial < trials; ++trial) {
+        const bool found = tracker.search(rooms[other].line(draw_pose())).has_value();
+        (other == world ? own : foreign) += found ? 1 : 0;
+      }
+    }
+  }
+  std::printf("%d foreign and %d own lines found\n", foreign, own);
+  EXPECT_LE(foreign, static_cast<int>(0.01 * worlds * (worlds - 1) * trials));
+  EXPECT_GE(own, static_cast<int>(0.95 * worlds * trials));
+}
+
+// At the ends of a short, straight route few lines of sight cross it. The robot is then found where
+// it is, or not at all.
+TEST_F(RouteTracking, TheEndsOfAShortRouteGiveNoWrongPosition) {
+  RoutePanorama straight;
+  for (int i = 0; i <= 15; ++i) {
+    const Pose2 pose{0.1 * i - 0.7, -0.2, 0.0};
+    straight.append(pose, room.line(pose));
+  }
+  const RouteTracker tracker(straight);
+  int found = 0;
+  for (const double y_m : {-0.2, -0.17, -0.3}) {
+    for (int i = -4; i <= 34; ++i) {
+      const Pose2 robot{0.05 * i - 0.7, y_m, 0.4};
+      const auto fix = tracker.search(room.line(robot));
+      if (!fix) continue;
+      EXPECT_LT(distance(fix->pose.position(), robot.position()), 0.1) << i << " " << y_m;
+      EXPECT_GE(2 * fix->columns, straight.columns());
+      ++found;
+    }
+  }
+  EXPECT_GE(found, 60);
+}
+
 // Errors of the fit exceed what the noise of the lines explains, most of all between the lines of
 // the route.
 TEST_F(RouteTracking, TheStatedCovarianceHolds) {

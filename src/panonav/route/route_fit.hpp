@@ -42,6 +42,9 @@ struct RouteFix {
   double residual = 1.0;
   /// Correlation of the scanline and the expected line, -1 .. 1; changed parts have less weight.
   double correlation = 0.0;
+  /// Correlation of the changes from degree to degree of both lines, -1 .. 1. Lines of different
+  /// places may be similar on the whole, as rooms are, but not in detail.
+  double detail_correlation = 0.0;
   int columns = 0;  ///< directions in which the line of sight crosses the path
   /// Robust standard deviation of the scanline from the expected line, 0 .. 1; at least a grey
   /// level.
@@ -122,6 +125,8 @@ class RouteLines {
   [[nodiscard]] bool collect_terms(const Level& level, std::span<const float> line,
                                    const Pose2& pose, const Window& window,
                                    std::vector<Term>& terms) const;
+  [[nodiscard]] static double correlate_details(const std::vector<Term>& terms,
+                                                std::size_t columns);
   [[nodiscard]] static std::vector<float> shift_tolerant_residuals(const std::vector<Term>& terms,
                                                                    std::size_t columns, double gain,
                                                                    double offset, int shift);

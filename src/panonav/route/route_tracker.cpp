@@ -24,6 +24,22 @@ constexpr double square_of_position = 5.991;
 /// Smallest number of fits from which anything is learnt.
 constexpr std::size_t min_fits = 3;
 
+/// Returns the correlation that 1 % of correlations of the same distribution exceed, by the normal
+/// distribution of Fisher's z. Needs two correlations or more.
+double compute_upper_limit(const std::vector<double>& correlations) {
+  constexpr double max_correlation = 0.999;  // of which z is finite
+  constexpr double quantile_99 = 2.326;      // of the standard normal distribution
+  std::vector<double> z;
+  for (const double value : correlations) {
+    z.push_back(std::atanh(std::clamp(value, -max_correlation, max_correlation)));
+  }
+  const double middle = mean(z);
+  double squares = 0.0;
+  for (const double value : z) squares += (value - middle) * (value - middle);
+  return std::tanh(middle +
+                   quantile_99 * std::sqrt(squares / (static_cast<double>(z.size()) - 1.0)));
+}
+
 /// Error of a fit, with the covariance by the noise of the lines.
 struct FitError {
   Point2 position;
@@ -95,7 +111,9 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
           "distance from the predicted position above which the next line must confirm the result",
           0, 100),
       option<&T::min_correlation>(
-          "smallest correlation of an accepted result; 0: learnt from the route", 0, 1),
+          "smallest correlation of an accepted result; 0: learnt from the route, with that of the "
+          "details of the image",
+          0, 1),
   };
   table.visit(options, visitor);
 }
@@ -104,36 +122,57 @@ RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions
                            const RouteFitOptions& fit)
     : options_(options), metre_(fit.metre), lines_(route, fit) {
   validate(options);
-  min_correlation_ = options.min_correlation;
   constexpr std::size_t min_lines = 6;
   // Threshold if nothing can be learnt: half of the variance is explained.
   constexpr double default_correlation = 0.7071;
-  if (route.size() < min_lines) {
-    if (min_correlation_ == 0.0) min_correlation_ = default_correlation;
-    return;
-  }
+  min_correlation_ = options.min_correlation == 0.0 ? default_correlation : options.min_correlation;
+  if (route.size() < min_lines) return;
   const TestRoute test(route, fit);
-  if (min_correlation_ == 0.0) {
-    min_correlation_ = learn_min_correlation(test).value_or(default_correlation);
-  }
+  if (options.min_correlation == 0.0) learn_limits(test);
   learn_model_errors(test);
 }
 
-std::optional<double> RouteTracker::learn_min_correlation(const TestRoute& test) const {
+bool RouteTracker::has_enough_columns(const RouteFix& fix) const {
+  return 2 * fix.columns >= lines_.columns();
+}
+
+bool RouteTracker::is_match(const RouteFix& fix) const {
+  return has_enough_columns(fix) && fix.correlation >= min_correlation_ &&
+         fix.detail_correlation >= min_detail_;
+}
+
+void RouteTracker::learn_limits(const TestRoute& test) {
   std::vector<double> right;
+  std::vector<double> right_details;
   std::vector<double> wrong;
+  std::vector<double> wrong_details;
   for (std::size_t i = 0; i < test.poses.size(); ++i) {
     auto line = test.values[i];
-    if (const auto fix = test.lines.fit(line, test.poses[i])) right.push_back(fix->correlation);
-    std::ranges::reverse(line);
-    if (const auto fix = find_best_on_route(line)) wrong.push_back(fix->correlation);
+    if (const auto fix = test.lines.fit(line, test.poses[i])) {
+      right.push_back(fix->correlation);
+      right_details.push_back(fix->detail_correlation);
+    }
+    // As detailed as the lines of the route, but of no place. Unlike the mirror image of a line,
+    // its negative is no view in a symmetric corridor either.
+    for (float& value : line) value = 1.0F - value;
+    for (int mirrored = 0; mirrored < 2; ++mirrored) {
+      if (const auto fix = find_best_on_route(line)) {
+        wrong.push_back(fix->correlation);
+        wrong_details.push_back(fix->detail_correlation);
+      }
+      std::ranges::reverse(line);
+    }
   }
-  if (right.size() < min_fits || wrong.size() < min_fits) return std::nullopt;
-  const double low = std::max(0.0, order_statistic(std::move(wrong), 0.95));
-  const double high = order_statistic(std::move(right), 0.05);
-  // Puts the limit nearer to the wrong fits, as a line taken off the path or in a changed scene
+  if (right.size() < min_fits || wrong.size() < min_fits) return;
+  // Puts the limits nearer to the wrong fits, as a line taken off the path or in a changed scene
   // fits worse than one from the path.
-  return low + std::max(0.0, high - low) / 3.0;
+  const auto choose_limit = [](double low, double high) {
+    return low + std::max(0.0, high - low) / 3.0;
+  };
+  min_correlation_ = choose_limit(std::max(0.0, order_statistic(std::move(wrong), 0.95)),
+                                  order_statistic(std::move(right), 0.05));
+  const double detail = order_statistic(std::move(right_details), 0.05);
+  min_detail_ = std::min(detail, choose_limit(compute_upper_limit(wrong_details), detail));
 }
 
 void RouteTracker::learn_model_errors(const TestRoute& test) {
@@ -144,7 +183,7 @@ void RouteTracker::learn_model_errors(const TestRoute& test) {
     // To the left and right in turn.
     const double lateral_m = (i % 2 == 0 ? 1.0 : -1.0) * options_.surprise_m * metre_;
     const auto fix = test.lines.fit(test.values[i], truth * Pose2{0.0, lateral_m, 0.0});
-    if (!fix || fix->correlation < min_correlation_) continue;
+    if (!fix || !is_match(*fix)) continue;
     const FitError error{{fix->pose.x_m - truth.x_m, fix->pose.y_m - truth.y_m},
                          angle_difference(fix->pose.heading_rad, truth.heading_rad),
                          fix->covariance};
@@ -219,14 +258,15 @@ std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> 
     if (near) continue;
     tried.push_back(candidate.pose.position());
     auto fix = lines_.fit(line, candidate.pose);
-    if (fix && (!best || fix->correlation > best->correlation)) best = std::move(fix);
+    if (!fix || !has_enough_columns(*fix)) continue;
+    if (!best || fix->correlation > best->correlation) best = std::move(fix);
   }
   return best;
 }
 
 std::optional<RouteFix> RouteTracker::search(std::span<const float> line) const {
   auto best = find_best_on_route(line);
-  if (!best || best->correlation < min_correlation_) return std::nullopt;
+  if (!best || !is_match(*best)) return std::nullopt;
   return add_route_position(*std::move(best), RouteFix::Origin::search);
 }
 
@@ -243,8 +283,7 @@ std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const P
       return distance(fix.pose.position(), predicted.position());
     };
     const auto is_acceptable = [&](const std::optional<RouteFix>& fix) {
-      return fix && fix->correlation >= min_correlation_ &&
-             off_m(*fix) <= 1.5 * options_.recovery_m * metre_;
+      return fix && is_match(*fix) && off_m(*fix) <= 1.5 * options_.recovery_m * metre_;
     };
     auto fix = lines_.fit(line, predicted);
     if (is_acceptable(fix)) {

@@ -19,7 +19,8 @@ struct RouteTrackerOptions {
   /// Distance from the odometry's prediction beyond which a fix of a followed robot must be
   /// confirmed by the next line.
   double surprise_m = 0.15;
-  /// Smallest correlation of an accepted fit; 0: learnt from the route itself.
+  /// Smallest correlation of an accepted fit; 0: learnt from the route itself, with the smallest
+  /// detail correlation, which is otherwise not tested.
   double min_correlation = 0.0;
   friend bool operator==(const RouteTrackerOptions&, const RouteTrackerOptions&) = default;
 };
@@ -31,15 +32,14 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 class RouteTracker {
  public:
   /// Learns from lines left out of a test route of every second line:
-  /// - the smallest correlation of an accepted fit: above the 95 % quantile of mirrored lines,
-  /// which
-  ///   show a place that does not exist, by a third of the distance to the 5 % quantile of the
-  ///   lines;
-  /// - the variance of errors beyond the noise of the lines, which makes 95 % of the fits that
-  /// start
+  /// - the smallest correlation of an accepted fit: above the 95 % quantile of negative lines (of
+  ///   no place) by a third of the distance to the 5 % quantile of the lines;
+  /// - the smallest detail correlation, likewise above the 99 % quantile, but at most the 5 %
+  ///   quantile of the lines;
+  /// - the variance of errors beyond the noise of the lines, so that 95 % of the fits that start
   ///   `surprise_m` beside the truth lie within the 95 % ellipse.
   ///
-  /// Throws OptionError, and ContractError on a route of fewer than two lines. Cost: 40 searches.
+  /// Throws OptionError, and ContractError on a route of fewer than two lines. Cost: 80 searches.
   explicit RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options = {},
                         const RouteFitOptions& fit = {});
 
@@ -68,14 +68,20 @@ class RouteTracker {
   [[nodiscard]] const std::optional<Pose2>& pose() const noexcept { return pose_; }
   /// Smallest correlation of an accepted fit: learnt, or that of the options.
   [[nodiscard]] double min_correlation() const noexcept { return min_correlation_; }
+  /// Smallest detail correlation of an accepted fit; -1: not tested.
+  [[nodiscard]] double min_detail_correlation() const noexcept { return min_detail_; }
   /// The route as prepared for fits.
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
 
  private:
   /// Half of the lines as a route, and lines of the other half.
   struct TestRoute;
-  /// Returns nullopt if there are too few fits.
-  [[nodiscard]] std::optional<double> learn_min_correlation(const TestRoute& test) const;
+  /// Sets the limits of accepted fits; leaves them if there are too few fits.
+  void learn_limits(const TestRoute& test);
+  /// True if lines of sight cross the path in at least half of all directions. Otherwise few
+  /// directions decide, and any line fits somewhere far from the path.
+  [[nodiscard]] bool has_enough_columns(const RouteFix& fix) const;
+  [[nodiscard]] bool is_match(const RouteFix& fix) const;
   void learn_model_errors(const TestRoute& test);
   [[nodiscard]] std::optional<RouteFix> find_best_on_route(std::span<const float> line) const;
   [[nodiscard]] std::optional<RouteFix> recover(std::span<const float> line,
@@ -86,6 +92,7 @@ class RouteTracker {
   double metre_;  // `RouteFitOptions::metre`
   RouteLines lines_;
   double min_correlation_ = 0.0;
+  double min_detail_ = -1.0;
   double model_variance_m2_ = 0.0;    // of x and of y, beyond the noise of the lines
   double model_variance_rad2_ = 0.0;  // of the heading, likewise
   std::optional<Pose2> pose_;
