@@ -118,14 +118,37 @@ TEST_F(RouteVerbs, TheSameDriveGoesOnWhereItsRecordingStopped) {
   EXPECT_EQ(ended["appended"].get<int>() + begun["lines"].get<int>(), at_once["lines"]);
   EXPECT_EQ(ended["lines"], at_once["lines"]);
   EXPECT_EQ(ended["length_m"], at_once["length_m"]);
-  EXPECT_EQ(record({"--every-m", "0.05"})["appended"], 0);
+  const json again = record({"--every-m", "0.05"});
+  EXPECT_EQ(again["appended"], 0);
+  EXPECT_EQ(again["left_out"]["known_before"], at_once["lines"]);
+}
+
+// Every image that became no line is counted, with the reason.
+TEST_F(RouteVerbs, TheImagesThatBecameNoLinesAreCounted) {
+  const std::string poses = bytes_of(folder_ / "teach" / "poses.csv");
+  std::string some;
+  for (const auto& line : lines(poses)) {
+    const bool has_pose = !contains(line, "view_1003.") && !contains(line, "view_1004.");
+    some += (has_pose ? line
+                      : line.substr(0, line.find(',', line.find(',') + 1)) + std::string(6, ',')) +
+            "\n";
+  }
+  write_file(folder_ / "teach" / "poses.csv", std::string_view(some));
+  const auto said = run_panonav({"route", "record", folder_ / "m.panonav", folder_ / "teach"});
+  EXPECT_EQ(said.exit_code, 0) << said.err;
+  EXPECT_TRUE(contains(said.out,
+                       "of 81 images, 40 became lines; 39 are nearer to the line before "
+                       "than the distance between lines; 2 have no position"))
+      << said.out;
 }
 
 TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   const json recorded = record();
   EXPECT_EQ(keys_of(recorded),
             (std::set<std::string>{"memory", "route", "frame", "appended", "lines", "columns",
-                                   "length_m", "bytes", "bytes_per_km", "file_bytes"}));
+                                   "length_m", "bytes", "bytes_per_km", "file_bytes",
+                                   "left_out"}));
+  EXPECT_EQ(recorded["left_out"]["too_near"], 40) << "every second image is on the way between";
   EXPECT_EQ(recorded["lines"], 41);
   EXPECT_EQ(recorded["appended"], 41);
   EXPECT_EQ(recorded["columns"], 360);

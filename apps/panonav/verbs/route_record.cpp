@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "cli/verbs.hpp"
@@ -60,35 +61,22 @@ DrivePoses find_poses(const Arguments& declared, const RecordArguments& argument
                             "(panonav scale)");
   }
   const std::string lead = "panonav route record: " + arguments.dataset;
-  const std::size_t left_out = dataset.entries.size() - found.drive.entries.size();
-  const std::string rest = left_out > 0 ? "; " + format_count(left_out, "image") +
-                                              " left out, not connected with the others"
-                                        : "";
-  const auto note_left_out = [&](const std::string& what) {
-    if (left_out == 0) return;
-    session.note(lead + ": " + std::to_string(left_out) + " of " +
-                 format_count(dataset.entries.size(), "image") + " have no " + what +
-                 " and are left out");
-  };
   switch (found.origin) {
     case RoutePoseOrigin::data_set:
-      note_left_out("position");
       if (!found.drive.entries.front().pose->heading_rad) {
         session.note(lead + " contains no headings; the direction of travel is used");
       }
       break;
     case RoutePoseOrigin::odometry:
-      note_left_out("odometry");
       break;
     case RoutePoseOrigin::map:
       session.note(lead +
                    " has neither positions nor odometry; the poses are those of the map of " +
-                   arguments.memory + rest);
+                   arguments.memory);
       break;
     case RoutePoseOrigin::images:
       session.note(lead +
-                   " has neither positions nor odometry; the motion is computed from the images" +
-                   rest);
+                   " has neither positions nor odometry; the motion is computed from the images");
       break;
   }
   return found;
@@ -157,8 +145,49 @@ void print_frame(RouteFrame frame, const MemoryFile& memory, Session& session) {
   }
 }
 
+/// Images of a drive that became no line of the route, by reason.
+struct LeftOutImages {
+  std::size_t unusable = 0;
+  std::size_t without_pose = 0;
+  std::string missing_pose;  ///< why an image has no pose, for people
+  std::size_t too_near = 0;
+  std::size_t known_before = 0;
+
+  [[nodiscard]] std::size_t total() const {
+    return unusable + without_pose + too_near + known_before;
+  }
+};
+
+LeftOutImages count_left_out(const Dataset& dataset, const DrivePoses& drive,
+                             const RouteRecorder::Recorded& recorded) {
+  constexpr std::array reasons{"have no position", "have no odometry",
+                               "are not in the largest part of the map",
+                               "do not show the motion from the others"};
+  return {.unusable = dataset.unusable.size(),
+          .without_pose = dataset.entries.size() - drive.drive.entries.size(),
+          .missing_pose = reasons.at(static_cast<std::size_t>(drive.origin)),
+          .too_near = recorded.too_near,
+          .known_before = recorded.known_before};
+}
+
+/// Prints how many images became no line, and why; nothing if there are none.
+void print_left_out(const LeftOutImages& left_out, std::size_t lines, Session& session) {
+  if (left_out.total() == 0) return;
+  std::string text = "of " + format_count(lines + left_out.total(), "image") + ", " +
+                     std::to_string(lines) + " became lines";
+  const auto add = [&](std::size_t count, const std::string& reason) {
+    if (count > 0) text += "; " + std::to_string(count) + " " + reason;
+  };
+  add(left_out.too_near, "are nearer to the line before than the distance between lines");
+  add(left_out.known_before, "were recorded before");
+  add(left_out.without_pose, left_out.missing_pose);
+  add(left_out.unusable, "cannot be used");
+  session.print(text);
+}
+
 void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recorded& recorded,
-                    RouteFrame frame, std::uint64_t file_bytes, Session& session) {
+                    RouteFrame frame, const LeftOutImages& left_out, std::uint64_t file_bytes,
+                    Session& session) {
   const double length_m = recorded.route.length_m();
   const double bytes_per_km = recorded.bytes_per_km();
   const bool is_metric = session.length_unit() == LengthUnit::metres;
@@ -173,7 +202,12 @@ void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recor
                      {"length_m", length_m},
                      {"bytes", recorded.bytes},
                      {"bytes_per_km", is_metric ? ordered_json(bytes_per_km) : ordered_json()},
-                     {"file_bytes", file_bytes}}));
+                     {"file_bytes", file_bytes},
+                     {"left_out",
+                      {{"too_near", left_out.too_near},
+                       {"known_before", left_out.known_before},
+                       {"without_pose", left_out.without_pose},
+                       {"unusable", left_out.unusable}}}}));
     return;
   }
   session.print(session.bold(format_count(recorded.appended, "line")) + " recorded; route '" +
@@ -182,6 +216,7 @@ void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recor
                 session.format_length(length_m, 2) +
                 (is_metric ? ", " + format_fixed(1e-6 * bytes_per_km, 2) + " MB per kilometre"
                            : ", " + std::to_string(recorded.bytes) + " bytes"));
+  print_left_out(left_out, recorded.appended, session);
 }
 
 ExitCode record(const Arguments& declared, const RecordArguments& arguments, Session& session) {
@@ -228,7 +263,8 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   if (arguments.report)
     write_record_report(*arguments.report, arguments.name, recorded, session.length_unit());
   const RouteFrame frame = find_frame(drive.origin);
-  print_recorded(arguments, recorded, frame, recorder.memory().info().file_bytes, session);
+  print_recorded(arguments, recorded, frame, count_left_out(dataset, drive, recorded),
+                 recorder.memory().info().file_bytes, session);
   if (session.json()) return ExitCode::done;
   print_frame(frame, recorder.memory(), session);
   if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&

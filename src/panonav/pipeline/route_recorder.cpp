@@ -366,14 +366,19 @@ RouteRecorder::Recorded RouteRecorder::record(
         add(std::move(line));
         if (recorded) recorded(chosen.size() - first);
       });
-  return finish();
+  Recorded result = finish();
+  // Images before the first new line belong to lines that the route already had.
+  result.known_before = first == 0 ? 0 : (first < chosen.size() ? chosen[first] : poses.size());
+  result.too_near = poses.size() - result.known_before - result.appended;
+  return result;
 }
 
 RouteRecorder::Recorded RouteRecorder::finish() {
   flush();
   auto route = file_.route(options_.name);
   if (!route) throw ContractError("lines of the route", 0.0, "1 or more");
-  return {std::move(*route), appended_, file_.route_bytes(options_.name)};
+  return {
+      .route = std::move(*route), .appended = appended_, .bytes = file_.route_bytes(options_.name)};
 }
 
 }  // namespace panonav

@@ -74,6 +74,10 @@ class RouteRecorder {
     RoutePanorama route;       ///< all of its lines, including those of earlier drives
     std::size_t appended = 0;  ///< number of lines added
     std::uint64_t bytes = 0;   ///< stored size of the route's lines and poses
+    /// Number of images of `record` that are nearer than `every_m` to the line before.
+    std::size_t too_near = 0;
+    /// Number of images of `record` whose lines the route already had.
+    std::size_t known_before = 0;
     /// Bytes for each kilometre of the route; 0 for a route without length.
     [[nodiscard]] double bytes_per_km() const;
   };
