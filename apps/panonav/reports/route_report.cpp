@@ -199,9 +199,9 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
   viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
   start.squares.push_back(route.poses().front().position());
   viewer::ReportPage page("Route '" + name + "'",
-                          "A robot drove this route once. For each place it stored one line of "
-                          "pixels: the horizon around the robot at the height of its camera. It "
-                          "needs no other data to drive the route again.");
+                          "For each place of a drive, panonav stored one line of pixels: what the "
+                          "camera saw all around, at the height of the horizon. From these lines "
+                          "and their positions, route follow computes where a robot is.");
   page.add_figures(
       {{format_fixed(route.length_m(), 1) + " " + to_string(unit), "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
@@ -213,14 +213,15 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
                  std::string("in the memory")}});
   page.begin_section("The route panorama");
   page.add_text(
-      "Each row is the horizon at one place. The start is at the bottom, the end is at the top, "
-      "and the forward direction is in the middle. When the robot passes an object, the object "
-      "moves from the middle to one side. Distant objects move more slowly than near objects.");
-  page.add_plots({{draw_panorama(route, unit), "Omnidirectional route panorama"}});
+      "All lines above each other: each row of this picture is the line of one place. The start is "
+      "at the bottom, the end at the top. What was ahead of the robot is in the middle, what was "
+      "behind it at both sides. An object that the robot passes moves from the middle to one side, "
+      "a near object faster than a distant one.");
+  page.add_plots({{draw_panorama(route, unit), "The stored lines, from the start upwards"}});
   page.begin_section("Route");
   page.add_plots(
       {{viewer::MapPlot{.title = "Map", .layers = {path, start}, .unit = to_string(unit)},
-        "Positions of the lines"}});
+        "Where the lines were recorded"}});
   page.write(folder, "index.html", "panonav route record");
 }
 
@@ -234,7 +235,9 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
   for (const auto& [count, origin] : {std::pair{summary.predicted, RouteFix::Origin::prediction},
                                       {summary.recovered, RouteFix::Origin::recovery},
                                       {summary.searched, RouteFix::Origin::search}}) {
-    if (count > 0) figures.emplace_back(std::to_string(count), format_origin(origin));
+    if (count > 0) {
+      figures.emplace_back(std::to_string(count), "of these " + std::string(format_origin(origin)));
+    }
   }
   add_median_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
   add_median_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
@@ -242,17 +245,18 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
                     "median error of heading");
   viewer::ReportPage page(
       "Following route '" + route.name + "'",
-      "A robot drives the route again, or drives beside it. panonav searches for the pose at which "
-      "the stored lines predict the robot's current image.");
+      "A robot drove along the recorded route again, or beside it. For each of its images, panonav "
+      "computed where the robot was: at the position and heading from which the stored lines look "
+      "most like the image.");
   page.add_figures(figures);
-  page.add_text("How a position was computed: " + std::string(origin_explanation) + ".");
+  page.add_text("How each position was found: " + std::string(origin_explanation) + ".");
   replay_page.set_route(draw_panorama(route.panorama, route.unit), make_marks(images));
   page.begin_section("The run, image by image");
   page.add_text(
-      "The map shows the stored route and the robot's position. The route panorama is below. Each "
-      "row is the horizon at one place of the route, with the start at the bottom and the forward "
-      "direction in the middle. The horizontal line marks the robot's row. Orange marks are "
-      "directions in which the scene has changed.");
+      "The map shows the recorded route and the robot's position. The wide grey picture below it "
+      "contains the recorded lines above each other, the start of the route at the bottom, the "
+      "forward direction in the middle; its horizontal line shows how far along the route the "
+      "robot is. Orange marks are directions in which the scene has changed since the recording.");
   page.add_run(replay_page);
   page.begin_section("Route");
   page.add_plots({{draw_path(route.lines, images, route.unit),
@@ -260,17 +264,20 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
   if (!chosen.empty()) {
     page.begin_section("Seen and predicted lines");
     page.add_text(
-        "The upper band of each pair is the line that the robot saw. The lower band is the line "
-        "that the route predicts at the robot's computed pose; it combines the lines of many "
-        "places. Light blue: the route has no data in this direction.");
+        "A check of the answers. Of each pair, the upper band is what the robot saw at the height "
+        "of the horizon, the lower band what it should see at the computed position according to "
+        "the recorded lines. If both agree, the answer is right. Light blue: the recorded lines do "
+        "not show this direction. The correlation measures the agreement: 1 for the same pattern, "
+        "0 for nothing in common.");
     page.add_plots(
         {{draw_lines(route.lines, images, chosen), "Seen lines and predicted lines of some images"},
          {draw_correlations(images), "Correlation of seen and predicted lines, image by image"}});
   }
   if (!summary.position_m.empty()) {
     page.begin_section("Errors");
-    page.add_plots({{draw_errors(images),
-                     "Distance of each computed position from the position in the data set"}});
+    page.add_plots(
+        {{draw_errors(images),
+          "Distance of each computed position from the true one, which the data set contains"}});
   }
   const auto stretches = find_changed_sections(images);
   if (!stretches.empty()) {

@@ -152,15 +152,14 @@ void write_track_report(const std::filesystem::path& folder, const Tracker& trac
       std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
   viewer::ReportPage page(
       "Tracked run",
-      std::string("A robot moved. ") +
-          (tracker.visual_odometry() == nullptr
-               ? "It had odometry with errors"
-               : "Its motion was computed from its images; it had") +
-          (tracker.visual_odometry() == nullptr ? " and a memory of " : " a memory of ") +
-          format_count(memory.size(), "view") + ", and took " +
-          format_count(images.size(), "image") +
-          ". Particles show its possible positions after each image. They are far apart "
-          "while the position is unknown, and close together when it is known.");
+      "A robot took " + format_count(images.size(), "image") +
+          " while it moved. After each one, panonav computed where the robot was, from a memory "
+          "of " +
+          format_count(memory.size(), "view") + " and from " +
+          (tracker.visual_odometry() == nullptr ? "its odometry, which has errors"
+                                                : "the motion between its images") +
+          ". Particles are positions at which the robot may be: they are far apart while its "
+          "position is unknown, and close together when it is known.");
   page.add_figures(main_figures(summary, images.size()));
   page.begin_section("The run, image by image");
   page.add_text(
@@ -190,7 +189,7 @@ void write_track_report(const std::filesystem::path& folder, const Tracker& trac
   page.add_text(
       "The tracker uses more particles while many positions are possible, and fewer when the "
       "particles are close together. It also adds new particles at random positions, so that it "
-      "finds a kidnapped robot.");
+      "finds a robot that was carried to another place.");
   page.add_plots(
       {{draw_particles(images), "Number of particles after each image, on a logarithmic scale"}});
   page.write(folder, "index.html", "panonav track");
