@@ -262,6 +262,58 @@ TEST_F(OwnImages, TryReportsABadRecording) {
   EXPECT_EQ(ordinary["memory"], nullptr);
 }
 
+// Images with random names are no walk, although most are recognised.
+TEST_F(OwnImages, TryNoticesImagesInNoOrder) {
+  const fs::path mixed = std::string(folder / "mixed");
+  fs::create_directory(mixed);
+  for (std::size_t i = 0; i < count; ++i) {
+    fs::copy_file(walk() / view_name(i), mixed / view_name(i * 17 % count));  // a permutation
+  }
+  const json tried = json::parse(run_panonav({"try", mixed, "-o", folder / "tried", "--json"}).out);
+  EXPECT_FALSE(tried["in_order"].get<bool>()) << tried.dump();
+  EXPECT_FALSE(tried["good"].get<bool>());
+  EXPECT_TRUE(contains(tried["findings"][0].get<std::string>(), "in no order"));
+  for (const json& command : tried["commands"]) {
+    EXPECT_FALSE(contains(command.get<std::string>(), "panonav track")) << command;
+    EXPECT_FALSE(contains(command.get<std::string>(), "panonav route")) << command;
+  }
+  EXPECT_FALSE(contains(bytes_of(folder / "tried/index.html"), "Map of the images"));
+}
+
+// Raw images of two lenses need a calibration: the commands make it, and work as printed.
+TEST_F(OwnImages, TryPrintsTheCommandsForTwoLenses) {
+  write_file(folder / "turns.csv",
+             std::string_view("stamp_s,x_m,y_m,heading_deg\n0,2.5,1,0\n1,2.5,1,90\n2,2.5,1,180\n"
+                              "3,2.5,1,-90\n"));
+  const auto take = [&](const std::string& name, const std::vector<std::string>& path) {
+    run_well(
+        with({"simulate", "office", folder / ("all_" + name), "--kind", "dual-fisheye"}, path));
+    fs::create_directory(folder / name);
+    for (const auto& file : fs::directory_iterator(folder / ("all_" + name))) {
+      if (file.path().stem().string().starts_with("view")) {
+        fs::copy_file(file.path(), folder / name / file.path().filename());
+      }
+    }
+  };
+  take("turned", {"--trajectory", folder / "turns.csv"});
+  take("lenses", {"--random", "3"});
+  const auto result =
+      run_panonav({"try", folder / "lenses", "-o", folder / "tried_lenses", "--json"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  const json tried = json::parse(result.out);
+  ASSERT_EQ(tried["commands"].size(), 2U) << tried.dump();
+  for (const json& command : tried["commands"]) {
+    auto words = split_command(command.get<std::string>());
+    for (auto& word : words) {
+      if (word == "turned" || word == "camera.toml" || word == "lenses.panonav") {
+        word = folder / word;
+      }
+    }
+    run_well(words);
+  }
+  EXPECT_EQ(answer_of({"info", folder / "lenses.panonav", "--json"})["views"], 3);
+}
+
 // One rule: images of a folder that cannot be used are left out, counted and named.
 TEST_F(OwnImages, EveryVerbSkipsUnusableImages) {
   const std::vector<std::string> layout{"--kind", "panorama", "--elevation-deg", "-20", "20"};

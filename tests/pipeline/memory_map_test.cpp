@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/map_scale.hpp"
@@ -148,6 +149,53 @@ TEST_F(MemoryMaps, ViewsInNoOrderAreArranged) {
   EXPECT_EQ(map->unit, LengthUnit::view_steps);
   EXPECT_GE(map->part_sizes.front(), places.size() * 9 / 10);
   EXPECT_LT(shape(memory, places), 0.2);
+}
+
+/// True if `are_in_order` finds the order of views from these poses, with some noise.
+bool order_is_visible(const ToyWorld& world, const std::vector<Pose2>& poses) {
+  Random noise(4, 1);
+  std::vector<FourierSignature> signatures;
+  for (const Pose2& pose : poses) {
+    signatures.push_back(compute_signature(
+        world.panorama({pose.x_m + 0.002 * noise.normal(), pose.y_m, pose.heading_rad},
+                       round_room_shape.rows, 96),
+        round_room_shape.components));
+  }
+  return are_in_order(make_memory(
+      signatures, std::vector<std::optional<ReferencePose>>(signatures.size(), std::nullopt)));
+}
+
+TEST_F(MemoryMaps, OrderIsThatOfAWalkAlsoWithStandingPartsAndGaps) {
+  const auto walk = rounds(100);
+  EXPECT_TRUE(order_is_visible(world, walk));
+  std::vector<Pose2> slow;
+  for (const Pose2& pose : rounds(40)) slow.insert(slow.end(), 5, pose);
+  EXPECT_TRUE(order_is_visible(world, slow));
+  std::vector<Pose2> standing(walk.begin(), walk.begin() + 40);
+  standing.insert(standing.end(), 60, walk[40]);
+  standing.insert(standing.end(), walk.begin() + 41, walk.begin() + 60);
+  EXPECT_TRUE(order_is_visible(world, standing));
+  std::vector<Pose2> two_walks(walk.begin() + 60, walk.end());
+  two_walks.insert(two_walks.end(), walk.begin(), walk.begin() + 50);
+  EXPECT_TRUE(order_is_visible(world, two_walks));
+}
+
+TEST_F(MemoryMaps, ShuffledAndHalfShuffledViewsAreInNoOrder) {
+  int taken_for_a_walk = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    for (const std::size_t count : {12U, 40U, 100U}) {
+      auto poses = rounds(100);
+      poses.resize(count);
+      std::mt19937 random(seed);
+      std::ranges::shuffle(poses, random);
+      taken_for_a_walk += order_is_visible(world, poses) ? 1 : 0;
+    }
+    auto partly = rounds(100);
+    std::mt19937 random(seed);
+    std::shuffle(partly.begin(), partly.begin() + 60, random);
+    taken_for_a_walk += order_is_visible(world, partly) ? 1 : 0;
+  }
+  EXPECT_EQ(taken_for_a_walk, 0);
 }
 
 TEST_F(MemoryMaps, AnotherRecordingDoesNotFollowTheLastView) {

@@ -112,22 +112,63 @@ Panorama upright_edges(std::uint64_t seed) {
   return panorama;
 }
 
+constexpr ElevationBand kept_band{radians(-25.0), radians(25.0)};
+
+/// Images of as many rooms, taken by cameras with these tilts.
+std::vector<Panorama> take_images(const std::vector<Tilt>& tilts) {
+  std::vector<Panorama> images;
+  for (std::size_t i = 0; i < tilts.size(); ++i) {
+    images.push_back(level_panorama(upright_edges(i + 1), tilts[i], 80, kept_band));
+  }
+  return images;
+}
+
+std::optional<Lean> lean_of(const std::vector<Panorama>& images) {
+  Executor executor;
+  return estimate_lean(images, executor);
+}
+
 TEST(EstimateLean, IsThatOfATiltedCamera) {
-  const ElevationBand band{radians(-25.0), radians(25.0)};
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const Panorama level = upright_edges(seed);
-    EXPECT_LT(degrees(estimate_lean_rad(level).value()), 1.5);
-    for (const double lean_deg : {6.0, 12.0}) {
-      const Tilt tilt{radians(lean_deg) * 0.8, radians(lean_deg) * 0.6};
-      const Panorama tilted = level_panorama(level, tilt, 80, band);
-      EXPECT_NEAR(degrees(estimate_lean_rad(tilted).value()), lean_deg, lean_deg / 3.0) << seed;
+  for (const double lean_deg : {6.0, 12.0}) {
+    const Tilt tilt{radians(lean_deg) * 0.8, radians(lean_deg) * 0.6};
+    const auto mounted = lean_of(take_images(std::vector<Tilt>(12, tilt)));
+    ASSERT_TRUE(mounted) << lean_deg;
+    EXPECT_TRUE(mounted->is_common);
+    EXPECT_NEAR(degrees(mounted->rad), lean_deg, lean_deg / 3.0);
+    std::vector<Tilt> swaying;
+    for (int i = 0; i < 12; ++i) {
+      swaying.push_back(
+          {radians(lean_deg) * std::cos(2.0 * i), radians(lean_deg) * std::sin(2.0 * i)});
     }
+    const auto held = lean_of(take_images(swaying));
+    ASSERT_TRUE(held) << lean_deg;
+    EXPECT_FALSE(held->is_common);
+    EXPECT_NEAR(degrees(held->rad), lean_deg, lean_deg / 3.0);
   }
 }
 
-TEST(EstimateLean, NeedsEdgesAndElevations) {
-  EXPECT_FALSE(estimate_lean_rad(Panorama(80, 512, ElevationBand{-0.5, 0.5})));
-  EXPECT_FALSE(estimate_lean_rad(Panorama(80, 512, std::nullopt)));
+// A lean is stated only if it is significant: not for upright cameras, and not where nothing is
+// upright.
+TEST(EstimateLean, IsNoneForUprightCamerasAndForNoise) {
+  EXPECT_FALSE(lean_of(take_images(std::vector<Tilt>(12))));
+  int stated = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed, 7);
+    std::vector<Panorama> images;
+    for (int i = 0; i < 8; ++i) {
+      Panorama noise(32, 128, kept_band);
+      for (float& value : noise.values()) value = static_cast<float>(random.uniform(0.0, 1.0));
+      images.push_back(std::move(noise));
+    }
+    stated += lean_of(images) ? 1 : 0;
+  }
+  EXPECT_LE(stated, 1);
+}
+
+TEST(EstimateLean, NeedsEdgesElevationsAndSeveralImages) {
+  EXPECT_FALSE(lean_of(std::vector<Panorama>(12, Panorama(80, 512, kept_band))));
+  EXPECT_FALSE(lean_of(std::vector<Panorama>(12, Panorama(80, 512, std::nullopt))));
+  EXPECT_FALSE(lean_of(take_images(std::vector<Tilt>(7, Tilt{0.2, 0.0}))));
 }
 
 TEST(CountCarrierRows, CountsRowsThatLookTheSameEverywhere) {

@@ -56,11 +56,11 @@ void add_images(viewer::ReportPage& page, const Trial& trial) {
   if (!trial.example) return;
   page.begin_section("An image as panonav reads it");
   page.add_text(
-      "It should be upright and show each direction once. Writing must be readable: if it is "
-      "mirrored, add --columns-run counter-clockwise. The middle is the forward direction "
-      "(--forward-column).");
+      "This is what panonav compares: the scene all around, upright, each direction once. If "
+      "writing is mirrored, add --columns-run counter-clockwise to the commands. The middle should "
+      "be the direction in which the camera moved; if it is another column, add --forward-column.");
   page.add_pictures({{viewer::make_data_url("image/png", encode_png(trial.example->view())),
-                      "Elevation upwards, a full turn from left to right"}});
+                      "A full turn from left to right"}});
 }
 
 void add_table(viewer::ReportPage& page, const Trial& trial) {
@@ -80,21 +80,26 @@ void add_table(viewer::ReportPage& page, const Trial& trial) {
 
 void write_try_report(const std::filesystem::path& folder, const Trial& trial,
                       const TrialVerdict& verdict) {
+  const std::string_view made_map = trial.has_map() ? "made a map from their order, " : "";
   viewer::ReportPage page(verdict.headline,
-                          "panonav read the images, stored them in a memory, made a map from their "
-                          "order, and then searched for each image among the others.");
+                          "panonav read the images, stored them in a memory, " +
+                              std::string(made_map) +
+                              "and then searched for each image among the others.");
   if (trial.queries.size() >= 2) {
     const std::size_t steps = trial.queries.size() - 1;
     std::vector<std::pair<std::string, std::string>> figures{
         {std::to_string(trial.count_known()) + " of " + std::to_string(trial.queries.size()),
          "images recognised among the others"}};
-    if (!trial.has_positions) {
-      const std::size_t parts = trial.map_summary ? trial.map_summary->part_sizes.size() : 0;
+    if (!trial.has_positions && trial.is_in_order) {
       figures.push_back(
           {std::to_string(trial.count_connected_steps()) + " of " + std::to_string(steps),
-           "steps between consecutive images visible"});
+           "steps between consecutive images whose motion is visible"});
+    }
+    if (trial.has_map()) {
+      const std::size_t parts = trial.map_summary->part_sizes.size();
       figures.push_back(
-          {std::to_string(parts), parts == 1 ? "part of the map" : "parts of the map"});
+          {std::to_string(parts),
+           parts == 1 ? "connected map" : "parts of the map, not connected with each other"});
     }
     page.add_figures(figures);
   }
@@ -105,10 +110,15 @@ void write_try_report(const std::filesystem::path& folder, const Trial& trial,
     page.add_commands(verdict.commands);
   }
   add_images(page, trial);
-  if (trial.map && trial.map_summary) {
-    page.begin_section("Map and answers");
-    page.add_plots({{draw_map(trial), "Parts that are not connected are drawn beside each other"},
-                    {draw_probabilities(trial), "Each image was searched among all other images"}});
+  if (!trial.queries.empty()) {
+    std::vector<viewer::ReportPlot> plots;
+    if (trial.has_map()) {
+      plots.push_back(
+          {draw_map(trial), "Parts that are not connected are drawn beside each other"});
+    }
+    plots.push_back({draw_probabilities(trial), "Each image was searched among all other images"});
+    page.begin_section(trial.has_map() ? "Map and answers" : "Answers");
+    page.add_plots(plots);
   }
   if (!trial.queries.empty()) add_table(page, trial);
   page.write(folder, "index.html", "panonav try");

@@ -15,12 +15,14 @@
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/gpano.hpp"
 #include "panonav/io/panorama_reader.hpp"
+#include "panonav/localisation/observation_model.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/tracker.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav_viewer/report_page.hpp"
 #include "reports/report_page.hpp"
@@ -34,7 +36,8 @@ namespace fs = std::filesystem;
 
 /// Largest number of images that a trial uses, so that it takes about a minute.
 constexpr std::size_t max_images = 400;
-constexpr std::size_t max_samples = 12;  ///< images from which the kind is guessed
+constexpr std::size_t max_samples = 12;       ///< images from which the kind is guessed
+constexpr std::size_t max_lean_samples = 60;  ///< images from which the lean is estimated
 
 /// Keeps at most `count` entries at equal intervals.
 void thin_out(std::vector<DatasetEntry>& entries, std::size_t count) {
@@ -130,7 +133,7 @@ void guess_source(Trial& trial, Dataset& recording, const std::vector<Image>& sa
   trial.guess.explanation = "GPano data of the images say that they show a part of the sphere.";
 }
 
-/// Measures lean, carrier and brightness from samples, and leaves out the rows that show the
+/// Measures carrier and brightness from samples, and leaves out the rows that show the
 /// carrier, if the band of the source can be chosen.
 void measure_images(const std::vector<Image>& samples, PictureSource& source, Trial& trial) {
   const PanoramaReader reader(source, choose_panorama_shape(source, {}));
@@ -154,13 +157,18 @@ void measure_images(const std::vector<Image>& samples, PictureSource& source, Tr
       panoramas[i] = upper.convert(samples[i].view());
     }
   }
-  // The slant of edges depends on elevations, which are assumed for mirrors and strips.
-  if (source.kind != PictureKind::equirectangular) return;
-  std::vector<double> leans;
-  for (const Panorama& panorama : panoramas) {
-    if (const auto lean = estimate_lean_rad(panorama)) leans.push_back(*lean);
+}
+
+/// Measures the lean of the camera. The slant of edges depends on elevations, which are assumed for
+/// mirrors and strips.
+void measure_lean(const std::vector<Observation>& observations, Trial& trial, Session& session) {
+  if (trial.guess.source->kind != PictureKind::equirectangular) return;
+  const std::size_t count = std::min(max_lean_samples, observations.size());
+  std::vector<Panorama> panoramas;
+  for (std::size_t i = 0; i < count; ++i) {
+    panoramas.push_back(std::get<Panorama>(observations[i * observations.size() / count].picture));
   }
-  if (!leans.empty()) trial.lean_rad = upper_median_in_place(std::span(leans));
+  trial.lean = estimate_lean(panoramas, session.executor());
 }
 
 void memorise(const std::vector<Observation>& observations, const PictureSource& source,
@@ -220,9 +228,38 @@ void measure_motion(const std::vector<Observation>& observations, Trial& trial, 
   if (std::isfinite(median_m)) trial.median_distance_m = median_m;
 }
 
+/// Tracks a robot that takes the same images in their order, with unknown start. Does nothing if
+/// too few views have positions.
+void track_all(const std::vector<Observation>& observations, Trial& trial, Session& session) {
+  if (!trial.has_positions && !trial.has_map()) return;
+  constexpr std::uint64_t min_positions = ObservationModel::min_views;
+  const auto info = MemoryFile::open(trial.memory, Access::read_only).info();
+  if (info.views_with_position < min_positions) return;
+  Tracker tracker(trial.memory);
+  Progress progress(session, "tracking", observations.size());
+  std::size_t tracked = 0;
+  for (const Observation& observation : observations) {
+    const LocalisationState state = tracker.observe(observation).state;
+    tracked += state == LocalisationState::localised || state == LocalisationState::position_known;
+    progress.advance();
+  }
+  trial.tracked = tracked;
+}
+
+void measure_steps(const std::vector<Observation>& observations, Trial& trial) {
+  std::vector<double> steps_m;
+  for (std::size_t i = 1; i < observations.size(); ++i) {
+    const auto& before = observations[i - 1].pose;
+    const auto& after = observations[i].pose;
+    if (before && after) steps_m.push_back(distance(before->position(), after->position()));
+  }
+  if (!steps_m.empty()) trial.median_step_m = median(steps_m);
+}
+
 void read_map(Trial& trial) {
   const auto memory = MemoryFile::open(trial.memory, Access::read_only);
   trial.map = memory.map(map_name);
+  trial.is_in_order = are_in_order(memory.load());
   if (trial.map) trial.map_poses = place_components_side_by_side(*trial.map);
 }
 
@@ -253,6 +290,11 @@ void remove_earlier_memory(const fs::path& memory) {
 
 }  // namespace
 
+std::string choose_memory_name(const std::string& input) {
+  const std::string stem = fs::path(input).lexically_normal().stem().string();
+  return (stem.empty() || stem == "." ? "images" : stem) + ".panonav";
+}
+
 std::size_t Trial::count_known() const {
   return static_cast<std::size_t>(
       std::ranges::count_if(queries, [](const Query& query) { return query.place.known; }));
@@ -266,7 +308,11 @@ bool Trial::is_standing() const {
 }
 
 std::size_t Trial::count_connected_steps() const {
-  if (!map) return 0;
+  if (!map_summary) return 0;
+  if (!map) {  // the parts are too small for a map, and consist of consecutive images
+    const auto& sizes = map_summary->part_sizes;
+    return std::accumulate(sizes.begin(), sizes.end(), std::size_t{0}) - sizes.size();
+  }
   std::size_t steps = 0;
   for (std::size_t i = 1; i < map->nodes.size(); ++i) {
     steps += map->nodes[i].component == map->nodes[i - 1].component ? 1 : 0;
@@ -295,8 +341,7 @@ Trial run_trial(const std::vector<std::string>& inputs, const fs::path& folder, 
     trial.guess.explanation = "dataset.toml describes the images.";
   }
   const std::vector<Image> samples = read_samples(recording, input);
-  const std::string stem = fs::path(input).lexically_normal().stem().string();
-  const fs::path memory = folder / ((stem.empty() || stem == "." ? "images" : stem) + ".panonav");
+  const fs::path memory = folder / choose_memory_name(input);
   prepare_report_folder(folder, "try");
   require_unchanged_memory(memory, recording);
   if (!trial.guess.source) guess_source(trial, recording, samples, session);
@@ -304,6 +349,7 @@ Trial run_trial(const std::vector<std::string>& inputs, const fs::path& folder, 
   PictureSource& source = *trial.guess.source;
   if (!has_dataset_file(input)) measure_images(samples, source, trial);
   const std::vector<Observation> observations = read_panoramas(recording, source, trial, session);
+  if (!has_dataset_file(input)) measure_lean(observations, trial, session);
   if (observations.size() < 2) return trial;
   trial.memory = memory;
   // A later run recognises the folder of an interrupted one by this page.
@@ -320,168 +366,9 @@ Trial run_trial(const std::vector<std::string>& inputs, const fs::path& folder, 
   localise_all(observations, trial, session);
   measure_motion(observations, trial, session);
   read_map(trial);
+  if (trial.has_positions) measure_steps(observations, trial);
+  track_all(observations, trial, session);
   return trial;
-}
-
-namespace {
-
-std::string count_text(std::size_t count, std::size_t total) {
-  return std::to_string(count) + " of " + std::to_string(total);
-}
-
-/// Returns the flags with which other verbs read the images.
-std::string make_flags(const Trial& trial) {
-  const PictureSource& source = *trial.guess.source;
-  const auto band = [](const ElevationBand& kept) {
-    return " --elevation-deg " + format_number(degrees(kept.bottom_rad)) + " " +
-           format_number(degrees(kept.top_rad));
-  };
-  switch (trial.guess.form) {
-    case PictureForm::sphere:
-      return " --kind equirectangular" + band(*source.layout.kept_elevations);
-    case PictureForm::strip:
-      return " --kind panorama" + band(*source.layout.elevations);
-    default:
-      return " --kind mirror --camera " + quote_for_shell(trial.camera->string()) +
-             (source.layout.kept_elevations ? band(*source.layout.kept_elevations) : "");
-  }
-}
-
-void add_image_findings(const Trial& trial, std::vector<std::string>& findings) {
-  constexpr double max_lean_deg = 5.0;
-  constexpr double min_brightness = 0.1;
-  if (trial.example && trial.mean_brightness < min_brightness) {
-    findings.push_back("The images are very dark (mean brightness " +
-                       format_fixed(100.0 * trial.mean_brightness, 0) +
-                       " %): use more light or a longer exposure.");
-  }
-  if (trial.lean_rad && degrees(*trial.lean_rad) > max_lean_deg) {
-    findings.push_back("The camera seems to lean by " + format_fixed(degrees(*trial.lean_rad), 0) +
-                       " degrees: hold it upright, because views are compared row by row.");
-  }
-  if (trial.carrier_top_rad) {
-    findings.push_back("Below " + format_fixed(degrees(*trial.carrier_top_rad), 0) +
-                       " degrees the images look the same everywhere: probably you or the robot. "
-                       "These rows are left out.");
-  }
-  if (!trial.unread.empty()) {
-    const bool is_one = trial.unread.size() == 1;
-    findings.push_back(is_one ? trial.unread.front() + " cannot be read or has another size."
-                              : format_count(trial.unread.size(), "image") +
-                                    " cannot be read or have another size, such as " +
-                                    trial.unread.front() + ".");
-  }
-  if (trial.camera) {
-    findings.push_back("The calibration of the camera that was found is in " +
-                       trial.camera->string() + ".");
-  }
-  const std::size_t tried = trial.queries.size();
-  if (tried > 0 && trial.image_count > tried + trial.unread.size()) {
-    findings.push_back(std::to_string(tried) + " of " + format_count(trial.image_count, "image") +
-                       ", at equal intervals, " + (tried == 1 ? "was" : "were") + " tried.");
-  }
-}
-
-void add_distance_finding(const Trial& trial, std::vector<std::string>& findings) {
-  const std::size_t steps = trial.queries.size() - 1;
-  const std::size_t connected = trial.count_connected_steps();
-  const std::size_t parts = trial.map_summary ? trial.map_summary->part_sizes.size() : 0;
-  if (10 * connected < 9 * steps) {
-    findings.push_back("The motion between consecutive images is visible for " +
-                       count_text(connected, steps) +
-                       " steps, so the images are too far apart or in no order. Take one every 20 "
-                       "to 50 cm, or a video.");
-  }
-  if (parts > 1) {
-    findings.push_back("The map has " + format_count(parts, "part") +
-                       " that are not connected; the largest has " +
-                       format_count(trial.map_summary->part_sizes.front(), "image") +
-                       ". Parts are drawn beside each other, and distances between them "
-                       "have no meaning.");
-  }
-}
-
-std::vector<std::string> make_commands(const Trial& trial, bool is_good) {
-  std::string input;
-  for (const std::string& one : trial.inputs) {
-    input += (input.empty() ? "" : " ") + quote_for_shell(one);
-  }
-  const std::string memory = quote_for_shell(trial.memory.string());
-  if (trial.is_standing()) return {"panonav gallery " + memory + " -o gallery"};
-  if (!is_good) {
-    const std::string flags = has_dataset_file(trial.inputs.front()) ? "" : make_flags(trial);
-    return {"panonav gallery " + memory + " -o gallery",
-            "panonav memorise " + quote_for_shell(trial.memory.filename().string()) + " " + input +
-                flags};
-  }
-  std::vector<std::string> commands{
-      "panonav localise " + memory + " " + input + " --report answers",
-      "panonav track " + memory + " " + input + " --report tracked"};
-  // A route needs nine of ten images in one part of the map, as `find_drive_poses` does.
-  if (trial.has_positions ||
-      10 * trial.map_summary->part_sizes.front() >= 9 * trial.queries.size()) {
-    commands.push_back("panonav route record " + memory + " " + input);
-  }
-  return commands;
-}
-
-}  // namespace
-
-TrialVerdict judge_trial(const Trial& trial) {
-  TrialVerdict verdict;
-  if (!trial.guess.source) {
-    verdict.headline = trial.guess.form == PictureForm::ordinary
-                           ? "These are not omnidirectional images."
-                           : "These images cannot be used as they are.";
-    verdict.findings.push_back(trial.guess.explanation);
-    return verdict;
-  }
-  if (trial.queries.size() < 2) {
-    verdict.headline = "There are fewer than two images that can be read.";
-    verdict.findings.push_back("Record a walk of 30 images or more, one every 20 to 50 cm.");
-    add_image_findings(trial, verdict.findings);
-    verdict.findings.push_back(trial.guess.explanation);
-    return verdict;
-  }
-  const std::size_t images = trial.queries.size();
-  const std::size_t known = trial.count_known();
-  verdict.headline = count_text(known, images) + " images were recognised among the others.";
-  const bool is_connected =
-      trial.has_positions || 10 * trial.count_connected_steps() >= 9 * (images - 1);
-  verdict.is_good = 10 * known >= 9 * images && is_connected;
-  constexpr std::size_t few_images = 10;
-  if (images < few_images) {
-    verdict.findings.push_back("These are only " + format_count(images, "image") +
-                               ". Record a walk of 30 or more.");
-    verdict.is_good = false;
-  }
-  if (trial.is_standing()) {
-    verdict.is_good = false;
-    verdict.headline = "The camera hardly moves: the images show one place.";
-    verdict.findings.push_back(
-        "If things around are 1.5 m away, two of the images are " +
-        format_fixed(std::max(100.0 * *trial.median_distance_m, 1.0), 0) +
-        " cm apart or less (median). Walk through the place, and take an image every 20 to 50 cm, "
-        "or a video.");
-  } else if (!trial.has_positions && images >= few_images) {
-    add_distance_finding(trial, verdict.findings);
-  }
-  add_image_findings(trial, verdict.findings);
-  verdict.findings.push_back(trial.guess.explanation);
-  if (trial.map_summary && trial.map_summary->unit == LengthUnit::view_steps) {
-    verdict.findings.push_back(
-        "Images alone do not show how long a metre is, so positions are in view steps: the median "
-        "distance between consecutive images. panonav scale makes metres of them.");
-  }
-  if (verdict.is_good) {
-    verdict.findings.insert(verdict.findings.begin(),
-                            "This recording works: panonav knows these places again.");
-  } else {
-    verdict.findings.emplace_back(
-        "This recording does not work well. Record again as said above, and try the new images.");
-  }
-  verdict.commands = make_commands(trial, verdict.is_good);
-  return verdict;
 }
 
 }  // namespace panonav::command

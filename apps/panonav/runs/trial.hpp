@@ -28,18 +28,23 @@ struct Trial {
   std::size_t image_count = 0;      ///< of the input
   std::vector<std::string> unread;  ///< images that cannot be read or have another size
   std::vector<Query> queries;       ///< the images that were tried, in their order
-  std::optional<double> lean_rad;   ///< median lean of the camera
+  std::optional<Lean> lean;         ///< of the camera; nullopt: not measured or not significant
   /// Elevation up to which the images show the camera's carrier; these rows are left out.
   std::optional<double> carrier_top_rad;
   double mean_brightness = 0.0;          ///< 0 .. 1
   std::optional<Image> example;          ///< an unwrapped image
   std::filesystem::path memory;          ///< the memory file
-  std::optional<TopologicalMap> map;     ///< of the memory
+  std::optional<TopologicalMap> map;     ///< of the memory; nullopt: all parts are too small
   std::optional<MemoryMap> map_summary;  ///< description of `map`
   bool has_positions = false;            ///< of a data set, so that there is no map
+  bool is_in_order = false;              ///< `are_in_order`
   /// Median distance between two images if things around are 1.5 m away (`VisualOdometryOptions`);
   /// nullopt: most pairs of images do not show the motion between them.
   std::optional<double> median_distance_m;
+  /// Median distance between consecutive positions of a data set.
+  std::optional<double> median_step_m;
+  /// Number of images at which tracking knows the position; nullopt: there are no positions.
+  std::optional<std::size_t> tracked;
   std::vector<Pose2> map_poses;                 ///< of the map's nodes, parts beside each other
   std::optional<std::filesystem::path> camera;  ///< file of a camera that was found
 
@@ -47,9 +52,16 @@ struct Trial {
   /// True if two images are typically nearer to each other than the shortest step of a good
   /// recording, so that the whole recording shows one place.
   [[nodiscard]] bool is_standing() const;
-  /// Number of consecutive images whose motion is part of the map.
+  /// True if there is a map that means something, of images in order.
+  [[nodiscard]] bool has_map() const { return map && map_summary && is_in_order; }
+  /// True if tracking knows the position at half of the images or more.
+  [[nodiscard]] bool can_track() const { return tracked && 2 * *tracked >= queries.size(); }
+  /// Number of steps between consecutive images whose motion is visible.
   [[nodiscard]] std::size_t count_connected_steps() const;
 };
+
+/// Returns the file name of the memory for an input: that of the folder or video.
+[[nodiscard]] std::string choose_memory_name(const std::string& input);
 
 /// Opens the input (of several, videos that continue the first), guesses how to read its images,
 /// memorises at most 400 of them at equal intervals in `folder`, and localises each one among the

@@ -28,11 +28,14 @@ ordered_json to_json(const Trial& trial, const TrialVerdict& verdict,
                     {"images", trial.image_count},
                     {"tried", trial.queries.size()},
                     {"recognised", trial.count_known()},
+                    {"in_order", trial.is_in_order},
                     {"connected_steps", trial.count_connected_steps()},
+                    {"tracked", nullptr},
                     {"part_sizes", ordered_json::array()},
                     {"unread", trial.unread},
                     {"memory", nullptr},
                     {"page", (folder / "index.html").string()}};
+  if (trial.tracked) json["tracked"] = *trial.tracked;
   if (trial.map_summary) json["part_sizes"] = trial.map_summary->part_sizes;
   if (!trial.queries.empty()) json["memory"] = trial.memory.string();
   return json;
@@ -77,8 +80,9 @@ Verb try_verb() {
           VerbGroup::first_steps,
           "Try panonav with images of your own camera",
           "Finds out what the images are: a 360 degree camera, raw images of two lenses, a mirror "
-          "camera, or panoramas. Stores them in a memory, makes a map from their order, and "
-          "searches for each image among the others. Writes a page with a verdict and the next "
+          "camera, or panoramas. Stores them in a memory, makes a map if their order "
+          "shows the motion, searches for each image among the others, and tracks a robot with "
+          "them. Writes a page with a verdict and the next "
           "commands. Of more than 400 images, 400 at equal intervals are tried. The exit code is 1 "
           "if no image is recognised.",
           "  panonav try photos\n"

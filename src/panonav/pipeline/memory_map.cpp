@@ -132,29 +132,6 @@ std::map<std::pair<ViewId, ViewId>, Pose2> read_metric_steps(const MemoryFile& m
   return steps;
 }
 
-/// True if views resemble the next one more often than by chance: the next one is among the most
-/// similar tenth of all views for more of them than the mean of a random order plus three standard
-/// deviations.
-bool are_in_order(const VisualMemory& views) {
-  constexpr std::size_t max_tested = 200;
-  const auto ids = views.views();
-  const std::size_t steps = ids.size() - 1;
-  const std::size_t every = (steps + max_tested - 1) / max_tested;
-  const std::size_t top = std::max<std::size_t>(1, ids.size() / 10);
-  std::size_t tested = 0;
-  std::size_t similar = 0;
-  for (std::size_t i = 0; i < steps; i += every) {
-    const std::array self{ids[i]};
-    const auto found = views.search(views.packed(ids[i]), {.top = static_cast<int>(top)},
-                                    {.excluded_views = self});
-    ++tested;
-    similar += std::ranges::find(found.matches, ids[i + 1], &Match::view) != found.matches.end();
-  }
-  const double chance = static_cast<double>(top) / static_cast<double>(steps);
-  const double mean = static_cast<double>(tested) * chance;
-  return static_cast<double>(similar) > mean + 3.0 * std::sqrt(mean * (1.0 - chance));
-}
-
 /// Returns what the names of images of one recording have in common: all before the time in a video
 /// ("walk.mp4@3.2"), or the folder and the name without digits.
 std::string series_of(const std::string& name) {
@@ -243,6 +220,45 @@ void store_poses(MemoryFile& memory, const TopologicalMap& map) {
 }
 
 }  // namespace
+
+bool are_in_order(const VisualMemory& views) {
+  constexpr std::size_t max_tested = 200;
+  const auto ids = views.views();
+  if (ids.size() < 3) return false;
+  const std::size_t steps = ids.size() - 1;
+  const std::size_t every = (steps + max_tested - 1) / max_tested;
+  const std::size_t top = std::max<std::size_t>(1, ids.size() / 10);
+  std::size_t tested = 0;
+  std::size_t similar = 0;
+  double gain = 0.0;
+  double largest_gain = 0.0;
+  double rank = 0.0;  // mean of the ranks of the next views, 0 .. 1
+  for (std::size_t i = 0; i < steps; i += every) {
+    const std::array self{ids[i]};
+    const auto others = views
+                            .search(views.packed(ids[i]), {.top = static_cast<int>(steps)},
+                                    {.excluded_views = self})
+                            .matches;
+    const auto next = std::ranges::find(others, ids[i + 1], &Match::view);
+    ++tested;
+    const auto before = static_cast<std::size_t>(next - others.begin());
+    similar += before < top ? 1 : 0;
+    rank += static_cast<double>(before) / static_cast<double>(others.size() - 1);
+    double sum = 0.0;
+    for (const Match& other : others) sum += other.dissimilarity;
+    const double average = sum / static_cast<double>(others.size());
+    gain += average - next->dissimilarity;
+    largest_gain += average - 0.5 * (others[0].dissimilarity + others[1].dissimilarity);
+  }
+  const double chance = static_cast<double>(top) / static_cast<double>(steps);
+  const double by_chance = static_cast<double>(tested) * chance;
+  const bool is_significant =
+      static_cast<double>(similar) > by_chance + 3.0 * std::sqrt(by_chance * (1.0 - chance));
+  // A random step has a rank of 0.5 on average, so at most two of five steps are random.
+  constexpr double max_rank = 0.2;
+  return is_significant &&
+         (2.0 * gain >= largest_gain || rank <= max_rank * static_cast<double>(tested));
+}
 
 const char* to_string(LengthUnit unit) noexcept {
   return unit == LengthUnit::metres ? "m" : "view steps";

@@ -72,6 +72,15 @@ struct MemoryMap {
 void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit,
                double assumed_unit_m = 1.0);
 
+/// True if the views are in the order of a walk, which may pause, be slow, have gaps or pass places
+/// that look alike. The next view must be among the most similar tenth of all views for more
+/// views than the mean of a random order plus three standard deviations. And most steps must be in
+/// order, by one of two measures that random steps reduce by their share: the similarity of the
+/// next view exceeds the average by half as much as that of the two most similar views does; or on
+/// average four fifths of all views are less similar. False if the images are too
+/// far apart to look alike. Cost: 200 searches.
+[[nodiscard]] bool are_in_order(const VisualMemory& views);
+
 /// Makes the map of a memory whose views have no positions from data sets, in the order of their
 /// ids
 /// (`TopologicalMapper`). Views in no order, where consecutive ones are not more similar than

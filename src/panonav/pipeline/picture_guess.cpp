@@ -15,6 +15,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 
 namespace panonav {
 
@@ -130,8 +131,9 @@ PictureGuess guess_lenses(std::span<const Image> samples, Executor& executor) {
   if (!best) {
     guess.explanation +=
         "One image alone does not show how the lenses fit together. Take four images at one place, "
-        "rotated by about 90 degrees each, and calibrate the camera from them (profile "
-        "dual-fisheye); or use the stitched images of the camera's own program.";
+        "with objects some metres away, and rotate the camera on its stand by about 90 degrees "
+        "between them; then calibrate the camera from them. Or use the stitched images of the "
+        "camera's own program.";
     return guess;
   }
   guess.source.emplace();
@@ -182,12 +184,13 @@ PictureGuess refuse_ordinary(const Image& first, const std::string& why) {
               "camera, of a mirror camera, or panoramas of a full turn."};
 }
 
-/// Slopes of edges that are nearly upright, with their azimuth and weight.
+/// An edge that is nearly upright.
 struct UprightEdge {
   double cosine = 0.0;
   double sine = 0.0;
   double slope = 0.0;
   double weight = 0.0;
+  std::size_t half = 0;  ///< 0 or 1: every second of eight sectors of azimuth
 };
 
 std::vector<UprightEdge> find_upright_edges(const Panorama& panorama) {
@@ -215,8 +218,8 @@ std::vector<UprightEdge> find_upright_edges(const Panorama& panorama) {
       by_elevation /= row_rad;
       if (std::abs(by_elevation) > max_slope * std::abs(by_azimuth) || by_azimuth == 0.0) continue;
       const double azimuth = panorama.azimuth_rad(c);
-      edges.push_back(
-          {std::cos(azimuth), std::sin(azimuth), -by_elevation / by_azimuth, std::abs(by_azimuth)});
+      edges.push_back({std::cos(azimuth), std::sin(azimuth), -by_elevation / by_azimuth,
+                       std::abs(by_azimuth), static_cast<std::size_t>(8 * c / columns % 2)});
       weights.push_back(edges.back().weight);
     }
   }
@@ -226,6 +229,104 @@ std::vector<UprightEdge> find_upright_edges(const Panorama& panorama) {
   const double limit = quantile(weights, 0.9);
   std::erase_if(edges, [&](const UprightEdge& edge) { return edge.weight < limit; });
   return edges;
+}
+
+/// Leans are tried in steps of a degree, up to this angle in both directions.
+constexpr int max_lean_deg = 20;
+constexpr int leans_per_side = 2 * max_lean_deg + 1;
+constexpr std::size_t lean_count = leans_per_side * leans_per_side;
+constexpr std::size_t upright_lean = lean_count / 2;
+/// Fewest images from which a lean is estimated.
+constexpr std::size_t min_lean_images = 8;
+
+struct LeanDegrees {
+  int a = 0;  ///< slope of edges at azimuth 0
+  int b = 0;  ///< at azimuth 90 degrees
+};
+
+LeanDegrees lean_at(std::size_t index) {
+  const int i = static_cast<int>(index);
+  return {i / leans_per_side - max_lean_deg, i % leans_per_side - max_lean_deg};
+}
+
+/// Share of the edges of one image that each lean explains, of two halves of the azimuths. A lean
+/// of the camera fits both halves; slanted things and chance do not.
+using LeanScores = std::array<std::vector<double>, 2>;
+
+std::optional<LeanScores> score_leans(const Panorama& panorama) {
+  if (!panorama.elevations() || panorama.rows() < 16 || panorama.columns() < 16) {
+    return std::nullopt;
+  }
+  const std::vector<UprightEdge> edges = find_upright_edges(panorama);
+  if (edges.empty()) return std::nullopt;
+  double total = 0.0;
+  for (const UprightEdge& edge : edges) total += edge.weight;
+  constexpr double slope_deviation = 0.04;  // of an edge's slope, some 2 degrees (chosen)
+  LeanScores scores{std::vector<double>(lean_count), std::vector<double>(lean_count)};
+  for (std::size_t lean = 0; lean < lean_count; ++lean) {
+    const LeanDegrees degrees = lean_at(lean);
+    const double a = radians(degrees.a);
+    const double b = radians(degrees.b);
+    for (const UprightEdge& edge : edges) {
+      const double off = (edge.slope - a * edge.cosine - b * edge.sine) / slope_deviation;
+      scores.at(edge.half)[lean] += edge.weight / (total * (1.0 + off * off));
+    }
+  }
+  return scores;
+}
+
+std::size_t find_best_lean(const std::vector<double>& scores) {
+  return static_cast<std::size_t>(std::ranges::max_element(scores) - scores.begin());
+}
+
+void add_scores(std::vector<double>& sum, const std::vector<double>& scores, double factor = 1.0) {
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += factor * scores[i];
+}
+
+/// True if the mean of the values is above 0 by more than three standard errors.
+bool is_significantly_positive(const std::vector<double>& values) {
+  const double average = mean(values);
+  double squares = 0.0;
+  for (const double value : values) squares += (value - average) * (value - average);
+  const auto n = static_cast<double>(values.size());
+  return average > 3.0 * std::sqrt(squares / (n * (n - 1.0)));
+}
+
+/// Returns the lean that all images have in common, by all of their edges. nullopt unless a lean
+/// that is estimated from one half of the azimuths of all other images explains the edges in the
+/// other half of an image better than no lean does, for both halves.
+std::optional<double> find_common_lean_deg(const std::vector<LeanScores>& images) {
+  LeanScores sums{std::vector<double>(lean_count), std::vector<double>(lean_count)};
+  for (const LeanScores& image : images) {
+    for (const std::size_t half : {0U, 1U}) add_scores(sums.at(half), image.at(half));
+  }
+  for (const std::size_t half : {0U, 1U}) {
+    std::vector<double> gains;
+    for (const LeanScores& image : images) {
+      std::vector<double> others = sums.at(1 - half);
+      add_scores(others, image.at(1 - half), -1.0);
+      const std::vector<double>& own = image.at(half);
+      gains.push_back(own[find_best_lean(others)] - own[upright_lean]);
+    }
+    if (!is_significantly_positive(gains)) return std::nullopt;
+  }
+  add_scores(sums[0], sums[1]);
+  const LeanDegrees best = lean_at(find_best_lean(sums[0]));
+  return std::hypot(best.a, best.b);
+}
+
+/// Returns the root mean square of the leans of single images, whatever their directions: the
+/// scalar product of independent estimates from both halves of the azimuths has the square of the
+/// lean as its mean. nullopt if that is not significant.
+std::optional<double> find_varying_lean_deg(const std::vector<LeanScores>& images) {
+  std::vector<double> squares;
+  for (const LeanScores& image : images) {
+    const LeanDegrees first = lean_at(find_best_lean(image[0]));
+    const LeanDegrees second = lean_at(find_best_lean(image[1]));
+    squares.push_back(first.a * second.a + first.b * second.b);
+  }
+  if (!is_significantly_positive(squares)) return std::nullopt;
+  return std::sqrt(mean(squares));
 }
 
 }  // namespace
@@ -258,32 +359,23 @@ PictureGuess guess_pictures(std::span<const Image> samples, Executor& executor) 
   return refuse_ordinary(first, "show neither a ring nor a full turn");
 }
 
-std::optional<double> estimate_lean_rad(const Panorama& panorama) {
-  if (!panorama.elevations() || panorama.rows() < 16 || panorama.columns() < 16) {
-    return std::nullopt;
+std::optional<Lean> estimate_lean(std::span<const Panorama> panoramas, Executor& executor) {
+  std::vector<std::optional<LeanScores>> all(panoramas.size());
+  parallel_for(executor, panoramas.size(),
+               [&](std::size_t i) { all[i] = score_leans(panoramas[i]); });
+  std::vector<LeanScores> images;
+  for (auto& scores : all) {
+    if (scores) images.push_back(std::move(*scores));
   }
-  const std::vector<UprightEdge> edges = find_upright_edges(panorama);
-  if (edges.empty()) return std::nullopt;
-  constexpr int max_lean_deg = 20;
-  constexpr double slope_deviation = 0.04;  // of an edge's slope, some 2 degrees (chosen)
-  double best = 0.0;
-  double lean_rad = 0.0;
-  for (int i = -max_lean_deg; i <= max_lean_deg; ++i) {
-    for (int j = -max_lean_deg; j <= max_lean_deg; ++j) {
-      const double a = radians(i);
-      const double b = radians(j);
-      double sum = 0.0;
-      for (const UprightEdge& edge : edges) {
-        const double off = (edge.slope - a * edge.cosine - b * edge.sine) / slope_deviation;
-        sum += edge.weight / (1.0 + off * off);
-      }
-      if (sum > best) {
-        best = sum;
-        lean_rad = std::hypot(a, b);
-      }
-    }
+  if (images.size() < min_lean_images) return std::nullopt;
+  const std::optional<double> common_deg = find_common_lean_deg(images);
+  const std::optional<double> varying_deg = find_varying_lean_deg(images);
+  // Leans of single images include the common one, so they exceed it where both are found.
+  if (varying_deg && (!common_deg || *varying_deg > std::numbers::sqrt2 * *common_deg)) {
+    return Lean{radians(*varying_deg), false};
   }
-  return lean_rad;
+  if (common_deg) return Lean{radians(*common_deg), true};
+  return std::nullopt;
 }
 
 int count_carrier_rows(std::span<const Panorama> panoramas) {

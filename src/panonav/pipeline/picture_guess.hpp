@@ -36,11 +36,18 @@ struct PictureGuess {
 /// Throws ContractError without samples. Cost: up to some seconds.
 [[nodiscard]] PictureGuess guess_pictures(std::span<const Image> samples, Executor& executor);
 
-/// Estimates by how much the camera leans against the vertical, in rad, from the slant of the
-/// upright edges of walls, doors and trees; up to 20 degrees, to about a third. nullopt if the
-/// panorama has too few such edges, or unknown elevations. Robust against edges in other
-/// directions.
-[[nodiscard]] std::optional<double> estimate_lean_rad(const Panorama& panorama);
+/// Lean of a camera against the vertical.
+struct Lean {
+  double rad = 0.0;        ///< typical size
+  bool is_common = false;  ///< the same in all images, as of a camera that is mounted askew
+};
+/// Estimates from the slant of the upright edges of walls, doors and trees by how much the camera
+/// leans; up to 20 degrees, to about a third. nullopt if no lean is significant (three standard
+/// errors) between the images and between two halves of the azimuths: most upright images, images
+/// without upright edges or with unknown elevations, and fewer than 8 images. Cost: some 20 ms an
+/// image.
+[[nodiscard]] std::optional<Lean> estimate_lean(std::span<const Panorama> panoramas,
+                                                Executor& executor);
 
 /// Counts the lowest rows that look the same in all panoramas, as those that show the camera's
 /// carrier. Needs panoramas of one shape from different places; 0 for fewer than 8.
