@@ -266,7 +266,8 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
     page.add_text(
         "A check of the answers. Of each pair, the upper band is what the robot saw at the height "
         "of the horizon, the lower band what it should see at the computed position according to "
-        "the recorded lines. If both agree, the answer is right. Light blue: the recorded lines do "
+        "the recorded lines. The better both agree, the safer is the answer. Light blue: the "
+        "recorded lines do "
         "not show this direction. The correlation measures the agreement: 1 for the same pattern, "
         "0 for nothing in common.");
     page.add_plots(
