@@ -323,7 +323,9 @@ TEST_F(Kill, InterruptionIsExplained) {
       ::kill(child, SIGINT);
       int status = 0;
       was_interrupted = ::waitpid(child, &status, 0) == child && WIFSIGNALED(status);
-      if (was_interrupted) EXPECT_EQ(WTERMSIG(status), SIGINT);
+      if (was_interrupted) {
+        EXPECT_EQ(WTERMSIG(status), SIGINT);
+      }
     }
     ASSERT_TRUE(was_interrupted) << "the verb ended before each signal";
     EXPECT_EQ(bytes_of(folder_ / "messages"), interrupted.message);

@@ -440,7 +440,7 @@ TEST_F(Recordings, ImagesWithoutOdometryLeaveThatOfTheOthers) {
 }
 
 TEST_F(Recordings, TheCommandThatInfoSuggestsWorks) {
-  for (const std::string& form : {"_lz4.mcap", "_rosbag2", "_ros1.bag"}) {
+  for (const std::string form : {"_lz4.mcap", "_rosbag2", "_ros1.bag"}) {
     SCOPED_TRACE(form);
     const std::string last = lines(run_panonav({"info", walk(form)}).out).back();
     const std::string start = "Next: panonav ";

@@ -222,7 +222,7 @@ TEST_F(MeshFile, WhatIsNotShownMayBeFaulty) {
 
 TEST_F(MeshFile, AllPrimitivesOfColladaAreRead) {
   const std::string vertices = "<input semantic='VERTEX' source='#v' offset='0'/>";
-  for (const std::string primitives :
+  for (const std::string& primitives :
        {"<triangles>" + vertices + "<p>0 1 2 0 2 3</p></triangles>",
         "<polylist>" + vertices + "<vcount>4</vcount><p>0 1 2 3</p></polylist>",
         "<polygons>" + vertices + "<p>0 1 2 3</p></polygons>",
