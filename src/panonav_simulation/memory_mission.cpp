@@ -9,22 +9,24 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 
 namespace panonav::simulation {
 
 namespace {
 
 /// Returns the true poses of the views, by node of the graph; NaN where the memory does not state
-/// them.
+/// them. Positions from the memory's own map are in another frame than the scene.
 std::vector<Pose2> collect_true_poses(const NavigationGraph& graph, const MemoryFile& file) {
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   constexpr std::size_t batch = 1024;  // views loaded at a time
+  const bool is_true = !has_positions_from_map(file);
   std::vector<Pose2> poses;
   for (std::size_t begin = 0; begin < graph.size(); begin += batch) {
     const auto views = graph.views().subspan(begin, std::min(batch, graph.size() - begin));
     const VisualMemory memory = file.load(views);
     for (const ViewId view : views) {
-      const auto& pose = memory.info(view).pose;
+      const auto& pose = is_true ? memory.info(view).pose : std::nullopt;
       poses.push_back(pose ? Pose2{pose->x_m, pose->y_m, pose->heading_rad.value_or(unknown)}
                            : Pose2{unknown, unknown, unknown});
     }

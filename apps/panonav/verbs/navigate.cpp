@@ -254,7 +254,8 @@ void require_known_goal(const NavigateArguments& arguments, const RobotNavigator
                         const simulation::RememberedPlace& remembered) {
   if (!std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
     throw FileError(arguments.memory,
-                    "does not contain the position of the view " + robot.info(robot.goal()).name +
+                    "does not contain the true position of the view " +
+                        robot.info(robot.goal()).name +
                         ", so the middle of the path is unknown; leave out --kidnap");
   }
 }
