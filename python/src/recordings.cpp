@@ -326,6 +326,7 @@ void bind_memorising(py::module_& m) {
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
         Memoriser memoriser(memory, options);
+        memoriser.recognise_renamed(dataset);
         DatasetObservations observations(dataset, executor);
         std::vector<Observation> batch;
         const auto add = [&] {

@@ -4,10 +4,12 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {
@@ -105,6 +107,41 @@ TEST_F(Memorising, GoesOnWhereItStoppedAndRefusesOtherViewsUnderKnownNames) {
   EXPECT_EQ(counts.appended, 5U);  // 5 .. 9
   EXPECT_EQ(counts.known_before, 2U);
   EXPECT_EQ(MemoryFile::open(path(), Access::read_only).names().back(), "view_9");
+}
+
+TEST_F(Memorising, KnowsWherePathsBegin) {
+  const auto memorise = [&](const std::vector<std::pair<std::string, int>>& input) {
+    Memoriser memoriser(path(), options());
+    std::vector<Observation> observations;
+    for (const auto& [name, number] : input) {
+      Observation observation = seen_at(number);
+      observation.name = name;
+      observation.pose.reset();
+      observations.push_back(std::move(observation));
+    }
+    Executor executor;
+    memoriser.add(std::move(observations), executor);
+    memoriser.finish(executor);
+    const MemoryFile file = MemoryFile::open(path(), Access::read_only);
+    std::vector<std::string> names;
+    const VisualMemory views = file.load();
+    for (const ViewId start : read_path_starts(file)) names.push_back(views.info(start).name);
+    return names;
+  };
+  using Names = std::vector<std::string>;
+  // Neither the names nor their endings tell which images belong together, but their input does.
+  EXPECT_EQ(memorise({{"a_1.png", 1}, {"b_2.jpg", 2}, {"3.PNG", 3}}), Names());
+  // The input of more images of a known walk continues it.
+  EXPECT_EQ(memorise({{"b_2.jpg", 2}, {"3.PNG", 3}, {"4.png", 4}}), Names());
+  EXPECT_EQ(memorise({{"5.png", 5}, {"6.png", 6}}), Names({"5.png"}));
+  // Images between known ones, and after a view that others follow.
+  EXPECT_EQ(memorise({{"5.png", 5}, {"5b.png", 15}, {"6.png", 6}, {"7.png", 7}}),
+            Names({"5.png", "5b.png", "7.png"}));
+  EXPECT_EQ(memorise({{"4.png", 4}, {"8.png", 8}, {"9.png", 9}}),
+            Names({"5.png", "5b.png", "7.png", "8.png"}));
+  EXPECT_EQ(
+      memorise({{"9.png", 9}, {"w.mp4@1", 20}, {"w.mp4@2", 21}, {"v.mp4@1", 22}, {"x/1", 23}}),
+      Names({"5.png", "5b.png", "7.png", "8.png", "w.mp4@1", "v.mp4@1", "x/1"}));
 }
 
 TEST_F(Memorising, MakesNoFileOfWhatItCannotCompare) {

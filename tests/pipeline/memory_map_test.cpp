@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -198,31 +199,30 @@ TEST_F(MemoryMaps, ShuffledAndHalfShuffledViewsAreInNoOrder) {
   EXPECT_EQ(taken_for_a_walk, 0);
 }
 
-TEST_F(MemoryMaps, AnotherRecordingDoesNotFollowTheLastView) {
-  const auto truth = rounds(40);
-  for (const auto& [first, second, follows] :
-       {std::tuple("walk/view_", "walk/view_", true),
-        std::tuple("walk/view_", "later/view_", false), std::tuple("a.mp4@", "a.mp4@", true),
-        std::tuple("walk1.mp4@", "walk2.mp4@", false)}) {
-    MemoryFile memory = make_memory();
-    for (std::size_t i = 0; i < truth.size(); ++i) {
-      const std::string name = (i < 20 ? first : second) + std::to_string(100 + i);
-      memory.append(NewView{{name, std::nullopt, std::nullopt},
-                            pack(round_room_signature(world, truth[i]), 0.1F),
-                            {},
-                            {}});
-    }
-    ASSERT_TRUE(map_views(memory, {}, executor));
-    const auto map = memory.map(map_name).value();
-    const ViewId last = map.nodes[19].view;
-    const ViewId next = map.nodes[20].view;
-    EXPECT_EQ(std::ranges::any_of(map.edges,
-                                  [&](const auto& edge) {
-                                    return edge.kind == Link::Kind::sequence && edge.a == last &&
-                                           edge.b == next;
-                                  }),
-              follows)
-        << second;
+bool has_sequence(const TopologicalMap& map, ViewId a, ViewId b) {
+  return std::ranges::any_of(map.edges, [&](const auto& edge) {
+    return edge.kind == Link::Kind::sequence && edge.a == a && edge.b == b;
+  });
+}
+
+TEST_F(MemoryMaps, APathDoesNotFollowTheLastViewOfThePathBefore) {
+  MemoryFile memory = make_walk(rounds(40));
+  const std::vector<ViewId> views = memory.views();
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  EXPECT_TRUE(has_sequence(memory.map(map_name).value(), views[19], views[20]));
+  add_path_starts(memory, std::array{views[20]});
+  add_path_starts(memory, std::array{views[10], views[20]});
+  EXPECT_EQ(read_path_starts(memory), std::vector({views[10], views[20]}));
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  EXPECT_FALSE(has_sequence(memory.map(map_name).value(), views[9], views[10]));
+  EXPECT_FALSE(has_sequence(memory.map(map_name).value(), views[19], views[20]));
+  EXPECT_TRUE(has_sequence(memory.map(map_name).value(), views[20], views[21]));
+  memory.remove(std::array{views[20]});  // the next one begins the path
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  EXPECT_FALSE(has_sequence(memory.map(map_name).value(), views[19], views[21]));
+  for (const char* text : {"a", "12 -3", "1.5", "21 11", "11 11", "4294967296"}) {
+    memory.set_parameter("path_starts", text);
+    EXPECT_THROW(static_cast<void>(read_path_starts(memory)), FileError) << text;
   }
 }
 

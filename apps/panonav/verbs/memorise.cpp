@@ -2,6 +2,7 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <set>
 
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
@@ -44,10 +45,12 @@ void record_skipped(const std::string& file, const Error& error, std::vector<Ski
   skipped.push_back({file, error.what()});
 }
 
-/// Memorises the missing images and stores the name of the recording as soon as the memory file
-/// exists. Images that cannot be read are added to `skipped`; with `strict` the first one throws.
-void memorise_missing(const Dataset& missing, const Dataset& recording, bool strict,
-                      Memoriser& memoriser, std::vector<Skipped>& skipped, Session& session) {
+/// Memorises the missing images of a recording, in its order, and stores the name of the recording
+/// as soon as the memory file exists. Images that cannot be read are added to `skipped`; with
+/// `strict` the first one throws.
+void memorise_missing(const Dataset& missing, const Dataset& recording,
+                      const std::set<std::string>& known, bool strict, Memoriser& memoriser,
+                      std::vector<Skipped>& skipped, Session& session) {
   bool noted = false;
   const auto note = [&] {
     if (!noted && memoriser.file() != nullptr) remember_recording(recording, *memoriser.file());
@@ -57,12 +60,19 @@ void memorise_missing(const Dataset& missing, const Dataset& recording, bool str
   Progress progress(session, "memorising", missing.entries.size());
   DatasetObservations source(missing, session.executor());
   std::exception_ptr failure;
-  std::size_t read = 0;
-  while (!failure && read < missing.entries.size()) {
+  std::size_t read = 0;  // entries of the recording
+  while (!failure && read < recording.entries.size()) {
     std::vector<Observation> batch;
     while (!failure && batch.size() < DatasetObservations::decoded_ahead &&
-           read < missing.entries.size()) {
-      const DatasetEntry& entry = missing.entries[read++];
+           read < recording.entries.size()) {
+      const DatasetEntry& entry = recording.entries[read];
+      if (known.contains(entry.file)) {
+        if (!batch.empty()) break;  // earlier images first
+        memoriser.recall(entry.file, entry.odometry);
+        ++read;
+        continue;
+      }
+      ++read;
       try {
         batch.push_back(source.next().value());
       } catch (const FileError& error) {
@@ -242,6 +252,7 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
   Memoriser memoriser(arguments.memory,
                       make_options(arguments, recording.source, skipped, session));
   Dataset missing = recording;
+  std::set<std::string> known;
   if (memory_existed) {
     require_fitting_image(recording, *memoriser.encoder());
     Progress comparing(session, "comparing", recording.entries.size());
@@ -254,15 +265,16 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
     check_known_views(
         recording, *memoriser.file(), *memoriser.encoder(), session.executor(),
         [&](std::size_t compared) { comparing.advance(compared); }, unread);
+    memoriser.recognise_renamed(recording);
     std::erase_if(missing.entries, [&](const DatasetEntry& entry) {
-      if (!memoriser.file()->find(entry.file)) return false;
-      memoriser.recall(entry.file, entry.odometry);
-      return true;
+      const bool is_known = memoriser.find(entry.file).has_value();
+      if (is_known) known.insert(entry.file);
+      return is_known;
     });
   }
   const std::size_t known_before = recording.entries.size() - missing.entries.size();
   const bool is_strict = arguments.strict || recording.entries.size() == 1;
-  memorise_missing(missing, recording, is_strict, memoriser, skipped, session);
+  memorise_missing(missing, recording, known, is_strict, memoriser, skipped, session);
   Progress mapping(session, "mapping", known_before + missing.entries.size());
   const auto counts = memoriser.finish(session.executor(), [&] { mapping.advance(); });
   mapping.clear();

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <optional>
+#include <set>
+#include <span>
 #include <variant>
 #include <vector>
 
@@ -98,6 +101,46 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
     }
     if (compared) compared(count);
   }
+}
+
+std::map<std::string, ViewId> find_renamed_views(const Dataset& recording, const MemoryFile& memory,
+                                                 const ViewEncoder& encoder) {
+  const VisualMemory views = memory.load();
+  const std::span<const ViewId> ids = views.views();
+  std::vector<std::optional<ViewId>> known;  // by entry
+  std::set<ViewId> assigned;
+  for (const DatasetEntry& entry : recording.entries) {
+    known.push_back(views.find(entry.file));
+    if (known.back()) assigned.insert(*known.back());
+  }
+  std::map<std::string, ViewId> renamed;
+  const auto assign_if_same = [&](std::size_t i, ViewId view) {
+    const DatasetEntry& entry = recording.entries[i];
+    const ReferenceInfo& info = views.info(view);
+    if (assigned.contains(view) || (entry.pose && info.pose != entry.pose) ||
+        info.stamp_s != entry.stamp_s) {
+      return;
+    }
+    try {
+      if (!is_same_picture(encoder.packed(read_observation(entry)), views.packed(view))) return;
+    } catch (const Error&) {
+      return;  // is named and skipped when it is memorised
+    }
+    known[i] = view;
+    assigned.insert(view);
+    renamed.emplace(entry.file, view);
+  };
+  for (std::size_t i = 1; i < known.size(); ++i) {
+    if (known[i] || !known[i - 1]) continue;
+    const auto next = std::ranges::upper_bound(ids, *known[i - 1]);
+    if (next != ids.end()) assign_if_same(i, *next);
+  }
+  for (std::size_t i = known.size(); i-- > 1;) {
+    if (known[i - 1] || !known[i]) continue;
+    const auto at = std::ranges::lower_bound(ids, *known[i]);
+    if (at != ids.begin()) assign_if_same(i - 1, *std::prev(at));
+  }
+  return renamed;
 }
 
 void remember_recording(const Dataset& recording, MemoryFile& memory) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <string>
 
 #include "panonav/core/executor.hpp"
@@ -23,6 +24,13 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
                        const std::function<void(std::size_t)>& compared = {},
                        const std::function<void(const DatasetEntry&, const Error&)>& unread = {});
+
+/// Returns the views of images that the memory does not know by name, by the names of the images: a
+/// view is next to that of a neighbouring image, has a name that the recording lacks, and the same
+/// picture, stamp and, if the image has one, pose. Images that cannot be read are left out.
+[[nodiscard]] std::map<std::string, ViewId> find_renamed_views(const Dataset& recording,
+                                                               const MemoryFile& memory,
+                                                               const ViewEncoder& encoder);
 
 /// Stores in the memory that its views with names of this recording come from this recording, so
 /// that `check_known_views` need not compare images.

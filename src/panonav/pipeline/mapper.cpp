@@ -73,7 +73,8 @@ bool Mapper::add(EncodedView encoded) {
                       std::move(encoded.thumbnail)};
   if (added.info.pose) remove_positions_from_map(file_);
   const auto known = file_.find(added.info.name);
-  const ViewId id = known ? *known : file_.append(added);
+  const ViewId id = known ? *known : append(added);
+  is_last_node_new_ = !known;
   std::optional<Pose2> moved;
   ++nodes_since_odometry_;
   if (last_odometry_ && encoded.odometry) moved = inverse(*last_odometry_) * *encoded.odometry;
@@ -91,6 +92,21 @@ bool Mapper::add(EncodedView encoded) {
     nodes_since_odometry_ = 0;
   }
   return true;
+}
+
+// Appends a view, which begins a path (`read_path_starts`) unless it follows the file's last view.
+ViewId Mapper::append(const NewView& view) {
+  const std::vector<ViewId> stored = is_last_node_new_ ? std::vector<ViewId>() : file_.views();
+  const auto nodes = node_views_.views();
+  if (stored.empty() || (!nodes.empty() && nodes.back() == stored.back())) {
+    return file_.append(view);
+  }
+  ViewId id;
+  file_.change([&] {
+    id = file_.append(view);
+    add_path_starts(file_, {&id, 1});
+  });
+  return id;
 }
 
 Mapper::Result Mapper::map(const Dataset& recording, Executor& executor,

@@ -101,6 +101,8 @@ class Mapper {
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
 
  private:
+  ViewId append(const NewView& view);
+
   MapperOptions options_;
   MemoryFile file_;
   ViewEncoder encoder_;
@@ -112,6 +114,7 @@ class Mapper {
   std::size_t nodes_since_odometry_ = 0;
   bool has_all_odometry_ = true;
   bool has_any_pose_ = false;
+  bool is_last_node_new_ = false;  // the last node is a view that this object appended
 };
 
 /// Returns the component with the largest number of nodes; of ties the first one.

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -27,6 +28,13 @@ double unix_time_s() {
 
 std::string describe_observation(const Observation& observation) {
   return observation.file.empty() ? observation.name : observation.file.string();
+}
+
+/// Returns what the names of images of one path have in common: all before the time in a video
+/// ("walk.mp4@3.2"), or the folder.
+std::string_view get_path_name(std::string_view name) {
+  const std::size_t at = name.rfind('@');
+  return name.substr(0, at != std::string_view::npos ? at : name.rfind('/') + 1);  // 0 if none
 }
 
 Panorama make_first_panorama(const Observation& first, const PictureSource& source,
@@ -169,12 +177,12 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
     }
   });
   std::vector<NewView> unknown;
-  const auto append = [&] {
-    if (!unknown.empty()) counts_.appended += file_->append(std::exchange(unknown, {})).size();
-  };
+  std::vector<std::size_t> path_starts;  // numbers of unknown views
   for (std::size_t i = 0; i < views.size(); ++i) {
+    const std::string& name = observations[i].name;
     try {
-      recall(observations[i].name, observations[i].odometry);
+      const auto known = find(name);
+      if (known || failures[i]) recall(name, observations[i].odometry);
       if (failures[i]) {
         try {
           std::rethrow_exception(failures[i]);
@@ -184,19 +192,55 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
           continue;
         }
       }
-      if (const auto known = file_->find(views[i].info.name)) {
+      if (known) {
         require_same_view(observations[i], views[i].signature, *known);
         ++counts_.known_before;
         continue;
       }
     } catch (const Error&) {
-      append();
+      append(unknown, path_starts);
       throw;
     }
     if (observations[i].pose) remove_positions_from_map(*file_);
+    if (observations[i].odometry) odometry_.insert_or_assign(name, *observations[i].odometry);
+    if (does_begin_path(name, unknown.empty())) path_starts.push_back(unknown.size());
     unknown.push_back(std::move(views[i]));
+    before_ = name;
+    known_before_.reset();
   }
-  append();
+  append(unknown, path_starts);
+}
+
+// Stores new views and which of them begin a path.
+void Memoriser::append(std::vector<NewView>& views, std::vector<std::size_t>& path_starts) {
+  if (views.empty()) return;
+  file_->change([&] {
+    const std::vector<ViewId> ids = file_->append(views);
+    std::vector<ViewId> starts;
+    for (const std::size_t start : path_starts) starts.push_back(ids[start]);
+    add_path_starts(*file_, starts);
+  });
+  counts_.appended += views.size();
+  views.clear();
+  path_starts.clear();
+}
+
+bool Memoriser::does_begin_path(const std::string& name, bool is_first_of_batch) const {
+  const bool is_same_path = before_ && get_path_name(*before_) == get_path_name(name);
+  if (!is_first_of_batch) return !is_same_path || known_before_;
+  if (is_same_path && !known_before_) return false;
+  const std::vector<ViewId> stored = file_->views();
+  return !stored.empty() && !(is_same_path && *known_before_ == stored.back());
+}
+
+std::optional<ViewId> Memoriser::find(const std::string& name) const {
+  if (!file_) return std::nullopt;
+  const auto renamed = renamed_.find(name);
+  return renamed != renamed_.end() ? renamed->second : file_->find(name);
+}
+
+void Memoriser::recognise_renamed(const Dataset& recording) {
+  if (file_) renamed_ = find_renamed_views(recording, *file_, *encoder_);
 }
 
 void Memoriser::require_same_view(const Observation& observation, const PackedSignature& signature,
@@ -219,7 +263,15 @@ Memoriser::Counts Memoriser::finish() {
 }
 
 void Memoriser::recall(const std::string& name, const std::optional<Pose2>& odometry) {
-  if (odometry) odometry_.insert_or_assign(name, *odometry);
+  const auto known = find(name);
+  if (odometry) {
+    const bool is_renamed = known && renamed_.contains(name);
+    odometry_.insert_or_assign(
+        is_renamed ? file_->load(std::array{*known}).info(*known).name : name, *odometry);
+  }
+  if (!known) return;
+  before_ = name;
+  known_before_ = known;
 }
 
 Memoriser::Counts Memoriser::finish(Executor& executor, const std::function<void()>& mapped) {

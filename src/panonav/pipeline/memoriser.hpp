@@ -58,6 +58,9 @@ struct MemoriserOptions {
 /// A new file appears with the `scale_views`th observation; from then on a view is on the disk when
 /// `add` returns. The stored views depend neither on the size of batches nor on the number of
 /// threads. One thread at a time.
+///
+/// A new view continues a path if the observation before it is the last view of the memory and
+/// their names show no other video or folder; otherwise it begins a path (`read_path_starts`).
 class Memoriser {
  public:
   /// Number of observations from which the full scale of a new memory is computed.
@@ -88,9 +91,15 @@ class Memoriser {
   /// Finishes on all threads. Calls `mapped` after each view of the map.
   Counts finish(Executor& executor, const std::function<void()>& mapped = {});
 
-  /// Reports an observation that the file already has, without its image: its odometry is used for
-  /// the map.
+  /// Reports an observation that the file already has, without its image, in its turn: its odometry
+  /// is used for the map, and a new view may follow it.
   void recall(const std::string& name, const std::optional<Pose2>& odometry);
+  /// Finds images of a recording whose views were renamed, so that they are not stored again: the
+  /// view is next to that of a neighbouring image, has a name that the recording lacks, and the
+  /// same picture, stamp and (if the image has one) pose. Cost: reads images beside known ones.
+  void recognise_renamed(const Dataset& recording);
+  /// Returns the view of the observation, also a renamed one; nullopt if the file has none.
+  [[nodiscard]] std::optional<ViewId> find(const std::string& name) const;
 
   /// Returns the file; null while a new file waits for its full scale.
   [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
@@ -105,6 +114,8 @@ class Memoriser {
   void store(std::span<const Observation> observations, Executor& executor);
   void require_same_view(const Observation& observation, const PackedSignature& signature,
                          ViewId view);
+  void append(std::vector<NewView>& views, std::vector<std::size_t>& path_starts);
+  [[nodiscard]] bool does_begin_path(const std::string& name, bool is_first_of_batch) const;
 
   std::filesystem::path path_;
   MemoriserOptions options_;
@@ -113,6 +124,9 @@ class Memoriser {
   std::optional<ViewEncoder> encoder_;
   Counts counts_;
   std::map<std::string, Pose2> odometry_;  // by the name of the view
+  std::map<std::string, ViewId> renamed_;  // by the name of the observation
+  std::optional<std::string> before_;      // name of the observation before
+  std::optional<ViewId> known_before_;     // its view; nullopt: it is new
 };
 
 }  // namespace panonav

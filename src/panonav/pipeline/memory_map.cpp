@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <numeric>
 #include <set>
-#include <string_view>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -27,6 +25,7 @@ namespace {
 /// Parameter that is set if the positions of the views come from a map; its value is their unit.
 constexpr const char* unit_parameter = "map_unit";
 constexpr const char* own_unit_parameter = "own_map_unit";
+constexpr const char* path_starts_parameter = "path_starts";
 constexpr const char* metres_text = "metres";
 constexpr const char* view_steps_text = "view_steps";  // followed by the assumed metres of a step
 /// Distance between components that have no common frame, in median steps. It exceeds the distance
@@ -132,18 +131,6 @@ std::map<std::pair<ViewId, ViewId>, Pose2> read_metric_steps(const MemoryFile& m
   return steps;
 }
 
-/// Returns what the names of images of one recording have in common: all before the time in a video
-/// ("walk.mp4@3.2"), or the folder and the name without digits.
-std::string series_of(const std::string& name) {
-  const std::size_t at = name.rfind('@');
-  if (at != std::string::npos) return name.substr(0, at);
-  const std::size_t file = name.rfind('/') + 1;  // 0 without a folder
-  std::string series = name.substr(0, file);
-  std::ranges::copy_if(std::string_view(name).substr(file), std::back_inserter(series),
-                       [](char c) { return c < '0' || c > '9'; });
-  return series;
-}
-
 /// A map of views in their order.
 struct OrderedMap {
   TopologicalMap map;
@@ -157,13 +144,16 @@ OrderedMap map_in_order(const MemoryFile& file, const VisualMemory& views,
   const auto metric_steps = read_metric_steps(file);
   VisualMemory nodes(views.shape(), views.full_scale(), views.elevations());
   TopologicalMapper mapper(nodes);
+  const std::vector<ViewId> path_starts = read_path_starts(file);
+  auto next_start = path_starts.begin();
   std::optional<ViewId> before;
   std::optional<Pose2> last_odometry;  // of the last view that has one
   std::size_t views_since_odometry = 0;
   for (const ViewId view : views.views()) {
     const ReferenceInfo& info = views.info(view);
-    if (before && series_of(views.info(*before).name) != series_of(info.name)) {
-      // Another recording begins anywhere, and so does its odometry.
+    const auto later_start = std::upper_bound(next_start, path_starts.end(), view);
+    if (std::exchange(next_start, later_start) != later_start && before) {
+      // Another path begins anywhere, and so does its odometry.
       mapper.begin_path();
       before.reset();
       last_odometry.reset();
@@ -258,6 +248,31 @@ bool are_in_order(const VisualMemory& views) {
   constexpr double max_rank = 0.2;
   return is_significant &&
          (2.0 * gain >= largest_gain || rank <= max_rank * static_cast<double>(tested));
+}
+
+std::vector<ViewId> read_path_starts(const MemoryFile& memory) {
+  const std::string text = memory.parameter(path_starts_parameter).value_or("");
+  std::vector<ViewId> starts;
+  for (const std::string& word : split_words(text)) {
+    ViewId start;
+    if (!read_number(word, start.value) || (!starts.empty() && start <= starts.back())) {
+      throw FileError(memory.path().string(), std::string("parameter ") + path_starts_parameter +
+                                                  " has '" + to_readable_line(word) +
+                                                  "'; allowed: ascending ids of views");
+    }
+    starts.push_back(start);
+  }
+  return starts;
+}
+
+void add_path_starts(MemoryFile& memory, std::span<const ViewId> starts) {
+  if (starts.empty()) return;
+  const std::vector<ViewId> before = read_path_starts(memory);
+  std::set<ViewId> all(before.begin(), before.end());
+  all.insert(starts.begin(), starts.end());
+  std::string text;
+  for (const ViewId start : all) text += (text.empty() ? "" : " ") + std::to_string(start.value);
+  memory.set_parameter(path_starts_parameter, text);
 }
 
 const char* to_string(LengthUnit unit) noexcept {

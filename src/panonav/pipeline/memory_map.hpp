@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -81,11 +82,18 @@ void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit,
 /// far apart to look alike. Cost: 200 searches.
 [[nodiscard]] bool are_in_order(const VisualMemory& views);
 
+/// Returns the views at which the paths of the memory begin, ascending; the first path begins at
+/// the first view. A view that was removed stands for the next one. Throws FileError on a bad
+/// value.
+[[nodiscard]] std::vector<ViewId> read_path_starts(const MemoryFile& memory);
+/// Stores that further paths begin at these views: no sequence leads to them from the view before.
+void add_path_starts(MemoryFile& memory, std::span<const ViewId> starts);
+
 /// Makes the map of a memory whose views have no positions from data sets, in the order of their
-/// ids
-/// (`TopologicalMapper`). Views in no order, where consecutive ones are not more similar than
-/// others, are arranged by similarity instead (`arrange`). Replaces an earlier map. Lengths are in
-/// metres if odometry is known or the earlier map is in metres.
+/// ids (`TopologicalMapper`) and of their paths (`read_path_starts`). Views in no order, where
+/// consecutive ones are not more similar than others, are arranged by similarity instead
+/// (`arrange`). Replaces an earlier map. Lengths are in metres if odometry is known or the earlier
+/// map is in metres.
 ///
 /// `odometry`: poses of views by name. Calls `mapped` after each view. Returns nullopt and
 /// changes nothing if a view has a position from a data set or there are fewer than two views.

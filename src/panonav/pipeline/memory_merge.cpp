@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
 #include <string>
@@ -232,6 +233,7 @@ class Merge {
 
   MergedMemory write(MemoryFile& file, const std::function<void()>& advance) {
     for (std::size_t i = 0; i < 2; ++i) add_views(file, i, advance);
+    for (std::size_t i = 0; i < 2; ++i) copy_path_starts(file, i);
     const VisualMemory all = file.load();
     TopologicalMap map = join_maps(all);
     add_links(file);
@@ -290,6 +292,25 @@ class Merge {
       if (waiting.size() == batch) append();
     }
     append();
+  }
+
+  /// Stores where the paths of a memory begin. Views that both memories have interrupt the
+  /// second's.
+  void copy_path_starts(MemoryFile& file, std::size_t from) const {
+    const std::vector<ViewId> old_starts = read_path_starts(*files_[from]);
+    std::vector<ViewId> starts;
+    std::optional<ViewId> before;
+    std::optional<ViewId> new_before;
+    for (const auto& [old, view] : ids_[from]) {
+      const bool is_start = !before || std::ranges::upper_bound(old_starts, *before) !=
+                                           std::ranges::upper_bound(old_starts, old);
+      const bool is_shared = from == 1 && !ids_[0].empty() && view <= ids_[0].rbegin()->second;
+      if (!is_shared && (is_start || view.value != new_before->value + 1)) starts.push_back(view);
+      before = old;
+      new_before = view;
+    }
+    if (from == 0 && !starts.empty()) starts.erase(starts.begin());  // of the whole memory
+    add_path_starts(file, starts);
   }
 
   TopologicalMap join_maps(const VisualMemory& all) {
