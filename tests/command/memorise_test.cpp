@@ -253,6 +253,31 @@ void expect_default_band(const fs::path& folder, const fs::path& memory) {
       {"memorise", whole, folder, "--kind", "equirectangular", "--elevation-deg", "-90", "90"});
   EXPECT_EQ(stated.err, "");
   EXPECT_EQ(band_of(whole), (std::vector<long>{-90, 90}));
+
+  // Where a dataset.toml describes the images, only a band in this file has an effect.
+  const fs::path toml = folder / "dataset.toml";
+  const std::string list = "[list]\nfile = \"images.csv\"\n";
+  write_file(folder / "images.csv", std::string_view("file\na.png\n"));
+  write_file(toml, list + "[images]\nkind = \"equirectangular\"\n");
+  const fs::path described = memory.string() + "_described";
+  const std::string way = "elevation_deg = [LOW, HIGH] below [images] in " + toml.string() + "\n";
+  for (const char* verb : {"memorise", "try"}) {
+    std::vector<std::string> words{verb, described, folder};
+    if (verb == std::string_view("try")) words = {verb, folder, "-o", described.string() + "_try"};
+    const std::string noted = run_panonav(words).err;
+    EXPECT_TRUE(contains(noted, "to use another part: " + way)) << noted;
+    EXPECT_FALSE(contains(noted, "--elevation-deg")) << noted;
+  }
+  expect_refusal({"memorise", described.string() + "_new", folder, "--elevation-deg", "-20", "30"},
+                 "--elevation-deg cannot be used where a dataset.toml describes the images; leave "
+                 "it out, or write elevation_deg = [LOW, HIGH] below [images] in " +
+                     toml.string());
+  write_file(toml, list + "[images]\nkind = \"equirectangular\"\nelevation_deg = [-20, 30]\n");
+  const fs::path again = memory.string() + "_again";
+  EXPECT_EQ(run_panonav({"memorise", again, folder}).err, "");
+  EXPECT_EQ(band_of(again), (std::vector<long>{-20, 30}));
+  fs::remove(toml);
+  fs::remove(folder / "images.csv");
 }
 
 TEST_F(Memorise, ImplausiblePicturesAreRefusedOrHinted) {

@@ -373,5 +373,33 @@ TEST_F(Track, WithoutOdometryMotionIsReadFromThePicturesAndItSaysSo) {
   EXPECT_TRUE(contains(bare.err, "motion is computed from the images"));
 }
 
+// The poses of a run are in another frame than a map of its images, also in metres.
+TEST_F(Track, PositionsOfAMapAreNotComparedWithThoseOfTheRun) {
+  const std::string drive = *folder_ / "drive";
+  write_run(drive, *world_, circle_poses(count), {3.0, -1.0, 0.7}, {.truth = false});
+  const std::string map = *folder_ / "map.panonav";
+  run_well({"map", map, drive});
+  EXPECT_FALSE(contains(run_panonav({"info", map}).out, "view steps"));
+  const auto expect_no_truth = [&](const std::vector<std::string>& arguments) {
+    SCOPED_TRACE(arguments.front() + " " + arguments.back());
+    const auto text = run_panonav(arguments);
+    EXPECT_EQ(text.exit_code, 0) << text.err;
+    EXPECT_TRUE(contains(text.err, "are of its map and have another frame")) << text.err;
+    EXPECT_FALSE(contains(text.out, "error of")) << text.out;
+    const auto answers = answers_of(with(arguments, {"--json"}));
+    EXPECT_EQ(answers.size(), static_cast<std::size_t>(count));
+    for (const json& answer : answers) EXPECT_TRUE(answer.value("ground_truth", json()).is_null());
+  };
+  const std::string page = *folder_ / "page";
+  expect_no_truth({"track", map, run(), "--report", page});
+  EXPECT_FALSE(contains(bytes_of(page + "/index.html"), "The ring is the true position"));
+  const std::string answers = *folder_ / "answers";
+  expect_no_truth({"localise", map, run(), "--report", answers});
+  EXPECT_FALSE(contains(bytes_of(answers + "/index.html"), "\"truth\":{"));
+  expect_no_truth({"localise", map, run(), "--update"});
+  // Positions of a data set are those of the run, and are compared.
+  EXPECT_TRUE(contains(run_panonav({"track", memory(), run()}).out, "error of"));
+}
+
 }  // namespace
 }  // namespace panonav::testing

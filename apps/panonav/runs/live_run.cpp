@@ -151,7 +151,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
   if (!stated && !remembered) {
     throw UsageError("set --kind to the type of the images of " + input);
   }
-  if (!remembered) note_default_band(*stated, session);
+  if (!remembered) note_default_band(*stated, elevation_flag, session);
   if (stated && remembered) note_other_camera(*stated, *remembered, input, session);
   recordings::LiveOptions options;
   options.note = [&session](const std::string& line) { session.note(line); };

@@ -205,7 +205,13 @@ class LocalisedRun {
       : arguments_(arguments), session_(session), live_(recordings::is_live(input())) {
     open_source(declared);
     memory_.emplace(arguments.memory, make_memory_options(arguments, pictures_, live_));
-    if (recording_) estimate_missing_odometry();
+    if (recording_) {
+      estimate_missing_odometry();
+      has_truth_ =
+          !memory_exists(arguments.memory) ||
+          !has_incomparable_truth(*recording_, input(),
+                                  MemoryFile::open(arguments.memory, Access::read_only), session);
+    }
     if (arguments.route) open_route();
     if (recording_) {
       if (arguments.report) recording_copy_ = recording_;
@@ -232,7 +238,11 @@ class LocalisedRun {
           if (arguments_.out) table_ += csv_row(query_);
           if (arguments_.report) queries_.push_back(query_);
           if (route_) route_->add(observation, *memory_);
-          if (record.is_active()) record.add(moments.make(observation, answer_, record, stages));
+          if (record.is_active()) {
+            recordings::RunMoment moment = moments.make(observation, answer_, record, stages);
+            moment.truth = query_.pose;
+            record.add(std::move(moment));
+          }
           if (answer_.is_new) memory_->add(std::move(observation));
         },
         [&](const Observation* observation, const Error& error) {
@@ -322,7 +332,8 @@ class LocalisedRun {
     stages.part("unwarping", answer_.unwrapping);
     stages.stage("signature, search, ranking");
     unwrapping_ += answer_.unwrapping;
-    query_ = {observation.name, 0.0, answer_.place.value_or(Place{}), observation.pose, ""};
+    query_ = {observation.name, 0.0, answer_.place.value_or(Place{}),
+              has_truth_ ? observation.pose : std::nullopt, ""};
     if (query_.place.known) ++known_count_;
     std::optional<RouteFollower::Step> step;
     if (follower_) {
@@ -376,6 +387,7 @@ class LocalisedRun {
   const LocaliseArguments& arguments_;
   Session& session_;
   bool live_;
+  bool has_truth_ = true;  // poses of the recording are in the frame of the memory
   PictureSource pictures_;
   RoutePoses poses_ = RoutePoses::images;
   std::optional<Dataset> recording_;       // nullopt for a live source; moved into source_

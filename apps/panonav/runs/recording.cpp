@@ -16,6 +16,7 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/media_kind.hpp"
 #include "panonav/io/panorama_reader.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/live_pictures.hpp"
 #include "panonav_recordings/recording.hpp"
@@ -322,16 +323,25 @@ void note_other_camera(const PictureSource& images, const PictureSource& referen
                      "; the other rows are filled with the nearest visible row"));
 }
 
-void note_default_band(const PictureSource& source, Session& session) {
+void note_default_band(const PictureSource& source, const std::string& way, Session& session) {
   if (source.kind != PictureKind::equirectangular || source.layout.kept_elevations) return;
   const auto& [bottom_rad, top_rad] = default_equirectangular_band;
   session.note("Of the 360 degree images, the elevations from " +
                format_number(degrees(bottom_rad)) + " to " + format_number(degrees(top_rad)) +
-               " degrees are used; to use another part: --elevation-deg LOW HIGH");
+               " degrees are used; to use another part: " + way);
 }
 
 Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, Session& session) {
+  const bool is_described = !find_dataset_reader(input) && has_dataset_file(input);
+  const std::string band_in_file = "elevation_deg = [LOW, HIGH] below [images] in " +
+                                   to_readable_line((fs::path(input) / "dataset.toml").string());
+  if (is_described && pictures.elevation_deg) {
+    throw UsageError(
+        "--elevation-deg cannot be used where a dataset.toml describes the images; "
+        "leave it out, or write " +
+        band_in_file);
+  }
   const InputOptions options{
       .source = make_picture_source(pictures, session),
       .default_source = remembered,
@@ -351,7 +361,8 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
                                   pictures.check == PictureArguments::Check::heads);
     }
     note_unusable(opened, session);
-    if (!remembered && !is_refused_later(opened)) note_default_band(opened.source, session);
+    const std::string way = is_described ? band_in_file : elevation_flag;
+    if (!remembered && !is_refused_later(opened)) note_default_band(opened.source, way, session);
     if (remembered) note_other_camera(opened.source, *remembered, input, session);
     return opened;
   } catch (const OptionError& error) {
@@ -400,6 +411,18 @@ Dataset open_run(const std::string& input, const RunArguments& run, const Memory
   pictures.check = PictureArguments::Check::heads;
   pictures.further_videos = run.further_videos;
   return open_recording(input, pictures, memory, session);
+}
+
+bool has_incomparable_truth(const Dataset& run, const std::string& input, const MemoryFile& memory,
+                            Session& session) {
+  if (!has_positions_from_map(memory)) return false;
+  if (std::ranges::any_of(run.entries,
+                          [](const DatasetEntry& entry) { return entry.pose.has_value(); })) {
+    session.note("the true positions of " + to_readable_line(input) +
+                 " are not compared, as those of " + memory.path().string() +
+                 " are of its map and have another frame; panonav evaluate aligns such paths");
+  }
+  return true;
 }
 
 void append_pose(std::vector<StampedPose>& trajectory, const StampedPose& pose,

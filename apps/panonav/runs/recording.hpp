@@ -103,8 +103,11 @@ class SkippedImages {
 void note_other_camera(const PictureSource& images, const PictureSource& reference,
                        const std::string& input, Session& session);
 
-/// Prints a note if the images are equirectangular and no elevation band is stated for them.
-void note_default_band(const PictureSource& source, Session& session);
+/// The option with which a verb uses another elevation band.
+inline constexpr const char* elevation_flag = "--elevation-deg LOW HIGH";
+/// Prints a note if the images are equirectangular and no elevation band is stated for them. `way`:
+/// how to state one.
+void note_default_band(const PictureSource& source, const std::string& way, Session& session);
 
 /// Converts the arguments to a selection of images. Throws UsageError on values out of range.
 [[nodiscard]] Dataset::Selection to_selection(const PartArguments& part);
@@ -128,6 +131,11 @@ void require_stored_band(const PictureArguments& pictures, const MemoryFile& mem
 /// the layout of the memory's images.
 [[nodiscard]] Dataset open_run(const std::string& input, const RunArguments& run,
                                const MemoryFile& memory, Session& session);
+
+/// True if the positions of the memory are those of its map, whose frame is not that of the poses
+/// of a run, so that their distances are no errors. The session prints a note if the run has poses.
+[[nodiscard]] bool has_incomparable_truth(const Dataset& run, const std::string& input,
+                                          const MemoryFile& memory, Session& session);
 
 /// Adds a pose to a trajectory for a file. Leaves it out if it has the stamp of the last one.
 /// Throws FileError on an earlier stamp, which the TUM format does not allow; `file`: the image.

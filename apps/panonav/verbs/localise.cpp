@@ -122,7 +122,7 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
   require_stored_band(arguments.pictures, file);
   Dataset recording = open_queries(arguments, file.header().source, session);
-  if (session.length_unit() != LengthUnit::metres) {  // true positions cannot be compared
+  if (has_incomparable_truth(recording, arguments.inputs.front(), file, session)) {
     for (DatasetEntry& entry : recording.entries) entry.pose.reset();
   }
   PlaceRecogniserOptions options{.localiser = arguments.localiser, .source = recording.source};

@@ -104,7 +104,7 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
   if (arguments.teach) {
     const auto pictures = make_picture_source(arguments.pictures, session);
     if (!pictures) throw UsageError("set --kind to the type of the images");
-    note_default_band(*pictures, session);
+    note_default_band(*pictures, elevation_flag, session);
     arguments.setup.teacher = arguments.teacher;
     arguments.setup.teacher->pictures = *pictures;
     arguments.setup.teacher->route = arguments.route;

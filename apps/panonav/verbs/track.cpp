@@ -371,7 +371,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   Tracker tracker(arguments.memory, make_tracker_options(declared, arguments, run.source));
   set_start(tracker, arguments);
   const bool is_metric = session.length_unit() == LengthUnit::metres;
-  if (!is_metric) {  // true positions are in metres and cannot be compared
+  if (has_incomparable_truth(run, arguments.dataset, file, session)) {
     for (DatasetEntry& entry : run.entries) entry.pose.reset();
   }
   TrackSettings settings{.every = arguments.every};
