@@ -80,7 +80,9 @@ void add_table(viewer::ReportPage& page, const Trial& trial) {
 
 void write_try_report(const std::filesystem::path& folder, const Trial& trial,
                       const TrialVerdict& verdict) {
-  const std::string_view made_map = trial.has_map() ? "made a map from their order, " : "";
+  const std::string_view made_map = trial.is_arranged() ? "arranged them by their similarity, "
+                                    : trial.has_map()   ? "made a map from their order, "
+                                                        : "";
   viewer::ReportPage page(verdict.headline,
                           "panonav read the images, stored them in a memory, " +
                               std::string(made_map) +

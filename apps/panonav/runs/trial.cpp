@@ -248,12 +248,22 @@ void track_all(const std::vector<Observation>& observations, Trial& trial, Sessi
 
 void measure_steps(const std::vector<Observation>& observations, Trial& trial) {
   std::vector<double> steps_m;
+  std::vector<double> nearest_m;
+  for (const Observation& image : observations) {
+    double off_m = std::numeric_limits<double>::infinity();
+    for (const Observation& other : observations) {
+      if (&other == &image || !image.pose || !other.pose) continue;
+      off_m = std::min(off_m, distance(image.pose->position(), other.pose->position()));
+    }
+    if (std::isfinite(off_m)) nearest_m.push_back(off_m);
+  }
   for (std::size_t i = 1; i < observations.size(); ++i) {
     const auto& before = observations[i - 1].pose;
     const auto& after = observations[i].pose;
     if (before && after) steps_m.push_back(distance(before->position(), after->position()));
   }
   if (!steps_m.empty()) trial.median_step_m = median(steps_m);
+  if (!nearest_m.empty()) trial.median_nearest_m = median(nearest_m);
 }
 
 void read_map(Trial& trial) {

@@ -43,6 +43,8 @@ struct Trial {
   std::optional<double> median_distance_m;
   /// Median distance between consecutive positions of a data set.
   std::optional<double> median_step_m;
+  /// Median distance of these positions from the nearest other one.
+  std::optional<double> median_nearest_m;
   /// Number of images at which tracking knows the position; nullopt: there are no positions.
   std::optional<std::size_t> tracked;
   std::vector<Pose2> map_poses;                 ///< of the map's nodes, parts beside each other
@@ -52,8 +54,18 @@ struct Trial {
   /// True if two images are typically nearer to each other than the shortest step of a good
   /// recording, so that the whole recording shows one place.
   [[nodiscard]] bool is_standing() const;
-  /// True if there is a map that means something, of images in order.
-  [[nodiscard]] bool has_map() const { return map && map_summary && is_in_order; }
+  /// True if nine of ten images or more are in one part of the map, as `find_drive_poses` needs.
+  [[nodiscard]] bool has_large_part() const {
+    return map && map_summary && 10 * map_summary->part_sizes.front() >= 9 * queries.size();
+  }
+  /// True if the images are in no order and were arranged by their similarity.
+  [[nodiscard]] bool is_arranged() const {
+    return !has_positions && !is_in_order && has_large_part();
+  }
+  /// True if there is a map that means something, of images in order or arranged ones.
+  [[nodiscard]] bool has_map() const {
+    return map && map_summary && (is_in_order || is_arranged());
+  }
   /// True if tracking knows the position at half of the images or more.
   [[nodiscard]] bool can_track() const { return tracked && 2 * *tracked >= queries.size(); }
   /// Number of steps between consecutive images whose motion is visible.

@@ -95,6 +95,14 @@ void add_image_findings(const Trial& trial, std::vector<std::string>& findings) 
 void add_order_findings(const Trial& trial, std::vector<std::string>& findings) {
   const std::size_t steps = trial.queries.size() - 1;
   const std::size_t connected = trial.count_connected_steps();
+  if (trial.is_arranged()) {
+    findings.push_back(
+        "The images are in no order, so they were arranged by their similarity: " +
+        count_text(trial.map_summary->part_sizes.front(), trial.queries.size()) +
+        " are in one part of the map. A route needs an order: for one, give the images names in "
+        "the order in which they were taken, one every 20 to 50 cm, or use a video.");
+    return;
+  }
   if (!trial.is_in_order) {
     findings.emplace_back(
         "Images that follow each other look hardly more alike than any two of the images, so they "
@@ -121,6 +129,20 @@ void add_order_findings(const Trial& trial, std::vector<std::string>& findings) 
   }
 }
 
+/// Adds how many images were not recognised and how far apart they are, where that is too far.
+void add_recognition_findings(const Trial& trial, std::vector<std::string>& findings) {
+  const std::size_t images = trial.queries.size();
+  if (10 * trial.count_known() >= 9 * images) return;
+  const std::string reason = count_text(images - trial.count_known(), images) +
+                             " images are not recognised among the others";
+  findings.push_back(reason +
+                     (trial.median_nearest_m
+                          ? "; the nearest other image is " +
+                                format_fixed(*trial.median_nearest_m, 2) + " m away (median)"
+                          : "") +
+                     ". Take images closer to each other, one every 20 to 50 cm, or a video.");
+}
+
 /// Adds whether recognition and tracking of these images can be expected in a later visit, too.
 void add_use_findings(const Trial& trial, std::vector<std::string>& findings) {
   constexpr double close_step_m = 0.1;  // half of the shortest step that is recommended
@@ -142,21 +164,20 @@ void add_use_findings(const Trial& trial, std::vector<std::string>& findings) {
 std::vector<std::string> make_commands(const Trial& trial, bool is_good) {
   const std::string input = list_inputs(trial);
   const std::string memory = quote_for_shell(trial.memory.string());
-  if (trial.is_standing()) return {"panonav gallery " + memory + " -o gallery"};
+  const std::string gallery = "panonav gallery " + memory + " -o " +
+                              quote_for_shell(trial.memory.stem().string() + "_gallery");
+  if (trial.is_standing()) return {gallery};
   if (!is_good) {
     const std::string flags = has_dataset_file(trial.inputs.front()) ? "" : make_flags(trial);
-    return {"panonav gallery " + memory + " -o gallery",
-            "panonav memorise " + quote_for_shell(trial.memory.filename().string()) + " " + input +
-                flags};
+    return {gallery, "panonav memorise " + quote_for_shell(trial.memory.filename().string()) + " " +
+                         input + flags};
   }
   std::vector<std::string> commands{"panonav localise " + memory + " " + input +
                                     " --report answers"};
   if (trial.can_track()) {
     commands.push_back("panonav track " + memory + " " + input + " --report tracked");
   }
-  // A route needs nine of ten images in one part of the map, as `find_drive_poses` does.
-  if (trial.has_positions ||
-      (trial.map && 10 * trial.map_summary->part_sizes.front() >= 9 * trial.queries.size())) {
+  if (trial.has_positions || (trial.is_in_order && trial.has_large_part())) {
     commands.push_back("panonav route record " + memory + " " + input);
   }
   return commands;
@@ -196,7 +217,7 @@ TrialVerdict judge_trial(const Trial& trial) {
   const std::size_t images = trial.queries.size();
   const std::size_t known = trial.count_known();
   verdict.headline = count_text(known, images) + " images were recognised among the others.";
-  const bool is_connected = trial.has_positions || is_connected_walk(trial);
+  const bool is_connected = trial.has_positions || trial.is_arranged() || is_connected_walk(trial);
   verdict.is_good = 10 * known >= 9 * images && is_connected;
   constexpr std::size_t few_images = 10;
   if (images < few_images) {
@@ -215,13 +236,16 @@ TrialVerdict judge_trial(const Trial& trial) {
   } else if (!trial.has_positions && images >= few_images) {
     add_order_findings(trial, verdict.findings);
   }
+  if (!trial.is_standing()) add_recognition_findings(trial, verdict.findings);
   if (!trial.is_standing()) add_use_findings(trial, verdict.findings);
   add_image_findings(trial, verdict.findings);
   verdict.findings.push_back(trial.guess.explanation);
   if (trial.has_map() && trial.map_summary->unit == LengthUnit::view_steps) {
     verdict.findings.push_back(
         "Images alone do not show how long a metre is, so positions are in view steps: the median "
-        "distance between consecutive images. panonav scale makes metres of them.");
+        "distance between " +
+        std::string(trial.is_arranged() ? "neighbouring" : "consecutive") +
+        " images. panonav scale makes metres of them.");
   }
   if (verdict.is_good) {
     verdict.findings.insert(verdict.findings.begin(),
