@@ -51,6 +51,10 @@ TEST_F(MemoryFileUndo, BringsBackAllThatWasDropped) {
   file.reset();
   file.emplace(MemoryFile::open(path, Access::read_write));
   EXPECT_EQ(file->undoable(), "forget 2");
+  const VisualMemory now = file->load();
+  file->require_undo_possible();
+  EXPECT_TRUE(same_content(file->load(), now)) << "only a check";
+  EXPECT_EQ(file->undoable(), "forget 2");
   file->undo();  // the last change before the one before it
   EXPECT_EQ(file->load().size(), 11U);
   EXPECT_EQ(file->thumbnail(ids[4]), thumbnail);
@@ -165,7 +169,10 @@ TEST_F(MemoryFileUndo, IsRefusedWhereItWouldOverwrite) {
   file->append(same_name);
   const VisualMemory now = file->load();
   const auto message = message_of<FileError>([&] { file->undo(); });
-  EXPECT_TRUE(contains(message, "cannot undo \"forget 1\": the table views has changed since"));
+  EXPECT_TRUE(
+      contains(message, "cannot undo \"forget 1\": a later change altered the same views; "));
+  EXPECT_TRUE(contains(message, "panonav rename")) << message;
+  EXPECT_EQ(message_of<FileError>([&] { file->require_undo_possible(); }), message);
   EXPECT_TRUE(same_content(file->load(), now));
   EXPECT_TRUE(file->undoable());
   EXPECT_TRUE(file->verify().empty());

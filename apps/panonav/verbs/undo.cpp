@@ -13,8 +13,7 @@ struct UndoArguments {
 };
 
 ExitCode undo(const UndoArguments& arguments, Session& session) {
-  auto memory = MemoryFile::open(arguments.memory,
-                                 arguments.dry_run ? Access::read_only : Access::read_write);
+  auto memory = MemoryFile::open(arguments.memory, Access::read_write);
   const auto what = memory.undoable();
   if (!what) {
     throw FileError(
@@ -23,7 +22,11 @@ ExitCode undo(const UndoArguments& arguments, Session& session) {
         "scale and localise --update");
   }
   const LengthUnit unit_before = read_length_unit(memory);
-  if (!arguments.dry_run) memory.undo();
+  if (arguments.dry_run) {
+    memory.require_undo_possible();
+  } else {
+    memory.undo();
+  }
   const LengthUnit unit = read_length_unit(memory);
   const auto views = memory.info().views;
   if (session.json()) {
@@ -48,7 +51,8 @@ Run declare_undo(Arguments& arguments) {
   auto values = std::make_shared<UndoArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.flag("--dry-run", values->dry_run,
-                 "Print the change that would be reverted, but do not change the memory");
+                 "Print the change that would be reverted, or why it cannot be, but do not change "
+                 "the memory");
   arguments.explain_interruption(
       "The memory is as before. To start over, run the same command again.");
   return [values](Session& session) { return undo(*values, session); };
@@ -66,7 +70,8 @@ Verb undo_verb() {
           "and a map and routes with their former unit. "
           "Views that were added after the reverted change stay in the memory. The verb refuses to "
           "revert a change if a view that was added later has the name of a view that would be "
-          "restored, or if a map was made again.",
+          "restored, or if a map or route that the change concerned was changed since, as by "
+          "memorising more views along it; after a scaling, run panonav scale again instead.",
           "  panonav undo office.panonav --dry-run\n"
           "  panonav undo office.panonav",
           declare_undo};

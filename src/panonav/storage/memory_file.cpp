@@ -100,6 +100,21 @@ struct MemoryFile::Implementation {
     tables->accept_row(std::nullopt, [&] { bytes = tables->read_checked_bytes(table, view); });
     return bytes;
   }
+  /// Undoes the newest change within a writing transaction. Throws as `MemoryFile::undo`.
+  void undo() const {
+    const auto kept = tables->history();
+    if (kept.empty() || !kept.front().undoable) {
+      throw ContractError("undo", "not possible", "after a change that was kept for it");
+    }
+    const auto faults = verify_links_and_maps(*tables, header);
+    tables->undo();
+    for (const Fault& fault : verify_links_and_maps(*tables, header)) {
+      if (std::ranges::find(faults, fault) != faults.end()) continue;
+      throw FileError(
+          tables->path().string(),
+          "cannot undo \"" + kept.front().what + "\": the memory would be damaged: " + fault.what);
+    }
+  }
   /// Changes name, pose or stamp of a view. Throws as `throw_unknown_view`.
   void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change) {
     write([&](MemoryTables&) {
@@ -209,17 +224,13 @@ std::optional<std::string> MemoryFile::undoable() const {
 }
 
 void MemoryFile::undo() {
-  implementation_->write([&](MemoryTables& tables) {
-    const auto what = undoable();
-    if (!what) throw ContractError("undo", "not possible", "after a change that was kept for it");
-    const auto faults = verify_links_and_maps(tables, header());
-    tables.undo();
-    for (const Fault& fault : verify_links_and_maps(tables, header())) {
-      if (std::ranges::find(faults, fault) != faults.end()) continue;
-      throw FileError(path().string(),
-                      "cannot undo \"" + *what + "\": the memory would be damaged: " + fault.what);
-    }
-  });
+  implementation_->write([&](MemoryTables&) { implementation_->undo(); });
+}
+
+void MemoryFile::require_undo_possible() {
+  // Rolled back, as it is not committed.
+  const auto transaction = implementation_->tables->transaction(MemoryTables::Kind::writing);
+  implementation_->undo();
 }
 
 ViewId MemoryFile::append(const NewView& view) {

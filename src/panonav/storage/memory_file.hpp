@@ -137,6 +137,8 @@ class MemoryFile {
   /// added since stay. Throws ContractError if there is none, FileError if later changes conflict
   /// with it.
   void undo();
+  /// Throws as `undo` if it would refuse. Changes nothing, but needs the same access to the file.
+  void require_undo_possible();
 
   /// Adds a view and returns once it is on the disk. Throws ContractError on another shape or a
   /// name in use, and as `validate` of memory/reference_validation.hpp. Ids ascend and are never

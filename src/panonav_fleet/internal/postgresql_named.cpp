@@ -125,9 +125,7 @@ void PostgresqlTables::undo() {
   const std::string what = kept.empty() ? "" : kept.front().what;
   const Rows rows = run("SELECT panonav.undo($1)");
   if (!rows.is_null(0, 0)) {
-    throw FileError(path().native(), "cannot undo \"" + what + "\": the table " +
-                                         std::string(rows.text(0, 0)) +
-                                         " has changed since where it was changed then");
+    throw_undo_conflict(path(), what, rows.text(0, 0));
   }
 }
 

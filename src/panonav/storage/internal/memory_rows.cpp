@@ -97,4 +97,20 @@ void require_undo_bytes(const std::filesystem::path& file, std::int64_t bytes) {
                                      std::to_string(max_undo_bytes) + ", or not to keep them");
 }
 
+void throw_undo_conflict(const std::filesystem::path& file, std::string_view what,
+                         std::string_view table) {
+  std::string changed = std::string(table);  // a table whose name is a word for people
+  if (table == "links") changed = "links between views";
+  if (table == "maps") changed = "map";
+  if (table.starts_with("route")) changed = "route";
+  const std::string next =
+      what.starts_with("scale ")
+          ? "to correct the scale, run panonav scale again with the right length"
+          : "first revert that later change; a newer view of a former name gets another by panonav "
+            "rename";
+  throw FileError(file.native(), "cannot undo \"" + std::string(what) +
+                                     "\": a later change altered the same " + changed + "; " +
+                                     next);
+}
+
 }  // namespace panonav

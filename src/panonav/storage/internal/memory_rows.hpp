@@ -59,4 +59,8 @@ inline constexpr std::int64_t max_undo_bytes = 200 << 20;
 /// Throws FileError if a change would need more than `max_undo_bytes`.
 void require_undo_bytes(const std::filesystem::path& file, std::int64_t bytes);
 
+/// Throws FileError: the change `what` cannot be undone, since rows of `table` have changed since.
+[[noreturn]] void throw_undo_conflict(const std::filesystem::path& file, std::string_view what,
+                                      std::string_view table);
+
 }  // namespace panonav

@@ -190,9 +190,7 @@ void SqliteTables::undo() {
                                     &conflicting_table);
     }
     if (code == SQLITE_ABORT) {
-      throw FileError(path_.string(), "cannot undo \"" + std::string(row.text(1)) +
-                                          "\": the table " + conflicting_table +
-                                          " has changed since where it was changed then");
+      throw_undo_conflict(path_, row.text(1), conflicting_table);
     }
     if (code != SQLITE_OK) database_.fail(code);
   }
