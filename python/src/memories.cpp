@@ -306,7 +306,8 @@ void bind_memory_file(py::module_& m) {
             return s.change([](MemoryFile& f) { return to_string(read_length_unit(f)); });
           },
           "Unit of all positions: 'm', or 'view steps' (the median distance between consecutive "
-          "views) if a map of images has no known length.")
+          "views; of images in no order, between a view and the nearest one) if a map of images "
+          "has no known length.")
       .def(
           "scale_to_metres",
           [](SharedFile& s, const std::string& first, const std::string& second,

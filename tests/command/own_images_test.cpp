@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "command/own_images.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
 #include "support/command_runner.hpp"
@@ -21,28 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-/// A walk with one's own camera: images in a folder, without positions, odometry or description.
-class OwnImages : public ::testing::Test {
- protected:
-  static constexpr std::size_t count = 40;
-
-  void SetUp() override {
-    fs::create_directory(walk());
-    for (std::size_t i = 0; i < count; ++i) {
-      const double along_m = 0.08 * static_cast<double>(i);
-      write_picture(walk() / view_name(i), world, {along_m - 1.5, 0.2 * std::sin(along_m), 0.0});
-    }
-  }
-  [[nodiscard]] fs::path walk() const { return fs::path(std::string(folder / "walk")); }
-  [[nodiscard]] std::string memory() const { return folder / "walk.panonav"; }
-  void memorise() const {
-    run_well({"memorise", memory(), walk(), "--kind", "panorama", "--elevation-deg", "-20", "20"});
-  }
-
-  const ToyWorld world = landmark_world(8);
-  TemporaryFolder folder;
-};
 
 std::vector<std::string> split_command(const std::string& command) {
   std::istringstream text(command);
@@ -83,29 +62,6 @@ TEST_F(OwnImages, LeadFromTheMemoryToTrackingRoutesAndMetres) {
   EXPECT_NEAR(std::hypot(x_m, y_m), 2.0, 1e-6);
   EXPECT_TRUE(answer_of({"route", "record", memory(), walk(), "--name", "metric", "--json"})
                   .contains("length_m"));
-}
-
-TEST_F(OwnImages, ACorrectedScaleMovesRoutesOfTheMapAndUndoSaysTheUnit) {
-  memorise();
-  run_well({"route", "record", memory(), walk(), "--name", "early"});
-  const std::vector<std::string> scale{"scale", memory(), "--distance", view_name(0),
-                                       view_name(25)};
-  EXPECT_EQ(answer_of(with(scale, {"2m", "--json"}))["routes"], json({"early"}));
-  run_well({"route", "record", memory(), walk(), "--name", "late"});
-  const auto lengths = [&] {
-    std::vector<double> values;
-    const json info = answer_of({"info", memory(), "--json"});
-    for (const json& route : info["routes"]) values.push_back(route.at("length_m"));
-    return values;
-  };
-  const auto before = lengths();
-  ASSERT_EQ(before.size(), 2U);
-  run_well(with(scale, {"4m"}));
-  const auto after = lengths();
-  for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(after[i], 2.0 * before[i], 1e-9);
-  EXPECT_EQ(answer_of({"undo", memory(), "--json"})["unit"], "m");
-  const std::string undone = run_panonav({"undo", memory()}).out;
-  EXPECT_TRUE(contains(undone, "positions in view steps")) << undone;
 }
 
 TEST_F(OwnImages, RoutesSayWhichFrameTheirPosesHave) {
@@ -157,23 +113,6 @@ TEST_F(OwnImages, ViewsWithoutPositionInAMemoryOfADataSetAreNamed) {
       {"memorise", known, walk(), "--kind", "panorama", "--elevation-deg", "-20", "20"});
   EXPECT_EQ(more.exit_code, 0) << more.err;
   EXPECT_TRUE(contains(more.out, "40 of 49 views have no position")) << more.out;
-}
-
-TEST_F(OwnImages, ScaleRefusesWhatMeansNothing) {
-  memorise();
-  expect_refusal({"scale", memory()}, "either --distance or --camera-height-m");
-  expect_refusal({"scale", memory(), "--distance", view_name(0), view_name(9), "3.2ft"}, "3.2ft");
-  expect_refusal({"scale", memory(), "--distance", view_name(0), "none.png", "1m"}, "none.png");
-  expect_refusal({"scale", memory(), "--distance", view_name(0), view_name(0), "1m"}, "far apart");
-  const auto unseen = run_panonav({"scale", memory(), "--camera-height-m", "0.6"});
-  EXPECT_EQ(unseen.exit_code, 1) << "the images show no ground";
-  EXPECT_TRUE(contains(unseen.err, "use --distance VIEW VIEW LENGTH")) << unseen.err;
-  EXPECT_EQ(answer_of({"info", memory(), "--json"})["map"]["unit"], "view_steps");
-  const std::string grid = folder / "grid";
-  write_dataset(grid, world, grid_poses(3));
-  run_well({"memorise", folder / "grid.panonav", grid});
-  expect_refusal({"scale", folder / "grid.panonav", "--distance", view_name(0), view_name(1), "1m"},
-                 "data set");
 }
 
 TEST_F(OwnImages, TryReportsAGoodRecordingAndItsCommandsRun) {

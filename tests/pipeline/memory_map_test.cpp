@@ -21,6 +21,7 @@
 #include "panonav/route/route_panorama.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/temporary_folder.hpp"
+#include "support/text.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -74,13 +75,17 @@ class MemoryMaps : public ::testing::Test {
   }
   /// Stores a route of length 2.
   static void append_route(MemoryFile& memory, const std::string& name,
-                           std::optional<double> assumed_unit_m) {
+                           std::optional<double> assumed_unit_m, bool is_in_map_unit = false) {
     RoutePanorama route(16);
     const std::vector<float> line(16, 0.5F);
     route.append({0.0, 0.0, 0.0}, line);
     route.append({2.0, 0.0, 0.0}, line);
     memory.append_route(name, route);
-    store_route_source(memory, name, {.line = {.columns = 16}, .assumed_unit_m = assumed_unit_m});
+    store_route_source(memory, name,
+                       {.line = {.columns = 16},
+                        .assumed_unit_m = assumed_unit_m,
+                        .is_in_map_unit = is_in_map_unit,
+                        .map_scale = is_in_map_unit ? read_map_scale(memory) : std::nullopt});
   }
   static double shape(const MemoryFile& memory, const std::vector<Pose2>& truth) {
     std::vector<Point2> points;
@@ -338,6 +343,37 @@ TEST_F(MemoryMaps, EveryScalingMovesTheRoutesInTheUnitOfTheMap) {
   EXPECT_THROW(scale_to_metres(memory, 0.0, "s"), ContractError);
 }
 
+// A route in metres of a scaling that was undone gets the scale of the next one, not both.
+TEST_F(MemoryMaps, RoutesOfAnUndoneScalingAreScaledOnce) {
+  MemoryFile memory = make_walk(rounds(round_views));
+  ASSERT_TRUE(map_views(memory, {}, executor));
+  append_route(memory, "before", read_assumed_unit_m(memory), true);
+  EXPECT_FALSE(read_map_scale(memory));
+  scale_to_metres(memory, 0.4, "first");
+  append_route(memory, "after", std::nullopt, true);
+  memory.undo();
+  append_route(memory, "of unknown scale", std::nullopt, true);
+  EXPECT_EQ(memory.route("before")->length_m(), 2.0);
+  EXPECT_EQ(memory.route("after")->length_m(), 2.0);
+  scale_to_metres(memory, 0.6, "second");
+  EXPECT_NEAR(memory.route("before")->length_m(), 2.0 * 0.6, 1e-9);
+  EXPECT_NEAR(memory.route("after")->length_m(), 2.0 * 0.6 / 0.4, 1e-9);
+  EXPECT_EQ(memory.route("of unknown scale")->length_m(), 2.0) << "no scale of its metres is known";
+  EXPECT_EQ(read_route_source(memory, "after", 16).map_scale, read_map_scale(memory));
+  // The same for a correction in metres that was undone.
+  scale_to_metres(memory, 2.0, "correction");
+  append_route(memory, "late", std::nullopt, true);
+  EXPECT_NEAR(memory.route("after")->length_m(), 2.0 * 1.2 / 0.4, 1e-9);
+  memory.undo();
+  EXPECT_NEAR(memory.route("after")->length_m(), 2.0 * 0.6 / 0.4, 1e-9);
+  scale_to_metres(memory, 1.5, "other correction");
+  EXPECT_NEAR(memory.route("before")->length_m(), 2.0 * 0.9, 1e-9);
+  EXPECT_NEAR(memory.route("after")->length_m(), 2.0 * 0.9 / 0.4, 1e-9);
+  EXPECT_NEAR(memory.route("late")->length_m(), 2.0 * 0.9 / 1.2, 1e-9);
+  memory.set_parameter("map_scale", "-1");
+  EXPECT_THROW(static_cast<void>(read_map_scale(memory)), FileError);
+}
+
 TEST_F(MemoryMaps, AMapThatReplacesOneInMetresKeepsItsScale) {
   MemoryFile memory = make_walk(rounds(round_views));
   ASSERT_TRUE(map_views(memory, {}, executor));
@@ -366,8 +402,28 @@ TEST_F(MemoryMaps, AnArrangementKeepsItsScaleWhenViewsFollow) {
   std::mt19937 random(1);
   std::ranges::shuffle(places, random);
   MemoryFile memory = make_walk({places.begin(), places.end() - 5});
-  ASSERT_TRUE(map_views(memory, {}, executor));
+  const auto described = map_views(memory, {}, executor);
+  ASSERT_TRUE(described);
+  EXPECT_STREQ(described->view_step, "median distance between a view and the nearest one");
+  // Neighbours are too near for a scale here, too, and the limit is in the unit of the map.
+  const TopologicalMap arranged = memory.map(map_name).value();
+  const double step = compute_view_step(arranged).value();
+  EXPECT_NEAR(step, 1.0, 0.05);
+  const auto from_first = [&](const TopologicalMap::Node& node) {
+    return distance(node.pose.position(), arranged.nodes.front().pose.position());
+  };
+  for (const TopologicalMap::Node& node : std::span(arranged.nodes).subspan(1)) {
+    if (from_first(node) >= 3.0 * step) continue;
+    const auto message = message_of<ContractError>(
+        [&] { scale_to_metres(memory, arranged.nodes.front().view, node.view, 1.0, "s"); });
+    EXPECT_TRUE(contains(message, "3 times the median distance between a view and the nearest"));
+    EXPECT_TRUE(contains(message, "view steps apart"));
+  }
   scale_to_metres(memory, 0.25, "scale");
+  EXPECT_TRUE(contains(message_of<ContractError>([&] {
+                         scale_to_metres(memory, memory.views()[0], memory.views()[0], 1.0, "s");
+                       }),
+                       " 0 m apart"));
   const TopologicalMap before = memory.map(map_name).value();
   for (auto place = places.end() - 5; place != places.end(); ++place)
     append(memory, round_room_signature(world, *place));

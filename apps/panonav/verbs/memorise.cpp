@@ -163,10 +163,8 @@ void print_map(const std::string& path, const MemoryMap& map, bool is_stored, Se
                   "connect them, take an image every 20 to 50 cm.");
   }
   if (map.unit == LengthUnit::view_steps) {
-    session.print(
-        "Positions are in view steps (median distance between consecutive views). For "
-        "metres: panonav scale " +
-        path + " --distance VIEW VIEW LENGTH");
+    session.print("Positions are in view steps (" + std::string(map.view_step) +
+                  "). For metres: panonav scale " + path + " --distance VIEW VIEW LENGTH");
   }
 }
 

@@ -73,6 +73,12 @@ DrivePoses find_poses(const Arguments& declared, const RecordArguments& argument
       session.note(lead +
                    " has neither positions nor odometry; the poses are those of the map of " +
                    arguments.memory);
+      if (!found.is_in_order) {
+        session.note(lead +
+                     " shows no drive: consecutive images are not more similar than others, so the "
+                     "route jumps between places; record a drive as a video, or name its images in "
+                     "their order, and choose another --name");
+      }
       break;
     case RoutePoseOrigin::images:
       session.note(lead +
@@ -273,7 +279,12 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
         "The elevations of the images are not known; each line is the mean of all rows. Select the "
         "rows at the horizon with --horizon-rows.");
   }
-  session.suggest({"panonav", "route", "follow", arguments.memory, "DATASET"});
+  if (recorder.memory().route_names().size() > 1) {
+    session.suggest({"panonav", "route", "follow", arguments.memory, arguments.dataset, "--name",
+                     arguments.name});
+  } else {
+    session.suggest({"panonav", "route", "follow", arguments.memory, arguments.dataset});
+  }
   return ExitCode::done;
 }
 

@@ -1,3 +1,7 @@
+#include <array>
+#include <string_view>
+#include <utility>
+
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
@@ -15,16 +19,21 @@ struct ScaleArguments {
   std::optional<double> camera_height_m;
 };
 
-/// Parses a length such as "3.2m" or "320cm", in metres. Throws UsageError.
+/// Parses a length with one of the units m, cm and mm, in metres. Throws UsageError.
 double parse_length_m(const std::string& text) {
-  const double metres_per_unit = text.ends_with("cm") ? 0.01 : 1.0;
-  const std::string number = text.substr(0, text.find_last_not_of("cm") + 1);
-  double value = 0.0;
-  if (!text.ends_with('m') || !read_number(number, value) || !(value > 0.0) || value > 1e6) {
-    throw UsageError("--distance is '" + text +
-                     "'; allowed: a length above 0, such as 3.2m or 320cm");
+  constexpr double max_length_m = 1e6;
+  constexpr std::array<std::pair<std::string_view, double>, 3> metres_per_unit{
+      {{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}}};
+  const std::size_t unit_at = text.find_last_of("0123456789.") + 1;  // 0 without a number
+  for (const auto& [unit, unit_m] : metres_per_unit) {
+    double value = 0.0;
+    if (std::string_view(text).substr(unit_at) != unit) continue;
+    if (!read_number(text.substr(0, unit_at), value)) continue;
+    if (value > 0.0 && unit_m * value <= max_length_m) return unit_m * value;
   }
-  return metres_per_unit * value;
+  throw UsageError("--distance is '" + text +
+                   "'; allowed: a number above 0 with the unit m, cm or mm, such as 3.2m, 320cm or "
+                   "3200mm; at most 1000000m");
 }
 
 /// Measures the metres per unit of the map from the ground. Throws UsageError, FileError if the
@@ -48,20 +57,23 @@ GroundScale measure_scale(const ScaleArguments& arguments, const MemoryFile& mem
   });
 }
 
-/// Returns the names of the routes that a scaling of the map scales.
-std::vector<std::string> find_routes_in_map_unit(const MemoryFile& memory) {
+/// Returns the names of the routes that were scaled with the map.
+std::vector<std::string> find_scaled_routes(const MemoryFile& memory) {
+  const auto map_scale = read_map_scale(memory);
   std::vector<std::string> names = memory.route_names();
   std::erase_if(names, [&](const std::string& name) {
     const int columns = memory.route(name).value().columns();
-    return !read_route_source(memory, name, columns).is_in_map_unit;
+    const RouteSource source = read_route_source(memory, name, columns);
+    return !source.is_in_map_unit || source.assumed_unit_m || source.map_scale != map_scale;
   });
   return names;
 }
 
 void print_result(const ScaleArguments& arguments, const MemoryFile& memory, double factor,
                   const std::optional<GroundScale>& ground, Session& session) {
-  const auto step_m = median_step_length(memory.map(map_name).value());
-  const auto routes = find_routes_in_map_unit(memory);
+  const TopologicalMap map = memory.map(map_name).value();
+  const auto step_m = compute_view_step(map);
+  const auto routes = find_scaled_routes(memory);
   if (session.json()) {
     ordered_json json{{"memory", arguments.memory},
                       {"factor", factor},
@@ -76,10 +88,10 @@ void print_result(const ScaleArguments& arguments, const MemoryFile& memory, dou
     session.print(json_line(json));
     return;
   }
-  session.print(
-      "positions in " + arguments.memory + " are now in " + session.bold("metres") +
-      (step_m ? "; consecutive views are " + format_number(*step_m, {}, 2) + " m apart (median)"
-              : "; one former unit is " + format_number(factor, {}, 2) + " m"));
+  session.print("positions in " + arguments.memory + " are now in " + session.bold("metres") +
+                (step_m ? std::string("; the ") + describe_view_step(map) + " is " +
+                              format_number(*step_m, {}, 2) + " m"
+                        : "; one former unit is " + format_number(factor, {}, 2) + " m"));
   if (ground) {
     session.print("The ground shows the distance of " + std::to_string(ground->measured) + " of " +
                   format_count(ground->tried, "pair") +
@@ -137,8 +149,8 @@ Run declare_scale(Arguments& arguments) {
   auto values = std::make_shared<ScaleArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file with a map of its images");
   arguments.option("--distance", "VIEW VIEW LENGTH", values->distance,
-                   "Names or ids of two views of one part of the map, and their distance, such as "
-                   "3.2m");
+                   "Names or ids of two views of one part of the map, and their distance in m, cm "
+                   "or mm, such as 3.2m");
   arguments.option(
       "--camera-height-m", values->camera_height_m,
       "Height of the camera above level ground; lengths are computed from the images of "
@@ -156,7 +168,8 @@ Verb scale_verb() {
       VerbGroup::maps_and_routes,
       "Scale a map of images to metres",
       "A map that was computed from images alone has no scale: its positions are in view steps, "
-      "the median distance between consecutive views. The known distance between two views, or "
+      "the median distance between consecutive views or, if the images are in no order, between a "
+      "view and the nearest one. The known distance between two views, or "
       "the height of the camera above the ground, makes them metres. Run the verb again to correct "
       "the scale. Routes in the unit of the map are scaled, too; those recorded with odometry or "
       "positions are not. panonav undo reverts a scaling.",

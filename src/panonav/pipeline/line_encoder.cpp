@@ -54,6 +54,8 @@ RouteSource read_route_source(const MemoryFile& memory, const std::string& name,
       source.from_odometry = true;
     } else if (word == "map_unit") {
       source.is_in_map_unit = true;
+    } else if (word == "map_scale") {
+      good = read_next(i, source.map_scale.emplace()) && *source.map_scale > 0.0;
     } else if (word == "assumed_unit_m") {
       good = read_next(i, source.assumed_unit_m.emplace()) && *source.assumed_unit_m > 0.0;
     } else {
@@ -76,6 +78,7 @@ void store_route_source(MemoryFile& memory, const std::string& name, const Route
   if (source.from_odometry) text += " odometry";
   if (source.is_in_map_unit) text += " map_unit";
   if (source.assumed_unit_m) text += " assumed_unit_m " + to_text(*source.assumed_unit_m);
+  if (source.map_scale) text += " map_scale " + to_text(*source.map_scale);
   memory.set_parameter(make_parameter_name(name), text);
 }
 

@@ -27,6 +27,9 @@ struct RouteSource {
   /// True: lengths are those of the memory's map, so scaling the map scales the route. False: they
   /// are metres of a data set or of odometry.
   bool is_in_map_unit = false;
+  /// Scale of the map (`read_map_scale`) by which poses in the unit of the map are in metres.
+  /// nullopt: unknown, or poses are in view steps or not in the unit of the map.
+  std::optional<double> map_scale = std::nullopt;
   friend bool operator==(const RouteSource&, const RouteSource&) = default;
 };
 

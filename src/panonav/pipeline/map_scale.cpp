@@ -72,6 +72,19 @@ double compute_median_deviation(const std::vector<double>& ratios, double middle
          std::sqrt(static_cast<double>(ratios.size()));
 }
 
+/// Returns the factor of a route's lengths in a scaling of the map by `factor` to `new_scale`
+/// metres for each assumed metre; nullopt if the route stays as it is.
+std::optional<double> choose_route_factor(const RouteSource& source, bool is_map_metric,
+                                          double factor, std::optional<double> new_scale) {
+  if (source.assumed_unit_m) {
+    if (is_map_metric) return std::nullopt;
+    return new_scale.value() * *source.assumed_unit_m;
+  }
+  if (!source.is_in_map_unit) return std::nullopt;
+  if (source.map_scale && new_scale) return *new_scale / *source.map_scale;
+  return is_map_metric ? std::optional(factor) : std::nullopt;
+}
+
 void require_positions_from_map(const MemoryFile& memory) {
   if (has_positions_from_map(memory)) return;
   throw ContractError(memory.path().string() +
@@ -123,28 +136,32 @@ GroundScale measure_ground_scale(const MemoryFile& memory, double camera_height_
   return scale;
 }
 
-void scale_routes(MemoryFile& memory, double factor) {
-  const double map_unit_m = read_assumed_unit_m(memory);
+std::optional<double> scale_routes(MemoryFile& memory, double factor) {
+  // Scales are metres for each assumed metre.
   const bool is_map_metric = read_length_unit(memory) == LengthUnit::metres;
+  const auto former_scale =
+      is_map_metric ? read_map_scale(memory) : std::optional(1.0 / read_assumed_unit_m(memory));
+  const auto new_scale = former_scale ? std::optional(factor * *former_scale) : std::nullopt;
   for (const std::string& name : memory.route_names()) {
     const RoutePanorama route = memory.route(name).value();
     RouteSource source = read_route_source(memory, name, route.columns());
-    const bool is_in_steps = source.assumed_unit_m.has_value();
-    if (is_in_steps ? is_map_metric : !source.is_in_map_unit) continue;
-    const double own_factor = factor * source.assumed_unit_m.value_or(map_unit_m) / map_unit_m;
+    const auto own_factor = choose_route_factor(source, is_map_metric, factor, new_scale);
+    if (!own_factor) continue;
     source.assumed_unit_m.reset();
     source.is_in_map_unit = true;
+    source.map_scale = new_scale;
     RoutePanorama scaled(route.columns());
     for (std::size_t i = 0; i < route.size(); ++i) {
       Pose2 pose = route.poses()[i];
-      pose.x_m *= own_factor;
-      pose.y_m *= own_factor;
+      pose.x_m *= *own_factor;
+      pose.y_m *= *own_factor;
       static_cast<void>(scaled.append(pose, route.line(i)));
     }
     memory.remove_route(name);
     static_cast<void>(memory.append_route(name, scaled));
     store_route_source(memory, name, source);
   }
+  return new_scale;
 }
 
 void scale_to_metres(MemoryFile& memory, double unit_m, const std::string& undo) {
@@ -163,8 +180,8 @@ void scale_to_metres(MemoryFile& memory, double unit_m, const std::string& undo)
           pose->y_m *= unit_m;
           memory.set_pose(view, pose);
         }
-        scale_routes(memory, unit_m);
-        store_length_unit(memory, LengthUnit::metres);
+        const auto map_scale = scale_routes(memory, unit_m);
+        store_length_unit(memory, LengthUnit::metres, 1.0, map_scale);
         learn_and_store_models(memory);
       },
       undo);
@@ -189,12 +206,14 @@ double scale_to_metres(MemoryFile& memory, ViewId a, ViewId b, double distance_m
   // A shorter distance is mostly the error of a single step. (chosen)
   constexpr double min_distance_steps = 3.0;
   const double known = find_distance(map, a, b).value_or(0.0);
-  const double step = median_step_length(map).value_or(0.0);
+  const double step = compute_view_step(map).value_or(0.0);
   if (!(known > 0.0) || known < min_distance_steps * step) {
+    const std::string unit = std::string(" ") + to_string(read_length_unit(memory));
     throw ContractError(views.info(a).name + " and " + views.info(b).name + " are " +
-                        format_number(step > 0.0 ? known / step : 0.0, {}, 2) +
-                        " view steps apart in the map; choose two views that are far apart, at "
-                        "least 3 view steps");
+                        format_number(known, {}, 2) + unit +
+                        " apart in the map; choose two views that are far apart, at least " +
+                        format_number(min_distance_steps * step, {}, 2) + unit + ", 3 times the " +
+                        describe_view_step(map));
   }
   const double unit_m = distance_m / known;
   scale_to_metres(memory, unit_m, undo);

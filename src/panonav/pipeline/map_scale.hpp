@@ -15,8 +15,8 @@ namespace panonav {
 /// Scales the map, the positions and the routes in the unit of the map to metres, by the known
 /// distance between two views. Returns the metres per former unit. `undo` describes the change for
 /// `undo`. Throws ContractError if a view does not exist, the views are not connected in the map or
-/// less than three median steps apart, the distance is not above 0, or positions come from a data
-/// set; FileError.
+/// less than three view steps (`compute_view_step`) apart, the distance is not above 0, or
+/// positions come from a data set; FileError.
 double scale_to_metres(MemoryFile& memory, ViewId a, ViewId b, double distance_m,
                        const std::string& undo);
 
@@ -51,7 +51,9 @@ void scale_to_metres(MemoryFile& memory, double unit_m, const std::string& undo)
 /// Multiplies the lengths of routes in the unit of the memory's map by `factor`, the metres per
 /// unit of the map. Routes in view steps of their own, of `RouteSource::assumed_unit_m`, are
 /// converted to those of the map first; they stay as they are if the map is in metres already.
-/// Afterwards the other routes are in metres.
-void scale_routes(MemoryFile& memory, double factor);
+/// Routes in metres of another scale of the map (`RouteSource::map_scale`), as after `undo` of a
+/// scaling, get the new scale; if that of theirs is not known, they stay as they are while the map
+/// is in view steps. Returns the new `read_map_scale`, which the caller stores.
+std::optional<double> scale_routes(MemoryFile& memory, double factor);
 
 }  // namespace panonav

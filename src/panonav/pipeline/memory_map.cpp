@@ -12,6 +12,7 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/geometry/nearest_points.hpp"
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/mapping/topological_mapper.hpp"
@@ -24,6 +25,7 @@ namespace {
 
 /// Parameter that is set if the positions of the views come from a map; its value is their unit.
 constexpr const char* unit_parameter = "map_unit";
+constexpr const char* scale_parameter = "map_scale";  // `read_map_scale`; empty: unknown
 constexpr const char* own_unit_parameter = "own_map_unit";
 constexpr const char* path_starts_parameter = "path_starts";
 constexpr const char* metres_text = "metres";
@@ -287,10 +289,24 @@ double read_assumed_unit_m(const MemoryFile& memory) {
   return read_stored_unit(memory).assumed_m;
 }
 
-void store_length_unit(MemoryFile& memory, LengthUnit unit, double assumed_unit_m) {
+std::optional<double> read_map_scale(const MemoryFile& memory) {
+  const auto text = memory.parameter(scale_parameter);
+  if (!text || text->empty()) return std::nullopt;
+  double scale = 0.0;
+  if (read_number(*text, scale) && std::isfinite(scale) && scale > 0.0) return scale;
+  throw FileError(memory.path().string(), std::string("parameter ") + scale_parameter + " is '" +
+                                              to_readable_line(*text) +
+                                              "'; allowed: a number above 0");
+}
+
+void store_length_unit(MemoryFile& memory, LengthUnit unit, double assumed_unit_m,
+                       std::optional<double> map_scale) {
   memory.set_parameter(unit_parameter, unit == LengthUnit::metres
                                            ? metres_text
                                            : view_steps_text + (" " + to_text(assumed_unit_m)));
+  if (map_scale || memory.parameter(scale_parameter)) {
+    memory.set_parameter(scale_parameter, map_scale ? to_text(*map_scale) : "");
+  }
 }
 
 bool has_positions_from_map(const MemoryFile& memory) {
@@ -337,11 +353,38 @@ std::optional<double> median_step_length(const TopologicalMap& map) {
   return upper_median_in_place(std::span(lengths));
 }
 
+std::optional<double> compute_view_step(const TopologicalMap& map) {
+  if (const auto step = median_step_length(map)) return step;
+  std::vector<Point2> points;
+  std::vector<std::size_t> components;
+  for (const TopologicalMap::Node& node : map.nodes) {
+    points.push_back(node.pose.position());
+    components.push_back(node.component);
+  }
+  const auto nearest = nearest_points(points, components, 1);
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!nearest[i].empty()) distances.push_back(distance(points[i], points[nearest[i].front()]));
+  }
+  std::erase(distances, 0.0);
+  if (distances.empty()) return std::nullopt;
+  return upper_median_in_place(std::span(distances));
+}
+
+const char* describe_view_step(const TopologicalMap& map) noexcept {
+  return std::ranges::any_of(
+             map.edges,
+             [](const TopologicalMap::Edge& edge) { return edge.kind == Link::Kind::sequence; })
+             ? "median distance between consecutive views"
+             : "median distance between a view and the nearest one";
+}
+
 std::optional<MemoryMap> describe_map(const MemoryFile& memory) {
   if (!has_positions_from_map(memory)) return std::nullopt;
   const auto map = memory.map(map_name);
   if (!map) return std::nullopt;
-  MemoryMap description{map->nodes.size(), count_nodes(*map), read_length_unit(memory)};
+  MemoryMap description{map->nodes.size(), count_nodes(*map), read_length_unit(memory),
+                        describe_view_step(*map)};
   std::erase(description.part_sizes, 0U);  // of forgotten views
   std::ranges::sort(description.part_sizes, std::greater{});
   return description;
@@ -369,12 +412,13 @@ void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit, double a
     memory.link(links);
     memory.save_map(map_name, map);
     store_poses(memory, map);
-    if (unit == LengthUnit::metres && unit_ratio &&
-        (unit_before == LengthUnit::view_steps ||
-         std::abs(*unit_ratio - 1.0) > min_change_of_scale)) {
-      scale_routes(memory, *unit_ratio);
+    std::optional<double> map_scale;
+    if (unit == LengthUnit::metres && unit_ratio) {
+      const bool is_scaled = unit_before == LengthUnit::view_steps ||
+                             std::abs(*unit_ratio - 1.0) > min_change_of_scale;
+      map_scale = is_scaled ? scale_routes(memory, *unit_ratio) : read_map_scale(memory);
     }
-    store_length_unit(memory, unit, assumed_unit_m);
+    store_length_unit(memory, unit, assumed_unit_m, map_scale);
     learn_and_store_models(memory);
   });
 }
@@ -417,7 +461,8 @@ std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::strin
   }
   if (std::ranges::max(count_nodes(ordered.map)) < min_positioned_views) {
     remove_positions_from_map(memory);
-    MemoryMap parts{views.size(), count_nodes(ordered.map), LengthUnit::view_steps};
+    MemoryMap parts{views.size(), count_nodes(ordered.map), LengthUnit::view_steps,
+                    describe_view_step(ordered.map)};
     std::ranges::sort(parts.part_sizes, std::greater{});
     return parts;
   }
@@ -437,6 +482,7 @@ void remove_positions_from_map(MemoryFile& memory) {
     }
     for (const ViewId view : memory.views()) memory.set_pose(view, std::nullopt);
     memory.set_parameter(unit_parameter, "");
+    if (memory.parameter(scale_parameter)) memory.set_parameter(scale_parameter, "");
   });
 }
 

@@ -22,7 +22,7 @@ inline constexpr const char* map_name = "map";
 /// in this unit, too.
 enum class LengthUnit {
   metres,  ///< of a data set, of odometry, or of a map with a known length
-  /// Median distance between consecutive views of the map. The map was computed from images alone,
+  /// The unit of `compute_view_step`. The map was computed from images alone,
   /// which do not show how long a metre is (`scale_to_metres`).
   view_steps,
 };
@@ -36,8 +36,13 @@ enum class LengthUnit {
 /// algorithms choose distances: things around are 1.5 m away, or views of an arrangement 0.3 m
 /// apart. 1 for metres.
 [[nodiscard]] double read_assumed_unit_m(const MemoryFile& memory);
-/// Stores the unit of positions that come from a map. Throws FileError.
-void store_length_unit(MemoryFile& memory, LengthUnit unit, double assumed_unit_m = 1.0);
+/// Returns the scale of a map of images in metres: metres for each metre that was assumed while its
+/// positions were in view steps. nullopt if the map never was in view steps, or is not in metres.
+[[nodiscard]] std::optional<double> read_map_scale(const MemoryFile& memory);
+/// Stores the unit of positions that come from a map, and `map_scale` (`read_map_scale`). Throws
+/// FileError.
+void store_length_unit(MemoryFile& memory, LengthUnit unit, double assumed_unit_m = 1.0,
+                       std::optional<double> map_scale = std::nullopt);
 /// True if the positions of the views were computed by a map, not read from a data set.
 [[nodiscard]] bool has_positions_from_map(const MemoryFile& memory);
 
@@ -52,12 +57,19 @@ void store_length_unit(MemoryFile& memory, LengthUnit unit, double assumed_unit_
 void scale_lengths(TopologicalMap& map, double factor);
 /// Returns the median length of the edges between consecutive views; nullopt if all are 0.
 [[nodiscard]] std::optional<double> median_step_length(const TopologicalMap& map);
+/// Returns the unit of a map of images, in its present unit of length: the median length of the
+/// edges between consecutive views; of an arrangement, which has none, the median distance between
+/// a view and the nearest one of its component. nullopt if there is neither.
+[[nodiscard]] std::optional<double> compute_view_step(const TopologicalMap& map);
+/// Returns what a view step is in a map, for people: "median distance between ...".
+[[nodiscard]] const char* describe_view_step(const TopologicalMap& map) noexcept;
 
 /// Description of the map of a memory's views.
 struct MemoryMap {
   std::size_t views = 0;                 ///< number of views in the map
   std::vector<std::size_t> part_sizes;   ///< views of each connected component, the largest first
   LengthUnit unit = LengthUnit::metres;  ///< of the positions
+  const char* view_step = "";            ///< what a view step is (`describe_view_step`)
 };
 /// Describes the map from which the views got their positions; nullopt if they got none from a map.
 [[nodiscard]] std::optional<MemoryMap> describe_map(const MemoryFile& memory);

@@ -375,6 +375,7 @@ class Merge {
       const double unit_m = source.assumed_unit_m ? read_assumed_unit_m(file) : 1.0;
       const double factor = source.assumed_unit_m.value_or(1.0) / unit_m;
       if (source.assumed_unit_m) source.assumed_unit_m = unit_m;
+      if (source.map_scale) source.map_scale = read_map_scale(file);
       RoutePanorama moved(route.columns());
       for (std::size_t i = 0; i < route.size(); ++i) {
         Pose2 pose = route.poses()[i];

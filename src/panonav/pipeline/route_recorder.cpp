@@ -35,6 +35,7 @@ RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& op
                      .from_odometry = options.odometry,
                      .assumed_unit_m = options.assumed_unit_m,
                      .is_in_map_unit = options.is_in_map_unit};
+  if (source.is_in_map_unit && !source.assumed_unit_m) source.map_scale = read_map_scale(file);
   const auto known = file.route(options.name);
   if (!known) return source;
   const RouteSource before = read_route_source(file, options.name, known->columns());
@@ -44,22 +45,28 @@ RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& op
     throw ContractError(
         describe_route(file, options.name) +
         " was recorded with another value of the option columns, the option half_band_rad or the "
-        "option horizon_rows; leave them out or choose another name");
+        "option horizon_rows; leave them out or choose another name with the option name");
   }
   if (source.assumed_unit_m != before.assumed_unit_m) {
-    throw ContractError(describe_route(file, options.name) + " is in " +
-                        (before.assumed_unit_m ? "view steps" : "metres") +
-                        ", these poses are in another unit; choose another name");
+    throw ContractError(
+        describe_route(file, options.name) + " is in " +
+        (before.assumed_unit_m ? "view steps" : "metres") +
+        ", these poses are in another unit; choose another name with the option name");
   }
   if (source.is_in_map_unit != before.is_in_map_unit && !source.assumed_unit_m) {
     throw ContractError(describe_route(file, options.name) + " is in " +
                         (before.is_in_map_unit ? "the unit of the map" : "metres of its drive") +
-                        ", these poses are not; choose another name");
+                        ", these poses are not; choose another name with the option name");
+  }
+  if (source.map_scale != before.map_scale) {
+    throw ContractError(describe_route(file, options.name) +
+                        " is in metres of an earlier scale of the map; choose another name with "
+                        "the option name");
   }
   if (source.from_odometry != before.from_odometry) {
     throw ContractError(describe_route(file, options.name) + " is in the frame of " +
                         (before.from_odometry ? "its odometry" : "its data set") +
-                        ", these poses are not; choose another name");
+                        ", these poses are not; choose another name with the option name");
   }
   return source;
 }
@@ -159,6 +166,21 @@ std::vector<std::optional<Pose2>> compute_poses_from_images(const Dataset& drive
   return known;
 }
 
+/// True if the images of the drive, which are views of the memory, are in the order of a walk, or
+/// are too few to tell.
+bool are_images_in_order(const Dataset& drive, const MemoryFile& memory) {
+  // The most similar tenth then has room for the views before and after.
+  constexpr std::size_t min_images = 20;
+  if (drive.entries.size() < min_images) return true;
+  const VisualMemory views = memory.load();
+  VisualMemory images(views.shape(), views.full_scale(), views.elevations());
+  for (const DatasetEntry& entry : drive.entries) {
+    const auto view = memory.find(entry.file);
+    if (view) static_cast<void>(images.append(views.packed(*view), views.info(*view)));
+  }
+  return are_in_order(images);
+}
+
 DrivePoses find_poses_by_images(const Dataset& drive, const MemoryFile& memory,
                                 Executor& executor) {
   const ViewEncoder encoder(memory.header(), drive.source);
@@ -217,6 +239,7 @@ DrivePoses find_drive_poses(const Dataset& drive, const MemoryFile& memory,
         keep_posed_images(drive, mapped, "are in the largest part of the memory's map");
     found.origin = RoutePoseOrigin::map;
     found.is_in_map_unit = true;
+    found.is_in_order = are_images_in_order(found.drive, memory);
     if (read_length_unit(memory) == LengthUnit::view_steps) {
       found.assumed_unit_m = read_assumed_unit_m(memory);
     }
@@ -226,7 +249,7 @@ DrivePoses find_drive_poses(const Dataset& drive, const MemoryFile& memory,
     throw FileError(memory.path().string(),
                     "already contains the route '" + route +
                         "', and the motion of this drive can only be computed from its images, "
-                        "in another frame; choose another name");
+                        "in another frame; choose another name with the option name");
   }
   return find_poses_by_images(drive, memory, executor);
 }
@@ -304,10 +327,11 @@ void RouteRecorder::add(EncodedLine line) {
     const double unit_m = source_.assumed_unit_m.value_or(1.0);
     if (unit_m * gap_m > max_gap_m) {
       const std::string unit = source_.assumed_unit_m ? " view steps" : " m";
-      throw FileError(file_.path().string(),
-                      "the first line lies " + format_number(gap_m) + unit +
-                          " from the end of the route '" + options_.name + "'; allowed: at most " +
-                          format_number(max_gap_m / unit_m) + unit + ", or another name");
+      throw FileError(file_.path().string(), "the first line lies " + format_number(gap_m) + unit +
+                                                 " from the end of the route '" + options_.name +
+                                                 "'; allowed: at most " +
+                                                 format_number(max_gap_m / unit_m) + unit +
+                                                 ", or another value of the option name");
     }
   }
   last_ = line.pose;

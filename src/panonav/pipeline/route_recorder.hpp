@@ -51,6 +51,8 @@ struct DrivePoses {
   RoutePoseOrigin origin = RoutePoseOrigin::data_set;  ///< where the poses come from
   std::optional<double> assumed_unit_m;                ///< as in `RouteRecorderOptions`
   bool is_in_map_unit = false;                         ///< as in `RouteSource`
+  /// False if the images have the poses of the map and are in no order (`are_in_order`).
+  bool is_in_order = true;
 };
 
 /// Finds the poses of a drive, in this order: of the data set (not with `only_odometry`), of its
