@@ -115,6 +115,51 @@ TEST_F(OwnImages, ViewsWithoutPositionInAMemoryOfADataSetAreNamed) {
   EXPECT_TRUE(contains(more.out, "40 of 49 views have no position")) << more.out;
 }
 
+TEST_F(OwnImages, EachInputIsAPathWhateverItsImagesAreCalled) {
+  // One walk with several endings is one path.
+  for (std::size_t i = 0; i < count; i += 3) {
+    const fs::path image = walk() / view_name(i);
+    fs::rename(image, fs::path(image).replace_extension(".PNG"));
+  }
+  memorise();
+  EXPECT_EQ(answer_of({"info", memory(), "--json"})["map"]["part_sizes"], json({count}));
+  // Images of another place continue the numbers, but not the walk.
+  const fs::path later = fs::path(std::string(folder / "later"));
+  fs::create_directory(later);
+  for (std::size_t i = 0; i < count; ++i)
+    write_picture(later / view_name(count + i), landmark_world(50),
+                  {0.08 * static_cast<double>(i) - 1.5, 0.2, 0.0});
+  const json more = answer_of({"memorise", memory(), later, "--json"});
+  EXPECT_EQ(more["map"]["part_sizes"], json({count, count}));
+}
+
+TEST_F(OwnImages, ARenamedViewIsNotStoredAgain) {
+  const fs::path rest = fs::path(std::string(folder / "rest"));
+  fs::create_directory(rest);
+  for (std::size_t i = count / 2; i < count; ++i)
+    fs::rename(walk() / view_name(i), rest / view_name(i));
+  memorise();
+  run_well({"rename", memory(), view_name(0), "door"});
+  run_well({"rename", memory(), view_name(9), "kitchen"});
+  run_well({"rename", memory(), view_name(10), "table"});
+  for (std::size_t i = count / 2; i < count; ++i)
+    fs::rename(rest / view_name(i), walk() / view_name(i));
+  const json more = answer_of({"memorise", memory(), walk(), "--json"});
+  EXPECT_EQ(more["appended"], count / 2);
+  EXPECT_EQ(more["known_before"], count / 2);
+  EXPECT_EQ(more["map"]["part_sizes"], json({count}));
+  EXPECT_FALSE(answer_of({"show", memory(), "kitchen", "--json"})["pose"].is_null());
+}
+
+TEST_F(OwnImages, NavigateKnowsNoTrueDistanceFromPositionsOfAMap) {
+  memorise();
+  const auto driven = run_panonav(
+      {"navigate", memory(), "--goal", view_name(5), "--scene", "office", "--seed", "2"});
+  EXPECT_TRUE(contains(driven.out, "driven ")) << driven.out << driven.err;
+  EXPECT_FALSE(contains(driven.out, "distance from the goal's view")) << driven.out;
+  EXPECT_FALSE(contains(driven.out, "shortest path")) << driven.out;
+}
+
 TEST_F(OwnImages, TryReportsAGoodRecordingAndItsCommandsRun) {
   const std::string out = folder / "tried";
   const json tried = answer_of({"try", walk(), "-o", out, "--json"});
