@@ -180,10 +180,11 @@ void require_one_run(const std::vector<std::int64_t>& stamps_ns, const std::file
   constexpr std::int64_t max_step_back_ns = 1'000'000'000;
   for (std::size_t i = 1; i < stamps_ns.size(); ++i) {
     if (stamps_ns[i - 1] - stamps_ns[i] <= max_step_back_ns) continue;
-    throw FileError(path.string(), source + ": the clock goes back at message " +
-                                       std::to_string(i + 1) +
-                                       "; allowed: one run; panonav convert joins the runs to a "
-                                       "folder, whose poses.csv has the true poses of its images");
+    throw FileError(path.string(),
+                    source + ": the clock goes back at message " + std::to_string(i + 1) +
+                        "; allowed: one run; panonav convert " + quote_for_shell(path.string()) +
+                        " OUT.mcap joins the runs of its images, with their odometry "
+                        "on /odom and the true poses of /ground_truth");
   }
 }
 

@@ -8,8 +8,11 @@
 #include <utility>
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav_recordings/recorded_poses.hpp"
+#include "panonav_recordings/recording_conversion.hpp"
 #include "support/picture_samples.hpp"
 #include "support/recorded_messages.hpp"
+#include "support/temporary_folder.hpp"
 #include "support/text.hpp"
 
 namespace panonav::recordings {
@@ -84,6 +87,21 @@ TEST_P(RecordedClocks, PartsBetweenRestartsFollowEachOther) {
             "that continue those of the first");
   EXPECT_EQ(dataset.entries[0].file, "1_070000000");
   EXPECT_NEAR(*dataset.entries.back().stamp_s - *dataset.entries[0].stamp_s, 11.65, 1e-6);
+}
+
+// Checks the next step that the refusal of poses of several runs recommends.
+TEST_P(RecordedClocks, AConvertedRecordingHasThePosesOfAllPartsInOneRun) {
+  const Dataset dataset = read_with([](bool, std::int64_t ns) {
+    return std::pair{1000 * ms + ns % (7000 * ms), start_ns + ns + 3 * ms};
+  });
+  const TemporaryFolder folder;
+  const std::filesystem::path joined = folder / "joined.mcap";
+  static_cast<void>(convert_to_recording(dataset, joined));
+  const auto poses = read_recorded_poses(joined, "/odom", PoseUse::ground_truth).poses;
+  ASSERT_EQ(poses.size(), dataset.entries.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_NEAR(poses[i].pose.position.x_m, dataset.entries[i].odometry->x_m, 1e-9) << i;
+  }
 }
 
 TEST_P(RecordedClocks, ASimulatedClockRestartsTheTimesOfRecordingToo) {

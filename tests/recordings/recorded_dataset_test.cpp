@@ -389,7 +389,7 @@ TEST_P(RecordedTopics, PosesOfOneTopicAreATrajectoryInSpace) {
   recorded_->add("/pose", start_ns + 100 * ms, pose);
   EXPECT_TRUE(contains(refusal("/pose"),
                        "drive.bag: topic /pose: the clock goes back at message 2; allowed: one "
-                       "run; panonav convert joins the runs"));
+                       "run; panonav convert drive.bag OUT.mcap joins the runs"));
 }
 
 TEST_P(RecordedTopics, GroundTruthIsNotOdometry) {
