@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
@@ -65,6 +66,9 @@ TEST_F(Info, FoldersAndImagesHaveVerbsAndANextCommandThatWorks) {
   fs::create_directory(tree);
   fs::rename(photos, tree / "photos");
   EXPECT_TRUE(contains(last_line(tree), "--recursive"));
+  const json images = describe(tree / "photos", "folder of images");
+  for (const char* verb : {"try", "route record", "route follow"})
+    EXPECT_TRUE(takes(images, verb)) << verb;
 }
 
 TEST_F(Info, DataSetsMemoriesTrajectoriesAndOptions) {
@@ -86,6 +90,7 @@ TEST_F(Info, DataSetsMemoriesTrajectoriesAndOptions) {
       text.out, std::to_string(bytes) + " bytes, " + std::to_string(bytes / 2) + " per view"));
   EXPECT_EQ(lines(text.out).back(), "Next: panonav localise " + memory + " INPUT");
 
+  EXPECT_FALSE(takes(said, "evaluate")) << "a memory without a map";
   const fs::path path = folder.write("path.tum", "# path\n1 0 0 0 0 0 0 1\n3 3 4 0 0 0 0 1\n");
   const json trajectory = describe(path, "trajectory");
   EXPECT_EQ(trajectory["summary"], "2 poses (TUM format) in 2 s over 5 m");
@@ -98,6 +103,28 @@ TEST_F(Info, DataSetsMemoriesTrajectoriesAndOptions) {
   EXPECT_TRUE(takes(options, "localise"));
   EXPECT_FALSE(takes(options, "memorise"));
   expect_refusal({"info", folder.write("p.toml", "[server]\nport = 3\n")}, "no verb takes");
+}
+
+// The verb evaluate needs a map whose views have stamps.
+TEST_F(Info, MemoriesWithAMapAreEvaluatedIfTheirViewsHaveStamps) {
+  const fs::path run = folder / "run";
+  write_dataset(run, landmark_world(7), grid_poses(4));
+  for (const bool has_stamps : {false, true}) {
+    SCOPED_TRACE(has_stamps);
+    if (has_stamps) {
+      std::string table;
+      for (const auto& line : lines(bytes_of(run / "poses.csv"))) {
+        table += line + (table.empty() ? ",stamp_s" : "," + line.substr(5, 3)) + "\n";
+      }
+      write_file(run / "poses.csv", std::string_view(table));
+    }
+    const std::string mapped = folder / (has_stamps ? "stamped.panonav" : "m.panonav");
+    run_well({"map", mapped, run});
+    EXPECT_TRUE(contains(run_panonav({"info", mapped}).out, "  map         16 views"));
+    EXPECT_EQ(takes(answer_of({"info", mapped, "--json"}, 0), "evaluate"), has_stamps);
+    const auto evaluated = run_panonav({"evaluate", mapped, run / "poses.csv"});
+    EXPECT_EQ(evaluated.exit_code != 2, has_stamps) << evaluated.err;
+  }
 }
 
 TEST_F(Info, PagesWorldsCamerasAndLiveSources) {
@@ -167,6 +194,13 @@ TEST_F(Info, WhatNoVerbTakesIsDescribedInOneLine) {
   }
   fs::create_directory(folder / "empty");
   expect_refusal({"info", folder / "empty"}, "but with nothing");
+  fs::create_directories(folder / "worlds/model");
+  for (const char* name : {"worlds/model/model.sdf", "worlds/yard.world", "worlds/LICENSE"})
+    std::ofstream(folder / name) << "x";
+  const std::string worlds = refusal({"info", folder / "worlds"});
+  EXPECT_TRUE(contains(worlds, "1 file without an ending, 1 *.world, 1 folder; try panonav info " +
+                                   (folder / "worlds/yard.world").string()))
+      << worlds;
   std::ofstream(folder / "empty/run.bag") << "";
   expect_refusal({"info", folder / "empty"}, "1 *.bag; try panonav info ");
   expect_refusal({"info", folder / "empty/run.bag"}, "empty (0 bytes)");

@@ -44,11 +44,16 @@ constexpr std::array<Takers, 10> takers{{
      "evaluate"},
     {InputKind::dataset,
      "memorise localise track home map route_record route_follow unwrap convert catchment"},
-    {InputKind::pictures, "memorise localise track map unwrap calibrate convert catchment"},
+    {InputKind::pictures,
+     "try memorise localise track map route_record route_follow unwrap calibrate convert "
+     "catchment"},
     {InputKind::picture, "localise memorise home unwrap calibrate"},
-    {InputKind::video, "memorise localise track map unwrap calibrate catchment"},
+    {InputKind::video,
+     "try memorise localise track map route_record route_follow unwrap calibrate convert "
+     "catchment"},
     {InputKind::recording,
-     "memorise localise track map route_record route_follow unwrap calibrate convert catchment"},
+     "try memorise localise track map route_record route_follow unwrap calibrate convert evaluate "
+     "catchment"},
     {InputKind::live, "localise memorise track"},
     {InputKind::camera_file, "unwrap memorise localise map", "--camera"},
     {InputKind::trajectory, "evaluate simulate"},
@@ -134,12 +139,14 @@ std::string list_contents(const fs::path& folder) {
       ++folders;
     } else {
       const std::string ending = to_lower_case(entry.path().extension().string());
-      ++endings[ending.empty() ? "files without an ending" : "*" + ending];
+      ++endings[ending];
     }
   }
   std::string text;
   for (const auto& [ending, count] : endings) {
-    text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + ending;
+    text += (text.empty() ? "" : ", ") + (ending.empty()
+                                              ? format_count(count, "file") + " without an ending"
+                                              : std::to_string(count) + " *" + ending);
   }
   if (folders > 0) text += (text.empty() ? "" : ", ") + format_count(folders, "folder");
   return text.empty() ? "nothing" : text;
@@ -178,8 +185,10 @@ std::pair<Dataset, bool> read_pictures(const std::string& folder) {
   try {
     return {read_picture_folder(folder, {}), false};
   } catch (const FileError&) {
-    const std::string world = find_file_below(folder, worlds);
-    if (!world.empty()) reject_folder(folder, world);
+    for (const std::string_view& ending : worlds) {
+      const std::string world = find_file_below(folder, std::span(&ending, 1));
+      if (!world.empty()) reject_folder(folder, world);
+    }
   }
   try {
     return {read_picture_tree(folder, {}), true};
@@ -233,7 +242,7 @@ DescribedInput describe_picture(const std::string& file, const std::string& desc
     for (auto& fact : list_picture_facts(file)) described.facts.push_back(std::move(fact));
   }
   if (is_sector(file)) {
-    throw FileError(file, "no verb takes it; it is " + described.summary + "; " +
+    throw FileError(file, "no verb takes it as it is; it is " + described.summary + "; " +
                               join_texts(std::span(described.facts).subspan(1)));
   }
   described.use.verbs = list_verbs_that_take(InputKind::picture);

@@ -76,9 +76,10 @@ std::string format_deg(double rad) {
 
 void add_gpano_facts(const GpanoData& data, std::vector<std::string>& facts) {
   if (!data.has_all_azimuths()) {
-    facts.push_back("GPano: a sector of " + format_deg(data.azimuth_width_rad) +
-                    " degrees; panonav needs images of all azimuths (if these data are wrong, set "
-                    "--ignore-gpano)");
+    facts.push_back(
+        "GPano: a sector of " + format_deg(data.azimuth_width_rad) +
+        " degrees; panonav needs images of all azimuths (if these data are wrong, verbs "
+        "read it with --ignore-gpano)");
   }
   if (data.elevations && !is_whole_sphere(*data.elevations)) {
     facts.push_back("GPano: elevations from " + format_deg(data.elevations->bottom_rad) + " to " +

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <fstream>
 
 #include "cli/texts.hpp"
@@ -13,6 +14,7 @@
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/live_pictures.hpp"
 #include "panonav_recordings/recorded_dataset.hpp"
+#include "panonav_recordings/ros_messages.hpp"
 #include "panonav_recordings/video_file.hpp"
 #include "runs/described_input.hpp"
 
@@ -70,6 +72,16 @@ LengthUnit read_route_unit(const MemoryFile& memory, const std::string& name) {
                                                                  : LengthUnit::metres;
 }
 
+/// True if the memory has a map all of whose views have a stamp, which the verb evaluate needs.
+bool can_be_evaluated(const MemoryFile& memory) {
+  const auto map = memory.map(map_name);
+  if (!map || map->nodes.empty() || memory.path().extension() != ".panonav") return false;
+  const VisualMemory views = memory.load();
+  return std::ranges::all_of(map->nodes, [&](const TopologicalMap::Node& node) {
+    return views.info(node.view).stamp_s.has_value();
+  });
+}
+
 /// Returns the verbs that take the memory: not those for routes, changes, positions or a map that
 /// it does not have.
 std::vector<std::string> find_memory_verbs(const MemoryFile& memory) {
@@ -77,6 +89,7 @@ std::vector<std::string> find_memory_verbs(const MemoryFile& memory) {
   if (memory.route_names().empty()) std::erase(verbs, "route follow");
   if (memory.history().empty()) std::erase(verbs, "undo");
   if (!has_positions_from_map(memory)) std::erase(verbs, "scale");
+  if (!can_be_evaluated(memory)) std::erase(verbs, "evaluate");
   if (memory.info().views_with_heading < std::uint64_t{ObservationModel::min_views}) {
     std::erase(verbs, "track");
   }
@@ -129,6 +142,20 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
   return json;
 }
 
+/// Prints what the memory's map contains, and whether the positions of the views come from it.
+void print_map(const MemoryFile& memory, Session& session) {
+  if (const auto map = describe_map(memory)) {
+    session.print(
+        "  map         " + format_count(map->views, "view") + " in " +
+        format_count(map->part_sizes.size(), "part") +
+        (map->part_sizes.size() == 1 ? "" : " that are not connected") + ", positions in " +
+        (map->unit == LengthUnit::metres ? "metres" : "view steps (panonav scale makes metres)"));
+  } else if (const auto beside = memory.map(map_name)) {
+    session.print("  map         " + format_count(beside->nodes.size(), "view") +
+                  "; the positions of the views are not those of the map");
+  }
+}
+
 ExitCode print_memory(const std::string& path, Session& session) {
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto info = memory.info();
@@ -162,13 +189,7 @@ ExitCode print_memory(const std::string& path, Session& session) {
                                 : std::string()) +
                 ", format " + std::to_string(info.format_version) + ", " +
                 format_count(info.thumbnails, "thumbnail"));
-  if (const auto map = describe_map(memory)) {
-    session.print(
-        "  map         " + format_count(map->views, "view") + " in " +
-        format_count(map->part_sizes.size(), "part") +
-        (map->part_sizes.size() == 1 ? "" : " that are not connected") + ", positions in " +
-        (map->unit == LengthUnit::metres ? "metres" : "view steps (panonav scale makes metres)"));
-  }
+  print_map(memory, session);
   if (info.views > 0 && info.views_with_position == 0) {
     session.print(
         "  positions   none: localise names the nearest view, but gives no position; panonav "
@@ -197,6 +218,17 @@ std::vector<std::string> make_first_command(const std::string& input, ImageSize 
   return make_memorise_command(input, guess.kind);
 }
 
+/// True if a topic has poses, which the verb evaluate reads.
+bool has_poses(const recordings::RecordingSummary& summary) {
+  namespace ros = recordings::ros;
+  constexpr std::array types{
+      ros::Odometry::type,         ros::PoseStamped::type,  ros::PoseWithCovarianceStamped::type,
+      ros::TransformStamped::type, ros::PointStamped::type, ros::TFMessage::type};
+  return std::ranges::any_of(summary.topics, [&](const recordings::TopicSummary& each) {
+    return each.topic.messages > 0 && std::ranges::find(types, each.topic.type) != types.end();
+  });
+}
+
 /// Verbs take a recording that has images which panonav can read.
 InputUse find_use(const std::string& path, const recordings::RecordingSummary& summary) {
   InputUse use;
@@ -209,6 +241,7 @@ InputUse find_use(const std::string& path, const recordings::RecordingSummary& s
     largest_px = area_px;
     use.next = make_first_command(path, *each.size);
   }
+  if (!has_poses(summary)) std::erase(use.verbs, "evaluate");
   return use;
 }
 
