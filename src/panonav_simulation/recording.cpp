@@ -34,8 +34,11 @@ std::vector<Pose2> plan_tour(const Scene& scene, const FreeSpace& space,
     way_points_of_tour = scene.tour;
     way_points_of_tour.push_back(way_points_of_tour.front());
   }
-  require(way_points_of_tour.size() >= 2, "waypoints of a tour",
-          static_cast<double>(way_points_of_tour.size()), ">= 2, or a scene that has a tour");
+  require(
+      way_points_of_tour.size() >= 2, "waypoints of a tour",
+      static_cast<double>(way_points_of_tour.size()),
+      ">= 2, or a scene that has a tour; for other scenes use --path walk, --path zigzag, --grid "
+      "or --trajectory");
   std::vector<Pose2> line;
   for (std::size_t i = 1; i < way_points_of_tour.size(); ++i) {
     const auto path =

@@ -16,6 +16,7 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -374,6 +375,34 @@ std::vector<RecordedPose> SimulatedWorld::plan_along(
     recorded.push_back({trajectory[i].stamp_s, poses[i], odometry[i]});
   }
   return recorded;
+}
+
+std::string SimulatedWorld::describe_impossible_poses(std::span<const RecordedPose> poses) const {
+  const Point2 low = free_space_->low();
+  const Point2 high = free_space_->high();
+  std::size_t outside = 0;
+  std::size_t blocked = 0;
+  for (const RecordedPose& recorded : poses) {
+    const Point2 p = recorded.pose.position();
+    if (p.x_m < low.x_m || p.y_m < low.y_m || p.x_m > high.x_m || p.y_m > high.y_m) {
+      ++outside;
+    } else if (!free_space_->is_free(p)) {
+      ++blocked;
+    }
+  }
+  if (outside + blocked == 0) return "";
+  std::string text = "the robot cannot be at " + std::to_string(outside + blocked) + " of " +
+                     format_count(poses.size(), "pose") + " (";
+  if (outside > 0) {
+    text += std::to_string(outside) + " outside of the floor, x " + to_text(low.x_m) + " to " +
+            to_text(high.x_m) + " m, y " + to_text(low.y_m) + " to " + to_text(high.y_m) + " m";
+  }
+  if (blocked > 0) {
+    text += std::string(outside > 0 ? "; " : "") + std::to_string(blocked) +
+            " inside of an obstacle, within " + to_text(options_.free_space.robot_radius_m) +
+            " m of one, or without a floor";
+  }
+  return text + "); their images show what no robot sees";
 }
 
 Image SimulatedWorld::capture_image(const Pose2& pose, std::uint64_t seed,

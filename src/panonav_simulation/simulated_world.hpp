@@ -104,6 +104,9 @@ class SimulatedWorld {
   /// Returns recorded poses along a trajectory, without checking that they are free. Throws
   /// OptionError.
   [[nodiscard]] std::vector<RecordedPose> plan_along(std::span<const StampedPose> trajectory) const;
+  /// Returns a warning that counts the poses at which the robot cannot be: outside of the floor,
+  /// in or too near to an obstacle, or above no floor. Empty if there are none.
+  [[nodiscard]] std::string describe_impossible_poses(std::span<const RecordedPose> poses) const;
   /// Takes the image at a pose; use a different seed for each image. Throws as the renderer.
   [[nodiscard]] Image capture_image(const Pose2& pose, std::uint64_t seed,
                                     Executor& executor) const;

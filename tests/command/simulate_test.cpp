@@ -367,6 +367,31 @@ TEST_F(Simulate, FollowsATrajectory) {
   EXPECT_NEAR(*dataset.entries[1].stamp_s, 2.0, 1e-9);
 }
 
+TEST_F(Simulate, PosesWhereNoRobotCanBeAreCounted) {
+  std::ofstream(folder / "way.csv") << "stamp_s,x_m,y_m,heading_deg\n"
+                                       "0,1,1,0\n1,1.5,1,0\n2,100,1,0\n3,-90,0,0\n4,0,0,0\n";
+  const auto world =
+      folder.write("table.world", ground_world(box_model("table", "0 0 0.4 0 0 0", "0.4 0.4 0.8")));
+  const auto said = run_panonav(with_small(
+      {"simulate", world, folder / "run", "--trajectory", folder / "way.csv", "--json"}));
+  EXPECT_EQ(said.exit_code, 0) << said.err;
+  const std::string expected =
+      "way.csv: the robot cannot be at 3 of 5 poses (2 outside of the floor, x -";
+  EXPECT_TRUE(contains(said.err, expected)) << said.err;
+  EXPECT_TRUE(contains(said.err, "; 1 inside of an obstacle, within ")) << said.err;
+  EXPECT_TRUE(contains(json::parse(said.out)["warnings"].dump(), expected)) << said.out;
+  std::ofstream(folder / "way.csv") << "stamp_s,x_m,y_m,heading_deg\n0,1,1,0\n1,1.5,1,0\n";
+  const auto free = run_panonav(
+      with_small({"simulate", world, folder / "free", "--trajectory", folder / "way.csv"}));
+  EXPECT_FALSE(contains(free.err, "cannot be at")) << free.err;
+}
+
+TEST_F(Simulate, AWorldWithoutATourNamesTheOtherPaths) {
+  expect_refusal(
+      {"simulate", folder.write("a.world", ground_world("")), folder / "run", "--path", "tour"},
+      "for other scenes use --path walk, --path zigzag, --grid or --trajectory");
+}
+
 TEST_F(Simulate, WrongValuesAreNamedWithTheirRange) {
   const std::string out = folder / "run";
   const auto line_of = [&](std::vector<std::string> more) {

@@ -101,6 +101,14 @@ ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Sessio
       [&](const std::string& warning) { session.note("warning: " + warning); });
   if (arguments.ros2) return arguments.robot.run(world, session);
   const auto poses = arguments.trajectory ? read_poses(*arguments.trajectory, world) : world.plan();
+  auto warnings = world.scene().warnings;
+  if (arguments.trajectory) {
+    const std::string impossible = world.describe_impossible_poses(poses);
+    if (!impossible.empty()) {
+      warnings.push_back(*arguments.trajectory + ": " + impossible);
+      session.note("warning: " + warnings.back());
+    }
+  }
   const bool with_path = arguments.trajectory.has_value() ||
                          world.options().recording.path != simulation::RecordingPath::random;
   RunRecord record(arguments.record, {}, false, session, {});
@@ -122,7 +130,7 @@ ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Sessio
                                          {"scene", world.scene().name},
                                          {"views", dataset.entries.size()},
                                          {"free_area_m2", world.free_space().area_m2()},
-                                         {"warnings", world.scene().warnings}}));
+                                         {"warnings", warnings}}));
   } else {
     session.print(session.bold(format_count(dataset.entries.size(), "view")) + " of " +
                   world.scene().name + " in " + out);
