@@ -78,6 +78,15 @@ TEST_F(OwnImages, RoutesSayWhichFrameTheirPosesHave) {
   EXPECT_FALSE(contains(on_map.out, "in the route's own frame")) << on_map.out;
 }
 
+TEST_F(OwnImages, AMergeWithMetresNamesTheCommandThatScales) {
+  memorise();
+  const std::string metric = folder / "metric.panonav";
+  write_dataset(folder / "run", landmark_world(7), grid_poses(4));
+  run_well({"memorise", metric, folder / "run"});
+  expect_refusal({"merge", memory(), metric, "-o", folder / "both.panonav"},
+                 "first scale it to metres: panonav scale " + memory() + ", with --distance");
+}
+
 TEST_F(OwnImages, AMemoryWithoutPositionsSaysWhatItCanDo) {
   memorise();
   const auto verbs = answer_of({"info", memory(), "--json"})["verbs"];

@@ -151,6 +151,9 @@ TEST(Usage, TheNearestNameIsProposed) {
                  "no such option: --componnets (did you mean '--components'?)");
   expect_refusal({"localise", "a", "b", "--elevation", "5"}, "(did you mean '--elevation-deg'?)");
   EXPECT_EQ(refusal({"info", "a", "--zzzzzzzzzz"}).find("did you mean"), std::string::npos);
+  const auto hidden = refusal({"memorise", "a", "b", "--camera-height-m", "1"});
+  EXPECT_TRUE(contains(hidden, "no such option: --camera-height-m")) << hidden;
+  EXPECT_FALSE(contains(hidden, "did you mean")) << hidden;
 }
 
 TEST(Usage, FilesOfOptionsProposeTheNearestNameAndOnlyThisVerbsSections) {

@@ -264,7 +264,9 @@ std::string_view Arguments::interruption_text() const {
 std::string Arguments::explain_unknown_flag(const std::string& typed) const {
   std::vector<std::string_view> names;
   for (const auto& info : infos()) {
-    if (!info.positional()) names.emplace_back(info.name);
+    // Leaves out options that are for special inputs, such as the size of images from a camera.
+    const bool is_hidden = !info.is_in_short_help && info.section.empty();
+    if (!info.positional() && !is_hidden) names.emplace_back(info.name);
   }
   return "no such option: " + typed + suggest_name(typed, names);
 }

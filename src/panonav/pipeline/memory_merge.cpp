@@ -15,6 +15,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/temporary_file.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
@@ -217,8 +218,10 @@ void require_same_unit(const MemoryFile& first, const MemoryFile& second) {
   if (other.info().views_with_position == 0) return;
   throw FileError(unscaled.path().string(),
                   "has positions in view steps, those of " + other.path().string() +
-                      " are in metres; first scale it to metres, by the known distance between two "
-                      "of its views");
+                      " are in metres; first scale it to metres: panonav scale " +
+                      quote_for_shell(unscaled.path().string()) +
+                      ", with the option distance (two of its views and the distance between "
+                      "them)");
 }
 
 class Merge {

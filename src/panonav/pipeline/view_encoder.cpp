@@ -151,8 +151,13 @@ void ViewEncoder::require_fit(const Observation& observation) const {
 
 void ViewEncoder::check_band(const std::optional<ElevationBand>& band) const {
   if (is_same_band(band, header_.elevations)) return;
-  throw ContractError("elevation band", format_band(band),
-                      format_band(header_.elevations) + std::string(as_remembered));
+  throw ContractError(
+      "elevation band", format_band(band),
+      format_band(header_.elevations) + std::string(as_remembered) +
+          (header_.elevations ? "; set the option elevation_deg to the band of these images, or "
+                                "store them in a memory of their own"
+                              : "; leave out the option elevation_deg, or store these images in a "
+                                "memory of their own"));
 }
 
 Panorama ViewEncoder::panorama(const Observation& observation) const {
