@@ -20,6 +20,7 @@
 #include "panonav/pipeline/route_follower.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 #include "support/command_runner.hpp"
+#include "support/landmark_pictures.hpp"
 #include "support/recorded_messages.hpp"
 #include "support/report_pages.hpp"
 #include "support/toy_world.hpp"
@@ -142,12 +143,34 @@ TEST_F(RouteVerbs, TheImagesThatBecameNoLinesAreCounted) {
       << said.out;
 }
 
+// Without odometry, the memory's views with positions give the scale, by an estimate.
+TEST_F(RouteVerbs, LengthsThatAreEstimatedFromTheViewsAreCalledSo) {
+  const fs::path walk = folder_ / "walk";
+  write_dataset(walk, landmark_world(7), grid_poses(4));
+  const fs::path images = folder_ / "images";
+  fs::create_directory(images);
+  for (const auto& entry : fs::directory_iterator(walk)) {
+    if (entry.path().extension() == ".png") fs::copy(entry.path(), images);
+  }
+  const std::string memory = folder_ / "walk.panonav";
+  run_well({"memorise", memory, walk});
+  const std::vector<std::string> kind{"--kind", "panorama", "--elevation-deg", "-20", "20"};
+  const auto said =
+      run_panonav(with({"route", "record", memory, images, "--name", "a", "--every-m", "0"}, kind));
+  EXPECT_EQ(said.exit_code, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "Lengths are estimated from the views of the memory")) << said.out;
+  const auto estimated = answer_of(
+      with({"route", "record", memory, images, "--name", "b", "--every-m", "0", "--json"}, kind));
+  EXPECT_EQ(estimated["length_estimated"], true);
+  EXPECT_EQ(record()["length_estimated"], false) << "positions of the data set";
+}
+
 TEST_F(RouteVerbs, RecordsALineEveryTenCentimetresAndFollowsToTheCentimetre) {
   const json recorded = record();
   EXPECT_EQ(keys_of(recorded),
             (std::set<std::string>{"memory", "route", "frame", "appended", "lines", "columns",
-                                   "length_m", "bytes", "bytes_per_km", "file_bytes",
-                                   "left_out"}));
+                                   "length_m", "length_estimated", "bytes", "bytes_per_km",
+                                   "file_bytes", "left_out"}));
   EXPECT_EQ(recorded["left_out"]["too_near"], 40) << "every second image is on the way between";
   EXPECT_EQ(recorded["lines"], 41);
   EXPECT_EQ(recorded["appended"], 41);
@@ -265,6 +288,7 @@ TEST_F(RouteVerbs, ImagesThatDoNotFitTheMemoryAreRefused) {
   const std::vector<std::string> follow{"route", "follow", folder_ / "m.panonav",
                                         folder_ / "other"};
   expect_refusal(follow, "elevation band is -20 to 20 degrees");
+  expect_refusal(follow, "; set --elevation-deg to the band of these images, or store");
   expect_refusal({"route", "record", folder_ / "m.panonav", folder_ / "other", "--name", "b"},
                  "elevation band is -20 to 20 degrees");
   fs::remove(folder_ / "other/dataset.toml");

@@ -192,8 +192,8 @@ void print_left_out(const LeftOutImages& left_out, std::size_t lines, Session& s
 }
 
 void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recorded& recorded,
-                    RouteFrame frame, const LeftOutImages& left_out, std::uint64_t file_bytes,
-                    Session& session) {
+                    const DrivePoses& drive, const LeftOutImages& left_out,
+                    std::uint64_t file_bytes, Session& session) {
   const double length_m = recorded.route.length_m();
   const double bytes_per_km = recorded.bytes_per_km();
   const bool is_metric = session.length_unit() == LengthUnit::metres;
@@ -201,11 +201,12 @@ void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recor
     session.print(session.json_line(
         ordered_json{{"memory", arguments.memory},
                      {"route", arguments.name},
-                     {"frame", to_string(frame)},
+                     {"frame", to_string(find_frame(drive.origin))},
                      {"appended", recorded.appended},
                      {"lines", recorded.route.size()},
                      {"columns", recorded.route.columns()},
                      {"length_m", length_m},
+                     {"length_estimated", drive.is_scale_estimated},
                      {"bytes", recorded.bytes},
                      {"bytes_per_km", is_metric ? ordered_json(bytes_per_km) : ordered_json()},
                      {"file_bytes", file_bytes},
@@ -223,6 +224,11 @@ void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recor
                 (is_metric ? ", " + format_fixed(1e-6 * bytes_per_km, 2) + " MB per kilometre"
                            : ", " + std::to_string(recorded.bytes) + " bytes"));
   print_left_out(left_out, recorded.appended, session);
+  if (drive.is_scale_estimated) {
+    session.print(
+        "Lengths are estimated from the views of the memory and may be wrong by a factor; odometry "
+        "or positions in the data set would measure them.");
+  }
 }
 
 ExitCode record(const Arguments& declared, const RecordArguments& arguments, Session& session) {
@@ -269,7 +275,7 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   if (arguments.report)
     write_record_report(*arguments.report, arguments.name, recorded, session.length_unit());
   const RouteFrame frame = find_frame(drive.origin);
-  print_recorded(arguments, recorded, frame, count_left_out(dataset, drive, recorded),
+  print_recorded(arguments, recorded, drive, count_left_out(dataset, drive, recorded),
                  recorder.memory().info().file_bytes, session);
   if (session.json()) return ExitCode::done;
   print_frame(frame, recorder.memory(), session);

@@ -194,6 +194,7 @@ DrivePoses find_poses_by_images(const Dataset& drive, const MemoryFile& memory,
   DrivePoses found = keep_posed_images(drive, poses, "show the motion from one to the next");
   found.origin = RoutePoseOrigin::images;
   found.is_in_map_unit = !has_unit || has_positions_from_map(memory);
+  found.is_scale_estimated = has_unit;
   if (!has_unit) {
     for (Pose2& pose : found.poses) {
       pose.x_m /= median_step;

@@ -53,6 +53,9 @@ struct DrivePoses {
   bool is_in_map_unit = false;                         ///< as in `RouteSource`
   /// False if the images have the poses of the map and are in no order (`are_in_order`).
   bool is_in_order = true;
+  /// True if the unit of the poses was estimated from views of the memory with positions, for
+  /// `RoutePoseOrigin::images`; lengths may then be wrong by a factor.
+  bool is_scale_estimated = false;
 };
 
 /// Finds the poses of a drive, in this order: of the data set (not with `only_odometry`), of its
