@@ -264,9 +264,8 @@ std::string_view Arguments::interruption_text() const {
 std::string Arguments::explain_unknown_flag(const std::string& typed) const {
   std::vector<std::string_view> names;
   for (const auto& info : infos()) {
-    // Leaves out options that are for special inputs, such as the size of images from a camera.
-    const bool is_hidden = !info.is_in_short_help && info.section.empty();
-    if (!info.positional() && !is_hidden) names.emplace_back(info.name);
+    const bool is_shown = info.is_in_short_help || !info.section.empty();
+    if (is_shown && !info.positional()) names.emplace_back(info.name);
   }
   return "no such option: " + typed + suggest_name(typed, names);
 }
@@ -481,10 +480,9 @@ std::string Arguments::config_template(std::string_view verb) const {
     OptionLister lister([&](const ListedOption& option) {
       const std::string name(option.info.name);
       const std::string range = option.choices.empty() ? option.range : join_texts(option.choices);
-      const bool is_name = option.type == "NAME";
       text += "# " + std::string(option.info.help) + (range.empty() ? "" : " (" + range + ")") +
               "\n" + (is_set(section.name, name) ? "" : "# ") + name + " = " +
-              (is_name ? quote_for_toml(option.value) : option.value) + "\n";
+              (option.type == "NAME" ? quote_for_toml(option.value) : option.value) + "\n";
     });
     section.visit(lister);
     for (const ArgumentInfo& info : implementation_->infos) {
