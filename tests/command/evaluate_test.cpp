@@ -190,5 +190,31 @@ TEST_F(Evaluate, BrokenFilesAreNamedWithLineAndField) {
       "relative_distance_m is -1");
 }
 
+TEST_F(Evaluate, ADataSetIsTheTruthByItsPoses) {
+  write("truth.tum", lines_of(tum));
+  std::filesystem::create_directory(std::string(folder_ / "run"));
+  const std::vector<std::string> call{"evaluate", folder_ / "truth.tum", folder_ / "run"};
+  expect_refusal(call, "a folder without poses.csv; allowed: a data set with poses.csv");
+  write("run/poses.csv",
+        "file,stamp_s,x_m,y_m,heading_deg\n" + lines_of([](int i, double x, double y) {
+          return "v.png," + std::to_string(i) + "," + std::to_string(x) + "," + std::to_string(y) +
+                 ",0\n";
+        }));
+  EXPECT_EQ(answer_of(with(call, {"--json"}))["pairs"], 8);
+  EXPECT_EQ(answer_of({"evaluate", folder_ / "run", folder_ / "truth.tum", "--json"})["pairs"], 8);
+}
+
+TEST_F(Evaluate, FewPairsAreNoted) {
+  write("truth.tum", tum(0, 0.0, 0.0) + tum(1, 1.0, 0.0) + tum(5, 4.0, 2.0));
+  write("half.tum", lines_of(tum).substr(0, 5 * tum(0, 0.0, 0.0).size()));
+  write("all.tum", lines_of(tum));
+  const auto few = run_panonav({"evaluate", folder_ / "all.tum", folder_ / "truth.tum"});
+  EXPECT_TRUE(contains(few.err, "only 3 of 8 estimated poses have a true pose")) << few.err;
+  EXPECT_TRUE(
+      contains(few.err, "the stamps of the estimate are 0 to 7, those of the truth 0 to 5"));
+  const auto whole = run_panonav({"evaluate", folder_ / "truth.tum", folder_ / "all.tum"});
+  EXPECT_FALSE(contains(whole.err, "true pose")) << whole.err;
+}
+
 }  // namespace
 }  // namespace panonav::testing

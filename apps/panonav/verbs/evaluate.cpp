@@ -117,11 +117,17 @@ TrajectoryFile read_poses(const std::string& input, const std::optional<std::str
     throw UsageError(std::string(flag) + " is " + to_readable_line(*topic) +
                      "; allowed: nothing, as " + to_readable_line(input) + " is no recording");
   }
-  return read_trajectory_file(input);
+  if (!std::filesystem::is_directory(input)) return read_trajectory_file(input);
+  const auto table = std::filesystem::path(input) / "poses.csv";
+  if (std::filesystem::is_regular_file(table)) return read_trajectory_file(table);
+  throw FileError(input,
+                  "is a folder without poses.csv; allowed: a data set with poses.csv, a file of "
+                  "poses or a recording");
 }
 
 TrajectoryEstimate read_estimate(const EvaluateArguments& arguments) {
-  if (!arguments.estimate_topic && !recordings::is_recording(arguments.estimate)) {
+  if (!arguments.estimate_topic && !recordings::is_recording(arguments.estimate) &&
+      !std::filesystem::is_directory(arguments.estimate)) {
     return panonav::read_estimate(arguments.estimate);
   }
   return {read_poses(arguments.estimate, arguments.estimate_topic, recordings::PoseUse::estimate),
@@ -207,6 +213,16 @@ void print_errors(const EstimateEvaluation& evaluation, const EvaluateArguments&
   if (evaluation.closures) print_closures(*evaluation.closures, session);
 }
 
+/// Warns if fewer than half of the estimated poses are compared.
+void note_few_pairs(const EstimateEvaluation& evaluation, const std::string& spans,
+                    Session& session) {
+  const TrajectoryError& error = evaluation.trajectory;
+  if (error.pairs >= error.left_out) return;
+  session.note("panonav evaluate: only " + std::to_string(error.pairs) + " of " +
+               format_count(error.pairs + error.left_out, "estimated pose") +
+               " have a true pose, so the errors say nothing about most of the estimate; " + spans);
+}
+
 ExitCode evaluate(const Arguments& declared, EvaluateArguments arguments, Session& session) {
   TrajectoryEstimate estimate = read_estimate(arguments);
   TrajectoryFile truth =
@@ -235,6 +251,7 @@ ExitCode evaluate(const Arguments& declared, EvaluateArguments arguments, Sessio
     session.note("panonav evaluate: " + format_count(repeated, "pose") +
                  " left out, because the pose before has the same stamp");
   }
+  note_few_pairs(*evaluation, spans, session);
   if (session.json()) {
     session.print(session.json_line(to_json(*evaluation, arguments.options, formats)));
     return ExitCode::done;
@@ -260,8 +277,8 @@ Run declare_evaluate(Arguments& arguments) {
                        "Estimated trajectory: TUM, KITTI, EuRoC, a CSV table or a recording; or a "
                        "memory file (NAME.panonav) with a map");
   arguments.positional("GROUND_TRUTH", values->truth,
-                       "True trajectory, with or without headings: TUM, KITTI, EuRoC, a CSV table "
-                       "or a recording");
+                       "True trajectory, with or without headings: TUM, KITTI, EuRoC, a CSV table, "
+                       "a data set with poses.csv or a recording");
   arguments.option("--estimate-topic NAME", values->estimate_topic,
                    "Topic of the estimated poses in a recording; needed if there are several "
                    "topics with poses");

@@ -15,7 +15,11 @@ TrajectoryEstimate read_map(const std::filesystem::path& path) {
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
   auto map = file.map("map");
   if (!map || map->nodes.empty()) {
-    throw FileError(path.string(), "contains no map; allowed: a memory file that panonav map made");
+    throw FileError(path.string(),
+                    file.info().views_with_position > 0
+                        ? "has positions from a data set and no map of its own to compare; make "
+                          "one with panonav map, or choose a file of estimated poses"
+                        : "contains no map; make one with panonav map or panonav memorise");
   }
   const VisualMemory memory = file.load();
   TrajectoryEstimate estimate;
@@ -27,7 +31,9 @@ TrajectoryEstimate read_map(const std::filesystem::path& path) {
     if (!stamp_s) {
       throw FileError(path.string(),
                       "view " + memory.info(node.view).name +
-                          " has no stamp; allowed: a recording with the column 'stamp_s'");
+                          " has no stamp, by which its true pose is found; memorise a video, a "
+                          "recording or a data set with the column 'stamp_s' in a new memory, or "
+                          "choose a file of estimated poses");
     }
     estimate.stamp_s.emplace(node.view, *stamp_s);
     if (node.component == map->nodes.front().component) {
