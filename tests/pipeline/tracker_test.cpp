@@ -66,6 +66,38 @@ TEST_F(TrackerTest, WithoutOdometryTheMotionIsThatOfThePictures) {
   EXPECT_LT(distance(last.pose->position(), pose(19).position()), 0.25);
 }
 
+// The robot may have moved where its images do not show how.
+TEST_F(TrackerTest, AStepThatCannotBeReadSpreadsTheParticles) {
+  const auto deviation_m = [](const Tracker& tracker) {
+    const Particles& particles = tracker.localiser().particles();
+    double sum = 0.0;
+    double squares = 0.0;
+    for (const double x : particles.x_m) {
+      sum += x;
+      squares += x * x;
+    }
+    const auto count = static_cast<double>(particles.size());
+    return std::sqrt(std::max(0.0, squares / count - sum / count * (sum / count)));
+  };
+  const FourierSignature blank = Tracker(memory()).encoder().signature(Observation(Image(96, 12)));
+  Tracker tracker(memory());
+  tracker.start_at(pose(0), 0.0, 0.0);
+  tracker.move_by_image(tracker.encoder().signature(picture(0)));
+  EXPECT_EQ(deviation_m(tracker), 0.0) << "the first image shows no motion";
+  tracker.move_by_image(blank);
+  EXPECT_EQ(tracker.visual_odometry()->breaks(), 1);
+  const double spacing_m = tracker.localiser().model().spacing_m;
+  EXPECT_NEAR(deviation_m(tracker), spacing_m, 0.1 * spacing_m) << "no step is known";
+  // Steps of the circle are shorter than the spacing of the memory.
+  Tracker moving(memory());
+  moving.start_at(pose(0), 0.0, 0.0);
+  for (int i = 0; i < 4; ++i) moving.move_by_image(moving.encoder().signature(picture(i)));
+  const double before_m = deviation_m(moving);
+  moving.move_by_image(blank);
+  EXPECT_GT(deviation_m(moving), before_m);
+  EXPECT_LT(deviation_m(moving), spacing_m);
+}
+
 TEST_F(TrackerTest, TheNoiseOfTheOptionsAppliesToBothKindsOfMotion) {
   const OdometryNoise none{DriveKind::holonomic, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   Tracker tracker(memory(), {.odometry = none});

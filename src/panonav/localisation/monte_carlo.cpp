@@ -449,6 +449,21 @@ void MonteCarloLocaliser::move(const Pose2& step) {
   move_particles(own.particles, StepSampler(step, own.odometry), own.random);
 }
 
+void MonteCarloLocaliser::spread(double deviation_m, double heading_deviation_rad) {
+  require(std::isfinite(deviation_m) && deviation_m >= 0.0, "deviation_m", deviation_m, ">= 0");
+  require(std::isfinite(heading_deviation_rad) && heading_deviation_rad >= 0.0,
+          "heading_deviation_rad", heading_deviation_rad, ">= 0");
+  auto& own = *implementation_;
+  own.travelled_m += deviation_m;
+  Particles& particles = own.particles;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const double x = own.random.normal(particles.x_m[i], deviation_m);
+    const double y = own.random.normal(particles.y_m[i], deviation_m);
+    const double heading = own.random.normal(particles.heading_rad[i], heading_deviation_rad);
+    particles.set(i, {x, y, wrap_angle(heading)}, particles.weight[i]);
+  }
+}
+
 void MonteCarloLocaliser::update_views() {
   implementation_->likelihood.update_sites();
   implementation_->likelihood.release();

@@ -130,6 +130,10 @@ class MonteCarloLocaliser {
   /// number of steps may come between two images.
   void move(const Pose2& step);
 
+  /// Adds noise of zero mean to all particles, for a motion of which nothing is known.
+  /// `deviation_m`: standard deviation of x and of y; both >= 0 and finite.
+  void spread(double deviation_m, double heading_deviation_rad);
+
   /// Reloads the positions of the memory's views after views were added or removed. Keeps the
   /// particles. Throws ContractError, without any change, if no view has a position.
   void update_views();

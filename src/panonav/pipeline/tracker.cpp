@@ -1,6 +1,7 @@
 #include "panonav/pipeline/tracker.hpp"
 
 #include <algorithm>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +22,10 @@
 namespace panonav {
 
 namespace {
+
+/// Standard deviation of the turn of a step that cannot be read from the images: the turn that is
+/// expected before the first step (`VisualOdometry`).
+constexpr double unknown_turn_deviation_rad = std::numbers::pi / 6.0;
 
 void require_positions(const MemoryFile& file, const VisualMemory& memory) {
   const std::size_t posed = HeldViewIndex(memory).posed_views().size();
@@ -158,10 +163,18 @@ struct Tracker::Implementation {
     localiser.set_odometry_noise(noise.value_or(visual_odometry_noise()));
     const bool is_first = !visual_odometry->last();
     const Pose2 before = visual_odometry->pose();
-    visual_odometry->add(std::move(seen));
+    const bool is_known = visual_odometry->add(std::move(seen)).has_value();
     if (is_first) return {};
     const Pose2 motion = inverse(before) * visual_odometry->pose();
-    localiser.move(motion);
+    if (is_known) {
+      path_m += distance({}, motion.position());
+      ++known_steps;
+      localiser.move(motion);
+    } else {
+      // A step as long as the others, in any direction; before the first, as views are apart.
+      localiser.spread(known_steps > 0 ? path_m / known_steps : localiser.model().spacing_m,
+                       unknown_turn_deviation_rad);
+    }
     return motion;
   }
 
@@ -178,6 +191,8 @@ struct Tracker::Implementation {
   bool is_last_by_image = false;                  // the last motion was read from images
   bool is_moved = false;                          // since the last view was observed
   std::optional<VisualOdometry> visual_odometry;  // nullopt: no motion was read from images
+  double path_m = 0.0;                            // length of the steps read from images
+  int known_steps = 0;                            // number of them
 };
 
 Tracker::Tracker(const std::filesystem::path& memory, const TrackerOptions& options)

@@ -85,8 +85,9 @@ class Tracker {
   /// which `move_by_image` may then continue; null: unknown. Throws ContractError beyond
   /// `max_position_m`, and if the memory's positions are in view steps.
   void move_to(const Pose2& odometry, const FourierSignature* view = nullptr);
-  /// Moves the particles by the motion from the last image to this one, read from both; only stores
-  /// it if the last view is not known. Call it before `observe` for images that were encoded with
+  /// Moves the particles by the motion from the last image to this one, read from both; spreads
+  /// them by the mean length of the other steps if it cannot be read; only stores the view if the
+  /// last one is not known. Call it before `observe` for images that were encoded with
   /// `encoder()`. The first call computes the metric scale from views with known positions; from a
   /// memory that is not held, it loads at most `max_learnt_views` for this. Throws ContractError
   /// unless the signature has three components or more; FileError if the server cannot be reached.

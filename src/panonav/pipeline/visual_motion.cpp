@@ -149,11 +149,12 @@ void add_motion_by_images(std::span<DatasetEntry> entries, VisualOdometry& odome
 }  // namespace
 
 OdometryNoise visual_odometry_noise() {
-  // Lengths of two of three steps lie within a quarter of the median, as the distance of things
-  // around changes along a drive (30 drives in six scenes, 2,970 steps).
-  constexpr double length_deviation = 0.25;
+  // After 1 m a path is too long or too short by a quarter, as the distance of things around
+  // changes slowly: two of three lengths are within a quarter of the median (2,970 steps of 30
+  // drives in six scenes).
+  constexpr double length_deviation_m = 0.25;
   return {.drive = DriveKind::holonomic,
-          .translation_from_translation = length_deviation,
+          .translation_from_translation = length_deviation_m,
           .rotation_from_translation = MappingOptions{}.turn_deviation};
 }
 
@@ -165,8 +166,14 @@ VisualOdometry visual_odometry(const VisualMemory& memory) {
 }
 
 std::string describe_visual_motion(const VisualOdometry& odometry) {
-  return std::to_string(odometry.breaks()) + " of " + format_count(odometry.tried_steps(), "step") +
-         " unread";
+  std::string text = "the images show " +
+                     std::to_string(odometry.tried_steps() - odometry.breaks()) + " of " +
+                     format_count(odometry.tried_steps(), "step");
+  // At the others, the position is known from the views alone.
+  if (2 * odometry.breaks() > odometry.tried_steps()) {
+    text += "; they are too far apart or in no order: take one every 20 to 50 cm";
+  }
+  return text;
 }
 
 std::string add_visual_odometry(Dataset& run, const VisualMemory& memory,
