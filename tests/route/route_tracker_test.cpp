@@ -174,6 +174,33 @@ TEST_F(RouteTracking, FollowsADriveAndTellsWayAndSide) {
   }
 }
 
+// At the crossing of an eight both passes are equally near.
+TEST_F(RouteTracking, StaysOnItsPassWhereTheRouteCrossesItself) {
+  const auto eight = smooth_path(
+      std::vector<Point2>{{-2, -0.6}, {1.6, 0.6}, {2.2, 0}, {1.6, -0.6}, {-2, 0.6}}, 0.1);
+  RoutePanorama crossing(route.columns());
+  std::vector<double> along_m{0.0};
+  for (std::size_t i = 0; i < eight.size(); ++i) {
+    crossing.append(eight[i], room.line(eight[i]));
+    if (i > 0) {
+      along_m.push_back(along_m.back() + distance(eight[i - 1].position(), eight[i].position()));
+    }
+  }
+  RouteTracker tracker(crossing);
+  for (const double lateral_m : {0.0, 0.15, -0.15}) {
+    tracker.reset();
+    Pose2 robot;
+    for (std::size_t i = 2; i + 2 < eight.size(); ++i) {
+      const Pose2 next = eight[i] * Pose2{0.0, lateral_m, 0.1};
+      const auto fix = tracker.track(room.line(next), i == 2 ? Pose2{} : inverse(robot) * next);
+      robot = next;
+      if (!fix) continue;
+      EXPECT_NEAR(fix->along_m, along_m[i], 0.25) << i << ", lateral " << lateral_m;
+      EXPECT_NEAR(fix->lateral_m, lateral_m, 0.1) << i;
+    }
+  }
+}
+
 TEST_F(RouteTracking, RecoversWhenThePredictionIsOff) {
   Random random(8);
   int right = 0;

@@ -196,7 +196,15 @@ void RouteTracker::learn_model_errors(const TestRoute& test) {
 }
 
 RouteFix RouteTracker::add_route_position(RouteFix fix, RouteFix::Origin origin) const {
-  const RoutePosition position = project_onto_route(lines_.poses(), fix.pose.position());
+  RoutePosition position = project_onto_route(lines_.poses(), fix.pose.position());
+  if (along_m_ && origin != RouteFix::Origin::search) {
+    // Where the route crosses itself or returns beside itself, the robot stays on its pass.
+    const double reach_m = std::abs(position.lateral_m) + options_.recovery_m * metre_;
+    for (const RoutePosition& pass : find_passes(lines_.poses(), fix.pose.position(), reach_m)) {
+      if (std::abs(pass.along_m - *along_m_) < std::abs(position.along_m - *along_m_))
+        position = pass;
+    }
+  }
   fix.origin = origin;
   fix.covariance[0] += model_variance_m2_;
   fix.covariance[4] += model_variance_m2_;
@@ -311,6 +319,7 @@ std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const P
   }
   if (found) {
     pose_ = found->pose;
+    along_m_ = found->along_m;
     unconfirmed_.reset();
     is_followed_ = true;
   }

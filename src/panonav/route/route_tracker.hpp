@@ -55,12 +55,14 @@ class RouteTracker {
   /// Forgets where the robot is.
   void reset() noexcept {
     pose_.reset();
+    along_m_.reset();
     unconfirmed_.reset();
     is_followed_ = false;
   }
   /// Sets the pose by another source.
   void set_pose(const Pose2& pose) noexcept {
     pose_ = pose;
+    along_m_.reset();
     unconfirmed_.reset();
     is_followed_ = false;
   }
@@ -96,6 +98,7 @@ class RouteTracker {
   double model_variance_m2_ = 0.0;    // of x and of y, beyond the noise of the lines
   double model_variance_rad2_ = 0.0;  // of the heading, likewise
   std::optional<Pose2> pose_;
+  std::optional<double> along_m_;     // of the latest fix; its pass is kept at crossings
   std::optional<Pose2> unconfirmed_;  // unexpected pose by the last line
   bool is_followed_ = false;          // a line has located the robot
 };
