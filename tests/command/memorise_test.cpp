@@ -215,13 +215,13 @@ TEST_F(Memorise, NamesWhatOfAFolderItLeavesOutAndTakesFoldersWithinWhenAsked) {
   write_text(folder / "notes.txt", "mine");
   const auto flat = run_panonav({"memorise", memory(), folder, "--kind", "panorama"});
   ASSERT_EQ(flat.exit_code, 0) << flat.err;
-  EXPECT_TRUE(contains(flat.err, "left out, no PNG or JPEG: notes.txt\n"));
+  EXPECT_TRUE(contains(flat.err, "left out, no image: notes.txt\n"));
   EXPECT_TRUE(contains(flat.err, "left out, folders within: evening/\n"));
   EXPECT_EQ(views_in(memory()), 2);
   const auto deep =
       run_panonav({"memorise", memory(), folder, "--kind", "panorama", "--recursive"});
   ASSERT_EQ(deep.exit_code, 0) << deep.err;
-  EXPECT_EQ(deep.err, "left out, no PNG or JPEG: notes.txt\n");
+  EXPECT_EQ(deep.err, "left out, no image: notes.txt\n");
   EXPECT_EQ(views_in(memory()), 3);
   const auto found = answers_of({"localise", memory(), folder / "evening", "--json"}, 0);
   EXPECT_EQ(found.size(), 1U);

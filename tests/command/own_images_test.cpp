@@ -78,6 +78,15 @@ TEST_F(OwnImages, RoutesSayWhichFrameTheirPosesHave) {
   EXPECT_FALSE(contains(on_map.out, "in the route's own frame")) << on_map.out;
 }
 
+TEST_F(OwnImages, AMergeWithACopyAddsNothing) {
+  memorise();
+  run_well({"copy", memory(), folder / "copy.panonav"});
+  const auto merged =
+      run_panonav({"merge", memory(), folder / "copy.panonav", "-o", folder / "both.panonav"});
+  EXPECT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_TRUE(contains(merged.out, "copy.panonav are in ")) << merged.out;
+}
+
 TEST_F(OwnImages, AMergeWithMetresNamesTheCommandThatScales) {
   memorise();
   const std::string metric = folder / "metric.panonav";

@@ -87,7 +87,7 @@ TEST_F(OpenInput, ADataSetDescribesItself) {
 TEST_F(OpenInput, PicturesLieAsTheCallerSays) {
   const Dataset flat = open_input(folder_ / "photos", {.default_source = panorama_});
   EXPECT_EQ(flat.entries.size(), 2U);
-  EXPECT_EQ(flat.warnings, (std::vector<std::string>{"left out, no PNG or JPEG: notes.txt",
+  EXPECT_EQ(flat.warnings, (std::vector<std::string>{"left out, no image: notes.txt",
                                                      "left out, folders within: evening/"}));
   const Dataset deep = open_input(folder_ / "photos", {.source = panorama_, .recursive = true});
   EXPECT_EQ(deep.entries.size(), 3U);

@@ -280,7 +280,7 @@ TEST_F(Video, FoldersOfWebPAreReadAsThoseOfPng) {
   EXPECT_EQ(read_picture(mixed.entries[0]), noise(0));
   EXPECT_EQ(read_picture(mixed.entries[5]), noise(3));
   ASSERT_FALSE(mixed.warnings.empty());
-  EXPECT_EQ(mixed.warnings[0], "left out, no PNG or JPEG: notes.txt");
+  EXPECT_EQ(mixed.warnings[0], "left out, no image: notes.txt");
   // A damaged one is taken out and named, of any kind, and in any position.
   const std::string whole = bytes_of(folder / "web" / "w1.webp");
   write_file(folder / "web" / "w1.webp", std::string_view(whole).substr(0, 40));

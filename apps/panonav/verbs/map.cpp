@@ -170,7 +170,7 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
   }
   session.print(session.bold(format_count(nodes, "place")) + " from " +
                 format_count(recording.entries.size(), "image") + ", " +
-                std::to_string(count_closures(run.map)) + " closures; " + format_fixed(step_ms, 2) +
+                format_count(count_closures(run.map), "closure") + "; " + format_fixed(step_ms, 2) +
                 " ms per image");
   print_components(sizes, session);
   print_unit(arguments, run, session);

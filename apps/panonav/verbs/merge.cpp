@@ -39,6 +39,10 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
                           {}, [&] { progress.advance(); });
   }();
   session.set_length_unit(read_length_unit(MemoryFile::open(arguments.memory, Access::read_only)));
+  const bool has_nothing_new =
+      merged.views == MemoryFile::open(arguments.first, Access::read_only).info().views;
+  const ExitCode exit_code =
+      merged.alignment || has_nothing_new ? ExitCode::done : ExitCode::no_answer;
   if (session.json()) {
     session.print(
         session.json_line(ordered_json{{"memory", arguments.memory},
@@ -48,9 +52,11 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
                                        {"alignment", to_json(merged.alignment)},
                                        {"connected_components", merged.connected_components},
                                        {"without_position", merged.without_position}}));
-    return merged.alignment ? ExitCode::done : ExitCode::no_answer;
+    return exit_code;
   }
-  if (merged.alignment) {
+  if (has_nothing_new) {
+    session.print("All views of " + arguments.second + " are in " + arguments.first + " already.");
+  } else if (merged.alignment) {
     const Pose2& pose = merged.alignment->first_from_second;
     session.print(
         session.bold("joined") + " by " + format_count(merged.alignment->places, "place") +
@@ -78,7 +84,7 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
                           : "") +
       ".");
   session.suggest({"panonav", "prune", arguments.memory, "--dry-run"}, "To list redundant views:");
-  return merged.alignment ? ExitCode::done : ExitCode::no_answer;
+  return exit_code;
 }
 
 Run declare_merge(Arguments& arguments) {

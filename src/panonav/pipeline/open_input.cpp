@@ -51,7 +51,7 @@ void add_warning_of_skipped_files(Dataset& opened) {
     const std::string count = names.size() > 1 ? " (" + std::to_string(names.size()) + ")" : "";
     opened.warnings.push_back("left out, " + why + count + ": " + join_names(names));
   };
-  warn(files, "no PNG or JPEG");
+  warn(files, "no image");
   warn(foreign, "WebP, HEIC or AVIF (convert them to PNG or JPEG)");
   warn(hidden, "hidden");
   warn(folders, "folders within");

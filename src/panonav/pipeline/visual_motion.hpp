@@ -25,8 +25,8 @@ inline constexpr std::size_t min_gap_scale_steps = 3;
 [[nodiscard]] OdometryNoise visual_odometry_noise();
 /// Makes visual odometry whose scale is calibrated by views of the memory with known positions.
 [[nodiscard]] VisualOdometry visual_odometry(const VisualMemory& memory);
-/// Describes the motion that was read from images: the number of steps that they show, and advice if
-/// these are fewer than half.
+/// Describes the motion that was read from images: the number of steps that they show, and advice
+/// if these are fewer than half.
 [[nodiscard]] std::string describe_visual_motion(const VisualOdometry& odometry);
 /// Sets the odometry of the entries that have none by `VisualOdometry`. Between entries with
 /// odometry, the motions forwards from the one before and backwards from the one after are
