@@ -195,7 +195,7 @@ def test_inputs_are_opened_as_by_the_command(office, tmp_path):
     (photos / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.warns(UserWarning) as warned:
         assert len(panonav.Dataset(photos, source)) == 1
-    assert [str(each.message) for each in warned] == ["left out, no PNG or JPEG: notes.txt",
+    assert [str(each.message) for each in warned] == ["left out, no image: notes.txt",
                                                       "left out, folders within: within/"]
     with pytest.warns(UserWarning, match="notes.txt"):
         assert len(panonav.Dataset(photos, source, recursive=True)) == 2

@@ -103,8 +103,8 @@ TEST_F(Heightmap, BitDepthAndFileFormatDoNotMatter) {
 
 TEST_F(Heightmap, OfOneLevelOrWithNegativeHeightIsAsInGazebo) {
   folder.write("black.png", make_grey_png_of_16_bits(2, 2, {0, 0, 0, 0}));
-  for (const Vector3& v : load("<uri>black.png</uri><size>4 4 10</size>").meshes[0].vertices)
-    EXPECT_EQ(v.z_m, 0.0);
+  const Scene flat = load("<uri>black.png</uri><size>4 4 10</size>");
+  for (const Vector3& v : flat.meshes[0].vertices) EXPECT_EQ(v.z_m, 0.0);
   folder.write("h.png", make_grey_png_of_16_bits(2, 2, {0, 0, 0, 9}));
   const Scene inverse = load("<uri>h.png</uri><size>4 4 -3</size>");
   for (const Vector3& v : inverse.meshes[0].vertices)
