@@ -440,7 +440,6 @@ void MonteCarloLocaliser::set_odometry_noise(const OdometryNoise& noise) {
   validate(noise);
   implementation_->odometry = noise;
 }
-
 void MonteCarloLocaliser::move(const Pose2& step) {
   require(is_finite(step), "step of the odometry", step.x_m, "numbers");
   auto& own = *implementation_;
@@ -450,17 +449,14 @@ void MonteCarloLocaliser::move(const Pose2& step) {
 }
 
 void MonteCarloLocaliser::spread(double deviation_m, double heading_deviation_rad) {
-  require(std::isfinite(deviation_m) && deviation_m >= 0.0, "deviation_m", deviation_m, ">= 0");
-  require(std::isfinite(heading_deviation_rad) && heading_deviation_rad >= 0.0,
-          "heading_deviation_rad", heading_deviation_rad, ">= 0");
   auto& own = *implementation_;
   own.travelled_m += deviation_m;
-  Particles& particles = own.particles;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    const double x = own.random.normal(particles.x_m[i], deviation_m);
-    const double y = own.random.normal(particles.y_m[i], deviation_m);
-    const double heading = own.random.normal(particles.heading_rad[i], heading_deviation_rad);
-    particles.set(i, {x, y, wrap_angle(heading)}, particles.weight[i]);
+  for (std::size_t i = 0; i < own.particles.size(); ++i) {
+    const Pose2 at = own.particles.pose(i);
+    const double x = own.random.normal(at.x_m, deviation_m);
+    const double y = own.random.normal(at.y_m, deviation_m);
+    const double heading = own.random.normal(at.heading_rad, heading_deviation_rad);
+    own.particles.set(i, {x, y, wrap_angle(heading)}, own.particles.weight[i]);
   }
 }
 
@@ -494,11 +490,9 @@ MonteCarloEstimate MonteCarloLocaliser::estimate() const {
   implementation_->fill_estimate(estimate, implementation_->modes());
   return estimate;
 }
-
 const Particles& MonteCarloLocaliser::particles() const noexcept {
   return implementation_->particles;
 }
-
 const ObservationModel& MonteCarloLocaliser::model() const noexcept {
   return implementation_->model;
 }
