@@ -23,20 +23,6 @@ HeadingWindow heading_window(double middle_rad, double half_width_rad) {
 
 constexpr ElevationBand band{-0.6, 0.6};
 
-// Texture on a cylinder of radius 1 m around the place of the home view.
-ToyWorld random_surroundings(std::uint64_t seed, double height_rate = 0.0) {
-  Random random(seed);
-  std::vector<CylinderWave> waves;
-  for (int k = 1; k <= 12; ++k) {
-    for (int i = 0; i < 2; ++i) {
-      waves.push_back({k, random.uniform(-height_rate, height_rate),
-                       0.3 / k * random.uniform(0.5, 1.0),
-                       random.uniform(-std::numbers::pi, std::numbers::pi)});
-    }
-  }
-  return waved_cylinder(1.0, std::move(waves));
-}
-
 // The view from (x, y) of a robot with this heading.
 Panorama seen_from(const ToyWorld& around, double x, double y, double heading, int rows) {
   return around.panorama({x, y, heading}, rows, 256, rows > 1 ? std::optional(band) : std::nullopt);

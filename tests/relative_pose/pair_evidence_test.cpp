@@ -23,20 +23,6 @@ HomingView encode_view(const Panorama& panorama) {
   return homing_view(compute_signature(panorama, 16));
 }
 
-// The wall of a round room of radius 1 m.
-ToyWorld round_wall(std::uint64_t seed, double height_rate) {
-  Random random(seed);
-  std::vector<CylinderWave> waves;
-  for (int k = 1; k <= 12; ++k) {
-    for (int i = 0; i < 2; ++i) {
-      waves.push_back({k, random.uniform(-height_rate, height_rate),
-                       0.3 / k * random.uniform(0.5, 1.0),
-                       random.uniform(-std::numbers::pi, std::numbers::pi)});
-    }
-  }
-  return waved_cylinder(1.0, std::move(waves));
-}
-
 HomingView view_from(const ToyWorld& world, const Pose2& pose) {
   return encode_view(world.panorama(pose, 24, 256, evidence_band));
 }
@@ -46,7 +32,7 @@ HomingView view_from(const ToyWorld& world, const Pose2& pose) {
 Panorama picture_of_nothing(int kind, std::uint64_t seed) {
   Random random(seed, static_cast<std::uint64_t>(kind));
   if (kind >= 4)
-    return round_wall(seed, kind == 4 ? 0.0 : 3.0).panorama({}, 24, 256, evidence_band);
+    return random_surroundings(seed, kind == 4 ? 0.0 : 3.0).panorama({}, 24, 256, evidence_band);
   Panorama panorama = random_panorama(random, 24, 96, evidence_band);
   const int along = kind % 2 == 1 ? 12 : 1;
   const int down = kind >= 2 ? 8 : 1;
@@ -84,7 +70,7 @@ HomingView add_noise(const HomingView& view, double share, std::uint64_t seed) {
 }
 
 TEST(PairEvidence, HoldsTheHomeVectorWithinItsDeviations) {
-  const ToyWorld world = round_wall(4, 2.0);
+  const ToyWorld world = random_surroundings(4, 2.0);
   const HomingView home = view_from(world, {0.0, 0.0, 0.4});
   const HomingView current = view_from(world, {0.15, 0.1, 1.5});
   const auto evidence = compute_pair_evidence(home, current);
@@ -118,7 +104,7 @@ TEST(PairEvidence, ARoomThatNearlyRepeatsAfterHalfATurnHasASecondTurn) {
 }
 
 TEST(PairEvidence, AWindowAroundAWrongTurnLeavesTheRightOneAsTheSecond) {
-  const ToyWorld world = round_wall(4, 2.0);
+  const ToyWorld world = random_surroundings(4, 2.0);
   const HomingView home = view_from(world, {0.0, 0.0, 0.4});
   const HomingView current = view_from(world, {0.15, 0.1, 1.5});
   const double right_rad = home_vector(home, current).heading_rad;
@@ -174,7 +160,7 @@ TEST(PairEvidence, ViewsOfOnePlaceAreKnownWhicheverWayTheRobotFaces) {
   int known = 0;
   int queries = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const ToyWorld around = round_wall(seed, 2.0);
+    const ToyWorld around = random_surroundings(seed, 2.0);
     const HomingView home = view_from(around, {});
     for (const double far : {0.0, 0.1, 0.2}) {
       const double towards = static_cast<double>(seed);
@@ -201,7 +187,7 @@ TEST(PairEvidence, TheProbabilityFallsWithNoise) {
     double sum = 0.0;
     constexpr int rooms = 10;
     for (std::uint64_t seed = 1; seed <= rooms; ++seed) {
-      const ToyWorld around = round_wall(seed, 2.0);
+      const ToyWorld around = random_surroundings(seed, 2.0);
       const PairFeatures features = compute_pair_features(
           view_from(around, {}), add_noise(view_from(around, {0.15, 0.1, 1.0}), share, seed));
       const double probability = features.direction_probability();

@@ -486,4 +486,19 @@ class Room : public ToyWorld {
   Point2 size_;
 };
 
+/// Returns texture on a cylinder of radius 1 m around the origin, which varies with height at up to
+/// `height_rate`.
+inline ToyWorld random_surroundings(std::uint64_t seed, double height_rate = 0.0) {
+  Random random(seed);
+  std::vector<CylinderWave> waves;
+  for (int k = 1; k <= 12; ++k) {
+    for (int i = 0; i < 2; ++i) {
+      waves.push_back({k, random.uniform(-height_rate, height_rate),
+                       0.3 / k * random.uniform(0.5, 1.0),
+                       random.uniform(-std::numbers::pi, std::numbers::pi)});
+    }
+  }
+  return waved_cylinder(1.0, std::move(waves));
+}
+
 }  // namespace panonav::testing
