@@ -1,8 +1,7 @@
 #pragma once
 
 // The world of all tests: walls, pillars and glowing posts between a floor and a ceiling, seen by
-// casting one ray per pixel. It knows nothing of the library's renderer, so that tests of what
-// robots see need none.
+// casting one ray per pixel. It needs no renderer, so that tests of what robots see need none.
 
 #include <algorithm>
 #include <array>
@@ -486,17 +485,14 @@ class Room : public ToyWorld {
   Point2 size_;
 };
 
-/// Returns texture on a cylinder of radius 1 m around the origin, which varies with height at up to
-/// `height_rate`.
+/// Returns random texture on a cylinder of radius 1 m; `height_rate`: largest change with height.
 inline ToyWorld random_surroundings(std::uint64_t seed, double height_rate = 0.0) {
   Random random(seed);
   std::vector<CylinderWave> waves;
-  for (int k = 1; k <= 12; ++k) {
-    for (int i = 0; i < 2; ++i) {
-      waves.push_back({k, random.uniform(-height_rate, height_rate),
-                       0.3 / k * random.uniform(0.5, 1.0),
-                       random.uniform(-std::numbers::pi, std::numbers::pi)});
-    }
+  for (int i = 2; i < 26; ++i) {  // two waves of each of 12 frequencies
+    const double rate = random.uniform(-height_rate, height_rate);
+    const double amplitude = 0.3 / (i / 2) * random.uniform(0.5, 1.0);
+    waves.push_back({i / 2, rate, amplitude, random.uniform(-std::numbers::pi, std::numbers::pi)});
   }
   return waved_cylinder(1.0, std::move(waves));
 }
