@@ -144,6 +144,33 @@ TEST_F(Memorising, KnowsWherePathsBegin) {
       Names({"5.png", "5b.png", "7.png", "8.png", "w.mp4@1", "v.mp4@1", "x/1"}));
 }
 
+TEST_F(Memorising, AnImageAloneContinuesThePath) {
+  const auto memorise = [&](const std::vector<std::string>& names, int first) {
+    Memoriser memoriser(path(), options());
+    for (const std::string& name : names) {
+      Observation observation = seen_at(first++);
+      observation.name = name;
+      observation.pose.reset();
+      memoriser.add(std::move(observation));
+    }
+    memoriser.finish();
+    const MemoryFile file = MemoryFile::open(path(), Access::read_only);
+    std::vector<std::string> starts;
+    const VisualMemory views = file.load();
+    for (const ViewId start : read_path_starts(file)) starts.push_back(views.info(start).name);
+    return starts;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(memorise({"a.png"}, 1), Names());
+  EXPECT_EQ(memorise({"b.png"}, 2), Names());
+  EXPECT_EQ(memorise({"c.png"}, 3), Names());
+  EXPECT_EQ(memorise({"c.png", "d.png"}, 3), Names());
+  // Images that are added to one Memoriser are a walk, also if they come one by one.
+  EXPECT_EQ(memorise({"e.png", "f.png"}, 20), Names({"e.png"}));
+  EXPECT_EQ(memorise({"g.png"}, 22), Names({"e.png"}));
+  EXPECT_EQ(memorise({"w.mp4@1"}, 23), Names({"e.png", "w.mp4@1"})) << "another video";
+}
+
 TEST_F(Memorising, MakesNoFileOfWhatItCannotCompare) {
   EXPECT_THROW(Memoriser{path()}, ContractError);  // how do pictures lie?
   Memoriser nothing(path(), options());

@@ -231,6 +231,34 @@ TEST_F(MemoryMaps, APathDoesNotFollowTheLastViewOfThePathBefore) {
   }
 }
 
+// Images in no order that were added to a walk: each is placed by the views around it.
+TEST_F(MemoryMaps, ViewsInNoOrderJoinTheWalkBesideWhichTheyWereTaken) {
+  const auto walk = rounds(60);
+  for (const bool is_same_room : {true, false}) {
+    SCOPED_TRACE(is_same_room);
+    MemoryFile memory = make_walk(walk);
+    std::vector<Pose2> all = walk;
+    const ToyWorld other = round_room(radius_m, 77);
+    for (int i = 0; i < 12; ++i) {
+      const Pose2& near = walk[static_cast<std::size_t>(i * 25 % 60)];
+      all.push_back({0.97 * near.x_m, 0.97 * near.y_m, wrap_angle(1.7 * i)});
+      append(memory, round_room_signature(is_same_room ? world : other, all.back()));
+    }
+    add_path_starts(memory, std::array{memory.views()[60]});
+    const auto map = map_views(memory, {}, executor);
+    ASSERT_TRUE(map);
+    if (!is_same_room) {
+      EXPECT_EQ(map->part_sizes.front(), 60U) << "the room looks otherwise";
+      continue;
+    }
+    ASSERT_EQ(map->part_sizes, std::vector<std::size_t>{72});
+    const auto found = positions(memory);
+    std::vector<Point2> truth;
+    for (const Pose2& pose : all) truth.push_back(pose.position());
+    EXPECT_LT(shape_difference(found, truth).value, 0.01);
+  }
+}
+
 TEST_F(MemoryMaps, PartsWithoutConnectionAreBesideEachOther) {
   const auto truth = rounds(60);
   MemoryFile memory = make_memory();

@@ -9,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/internal/loop_closure_finder.hpp"
+#include "panonav/mapping/internal/visual_scale.hpp"
 
 namespace panonav {
 
@@ -77,26 +78,6 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
     }
   }
   return matches;
-}
-
-/// Estimates the metric scale of visual displacements from the first edges of a map; nullopt if no
-/// edge has a visual step. Cost: 0.3 ms per edge.
-std::optional<double> estimate_visual_scale_m(const VisualMemory& memory,
-                                              const TopologicalMap& map) {
-  constexpr std::size_t max_edges = 200;  // the median of 200 ratios errs by a few percent
-  const auto pose_of = [&](ViewId view) {
-    return std::ranges::lower_bound(map.nodes, view, {}, &TopologicalMap::Node::view)->pose;
-  };
-  std::vector<KnownLength> lengths;
-  for (std::size_t i = 0; i < std::min(max_edges, map.edges.size()); ++i) {
-    const TopologicalMap::Edge& edge = map.edges[i];
-    const auto step =
-        visual_step(OdometryView(memory.signature(edge.a)), OdometryView(memory.signature(edge.b)));
-    if (!step) continue;
-    lengths.push_back(
-        {step->length_in_views, translation_m(inverse(pose_of(edge.a)) * pose_of(edge.b))});
-  }
-  return length_scale_m(lengths);
 }
 
 /// The matches of two sessions, each with the relative pose of the maps that it proposes.

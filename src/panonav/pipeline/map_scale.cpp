@@ -109,6 +109,12 @@ std::optional<double> compare_lengths(const TopologicalMap& known, const Topolog
 GroundScale measure_ground_scale(const MemoryFile& memory, double camera_height_m,
                                  const std::function<void(std::size_t)>& compared) {
   require_known_elevations(memory.header().source, memory.path().string());
+  if (!memory.header().elevations) {
+    throw FileError(memory.path().string(),
+                    "has images whose rows have unknown elevations, so the ground cannot be found; "
+                    "scale the map by a known distance (panonav scale, the option 'distance')");
+  }
+  require_positions_from_map(memory);
   GroundLengths ground(camera_height_m);
   const VisualMemory views = memory.load();
   const auto pairs = select_pairs(memory.map(map_name).value_or(TopologicalMap{}));

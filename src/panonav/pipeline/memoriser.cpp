@@ -211,13 +211,22 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
   append(unknown, path_starts);
 }
 
-// Stores new views and which of them begin a path.
+// Stores new views and which of them begin a path. An image that is the only one of its input
+// continues the path of the memory, so its start is stored only with the next image.
 void Memoriser::append(std::vector<NewView>& views, std::vector<std::size_t>& path_starts) {
   if (views.empty()) return;
+  const std::vector<std::string> stored = file_->names();
+  const bool is_alone = counts_.appended + views.size() == 1 && !has_recalled_ && !stored.empty() &&
+                        get_path_name(stored.back()) == get_path_name(views.front().info.name);
   file_->change([&] {
     const std::vector<ViewId> ids = file_->append(views);
     std::vector<ViewId> starts;
+    if (const auto start = std::exchange(lone_start_, std::nullopt)) starts.push_back(*start);
     for (const std::size_t start : path_starts) starts.push_back(ids[start]);
+    if (is_alone && !starts.empty()) {
+      lone_start_ = starts.back();
+      starts.clear();
+    }
     add_path_starts(*file_, starts);
   });
   counts_.appended += views.size();
@@ -270,6 +279,7 @@ void Memoriser::recall(const std::string& name, const std::optional<Pose2>& odom
         is_renamed ? file_->load(std::array{*known}).info(*known).name : name, *odometry);
   }
   if (!known) return;
+  has_recalled_ = true;
   before_ = name;
   known_before_ = known;
 }

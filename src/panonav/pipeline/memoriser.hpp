@@ -60,7 +60,9 @@ struct MemoriserOptions {
 /// threads. One thread at a time.
 ///
 /// A new view continues a path if the observation before it is the last view of the memory and
-/// their names show no other video or folder; otherwise it begins a path (`read_path_starts`).
+/// their names show no other video or folder; otherwise it begins a path (`read_path_starts`). The
+/// only observation of a `Memoriser` continues that of the last view, so that images can also be
+/// added one at a time.
 class Memoriser {
  public:
   /// Number of observations from which the full scale of a new memory is computed.
@@ -127,6 +129,8 @@ class Memoriser {
   std::map<std::string, ViewId> renamed_;  // by the name of the observation
   std::optional<std::string> before_;      // name of the observation before
   std::optional<ViewId> known_before_;     // its view; nullopt: it is new
+  bool has_recalled_ = false;              // an observation was in the file
+  std::optional<ViewId> lone_start_;       // the only view so far, where a path may begin
 };
 
 }  // namespace panonav

@@ -14,6 +14,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/nearest_points.hpp"
 #include "panonav/localisation/observation_model.hpp"
+#include "panonav/mapping/component_joining.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/mapping/topological_mapper.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
@@ -27,7 +28,6 @@ namespace {
 constexpr const char* unit_parameter = "map_unit";
 constexpr const char* scale_parameter = "map_scale";  // `read_map_scale`; empty: unknown
 constexpr const char* own_unit_parameter = "own_map_unit";
-constexpr const char* path_starts_parameter = "path_starts";
 constexpr const char* metres_text = "metres";
 constexpr const char* view_steps_text = "view_steps";  // followed by the assumed metres of a step
 /// Distance between components that have no common frame, in median steps. It exceeds the distance
@@ -140,9 +140,35 @@ struct OrderedMap {
   double assumed_unit_m = 1.0;  ///< of lengths that are not metric
 };
 
+/// Returns the views of paths beside others that are in no order, so that no step leads from one to
+/// the next. Odometry says what the order is.
+std::vector<ViewId> find_unordered_views(const MemoryFile& file, const VisualMemory& views,
+                                         const std::map<std::string, Pose2>& odometry) {
+  std::vector<ViewId> unordered;
+  const std::vector<ViewId> starts = read_path_starts(file);
+  const auto ids = views.views();
+  for (auto begin = ids.begin(); !starts.empty() && begin != ids.end();) {
+    const auto next_start = std::ranges::upper_bound(starts, *begin);
+    const auto end =
+        next_start == starts.end() ? ids.end() : std::lower_bound(begin, ids.end(), *next_start);
+    VisualMemory path(views.shape(), views.full_scale(), views.elevations());
+    bool has_odometry = false;
+    for (auto view = begin; view != end; ++view) {
+      path.append_with_id(*view, views.packed(*view), views.info(*view));
+      has_odometry = has_odometry || odometry.contains(views.info(*view).name);
+    }
+    if (path.size() >= min_positioned_views && !has_odometry && !are_in_order(path)) {
+      unordered.insert(unordered.end(), begin, end);
+    }
+    begin = end;
+  }
+  return unordered;
+}
+
+/// Makes a map of the views in the order of their ids. `unordered`: views to which no step leads.
 OrderedMap map_in_order(const MemoryFile& file, const VisualMemory& views,
                         const std::map<std::string, Pose2>& odometry,
-                        const std::function<void()>& mapped) {
+                        std::span<const ViewId> unordered, const std::function<void()>& mapped) {
   const auto metric_steps = read_metric_steps(file);
   VisualMemory nodes(views.shape(), views.full_scale(), views.elevations());
   TopologicalMapper mapper(nodes);
@@ -154,7 +180,9 @@ OrderedMap map_in_order(const MemoryFile& file, const VisualMemory& views,
   for (const ViewId view : views.views()) {
     const ReferenceInfo& info = views.info(view);
     const auto later_start = std::upper_bound(next_start, path_starts.end(), view);
-    if (std::exchange(next_start, later_start) != later_start && before) {
+    const bool begins_path = std::exchange(next_start, later_start) != later_start ||
+                             std::ranges::binary_search(unordered, view);
+    if (begins_path && before) {
       // Another path begins anywhere, and so does its odometry.
       mapper.begin_path();
       before.reset();
@@ -212,70 +240,6 @@ void store_poses(MemoryFile& memory, const TopologicalMap& map) {
 }
 
 }  // namespace
-
-bool are_in_order(const VisualMemory& views) {
-  constexpr std::size_t max_tested = 200;
-  const auto ids = views.views();
-  if (ids.size() < 3) return false;
-  const std::size_t steps = ids.size() - 1;
-  const std::size_t every = (steps + max_tested - 1) / max_tested;
-  const std::size_t top = std::max<std::size_t>(1, ids.size() / 10);
-  std::size_t tested = 0;
-  std::size_t similar = 0;
-  double gain = 0.0;
-  double largest_gain = 0.0;
-  double rank = 0.0;  // mean of the ranks of the next views, 0 .. 1
-  for (std::size_t i = 0; i < steps; i += every) {
-    const std::array self{ids[i]};
-    const auto others = views
-                            .search(views.packed(ids[i]), {.top = static_cast<int>(steps)},
-                                    {.excluded_views = self})
-                            .matches;
-    const auto next = std::ranges::find(others, ids[i + 1], &Match::view);
-    ++tested;
-    const auto before = static_cast<std::size_t>(next - others.begin());
-    similar += before < top ? 1 : 0;
-    rank += static_cast<double>(before) / static_cast<double>(others.size() - 1);
-    double sum = 0.0;
-    for (const Match& other : others) sum += other.dissimilarity;
-    const double average = sum / static_cast<double>(others.size());
-    gain += average - next->dissimilarity;
-    largest_gain += average - 0.5 * (others[0].dissimilarity + others[1].dissimilarity);
-  }
-  const double chance = static_cast<double>(top) / static_cast<double>(steps);
-  const double by_chance = static_cast<double>(tested) * chance;
-  const bool is_significant =
-      static_cast<double>(similar) > by_chance + 3.0 * std::sqrt(by_chance * (1.0 - chance));
-  // A random step has a rank of 0.5 on average, so at most two of five steps are random.
-  constexpr double max_rank = 0.2;
-  return is_significant &&
-         (2.0 * gain >= largest_gain || rank <= max_rank * static_cast<double>(tested));
-}
-
-std::vector<ViewId> read_path_starts(const MemoryFile& memory) {
-  const std::string text = memory.parameter(path_starts_parameter).value_or("");
-  std::vector<ViewId> starts;
-  for (const std::string& word : split_words(text)) {
-    ViewId start;
-    if (!read_number(word, start.value) || (!starts.empty() && start <= starts.back())) {
-      throw FileError(memory.path().string(), std::string("parameter ") + path_starts_parameter +
-                                                  " has '" + to_readable_line(word) +
-                                                  "'; allowed: ascending ids of views");
-    }
-    starts.push_back(start);
-  }
-  return starts;
-}
-
-void add_path_starts(MemoryFile& memory, std::span<const ViewId> starts) {
-  if (starts.empty()) return;
-  const std::vector<ViewId> before = read_path_starts(memory);
-  std::set<ViewId> all(before.begin(), before.end());
-  all.insert(starts.begin(), starts.end());
-  std::string text;
-  for (const ViewId start : all) text += (text.empty() ? "" : " ") + std::to_string(start.value);
-  memory.set_parameter(path_starts_parameter, text);
-}
 
 const char* to_string(LengthUnit unit) noexcept {
   return unit == LengthUnit::metres ? "m" : "view steps";
@@ -451,10 +415,21 @@ std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::strin
       (!has_positions_from_map(memory) && std::ranges::any_of(views.views(), has_pose))) {
     return std::nullopt;
   }
-  OrderedMap ordered = map_in_order(memory, views, odometry, mapped);
-  if (!ordered.is_metric && !are_in_order(views)) {
+  OrderedMap ordered = map_in_order(memory, views, odometry, {}, mapped);
+  const auto count_largest = [](const TopologicalMap& map) {
+    return std::ranges::max(count_nodes(map));
+  };
+  if (ordered.is_metric || are_in_order(views)) {
+    join_small_components(ordered.map, views, min_positioned_views - 1);
+    const auto unordered = find_unordered_views(memory, views, odometry);
+    if (!unordered.empty()) {
+      OrderedMap partly = map_in_order(memory, views, odometry, unordered, {});
+      join_small_components(partly.map, views, min_positioned_views - 1);
+      if (count_largest(partly.map) > count_largest(ordered.map)) ordered = std::move(partly);
+    }
+  } else {
     TopologicalMap arranged = to_topological_map(arrange(views, {}, {}, executor));
-    if (std::ranges::max(count_nodes(arranged)) > std::ranges::max(count_nodes(ordered.map))) {
+    if (count_largest(arranged) > count_largest(ordered.map)) {
       ordered.map = std::move(arranged);
       ordered.assumed_unit_m = assumed_spacing_m;
     }

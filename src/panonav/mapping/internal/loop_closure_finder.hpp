@@ -52,18 +52,23 @@ class LoopClosureFinder {
                                               const OdometryView& view, double scale_m,
                                               const IsPossible& is_possible);
 
+  /// Returns the closure of two nodes if home vectors in both directions and the compass agree on
+  /// it; nullopt otherwise. Cost: 0.6 ms.
+  [[nodiscard]] std::optional<LoopClosure> verify_closure(std::size_t earlier, std::size_t later,
+                                                          const OdometryView& earlier_view,
+                                                          const OdometryView& later_view) const;
+  /// True if two closures agree with the motion between their nodes: along the path of the later
+  /// nodes, and along that of the earlier ones.
+  [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
+                           std::span<const Pose2> poses) const;
+
  private:
   [[nodiscard]] std::optional<LoopClosure> find_best_closure(std::span<const PathNode> nodes,
                                                              std::span<const Pose2> poses,
                                                              const OdometryView& view,
                                                              const IsPossible& is_possible) const;
-  [[nodiscard]] std::optional<LoopClosure> verify_closure(std::size_t earlier, std::size_t later,
-                                                          const OdometryView& earlier_view,
-                                                          const OdometryView& later_view) const;
   [[nodiscard]] bool is_reciprocal(std::span<const PathNode> nodes, std::span<const Pose2> poses,
                                    const LoopClosure& closure) const;
-  [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
-                           std::span<const Pose2> poses) const;
   /// Returns the views that are no candidates for a closure with the node.
   [[nodiscard]] std::vector<ViewId> find_excluded_views(std::span<const PathNode> nodes,
                                                         std::size_t node) const;
