@@ -2,6 +2,7 @@
 
 #include "bindings.hpp"
 #include "memories.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/map_scale.hpp"
 #include "panonav/pipeline/memory_map.hpp"
@@ -258,6 +259,11 @@ void bind_memory_file(py::module_& m) {
       .field("file_bytes", &MemoryFile::Info::file_bytes, "Size including the write-ahead log.")
       .field("format_version", &MemoryFile::Info::format_version,
              "Version of the file format, >= 1.");
+  Record<GroundScale>(m, "GroundScale", "Scale of a map, measured on the ground in its images.")
+      .field("unit_m", &GroundScale::unit_m, "Metres per former unit; None if it is uncertain.")
+      .field("measured", &GroundScale::measured, "Number of pairs of views that show the ground.")
+      .field("tried", &GroundScale::tried, "Number of pairs that were compared.")
+      .field("deviation", &GroundScale::deviation, "Relative standard deviation of `unit_m`.");
   Record<MemoryFile::Fault>(m, "MemoryFault", "A fault in a memory file.")
       .field("view", &MemoryFile::Fault::view, "Id of the view, or None.")
       .field("what", &MemoryFile::Fault::what, "Description in one line.");
@@ -321,6 +327,21 @@ void bind_memory_file(py::module_& m) {
           py::arg("first"), py::arg("second"), py::arg("distance_m"),
           "Makes metres of view steps by the known distance between two views of the map. Returns "
           "the metres per former unit.")
+      .def(
+          "scale_by_camera_height",
+          [](SharedFile& s, double camera_height_m) {
+            return s.change([&](MemoryFile& f) {
+              const GroundScale ground = measure_ground_scale(f, camera_height_m);
+              if (ground.unit_m) {
+                scale_to_metres(f, *ground.unit_m,
+                                "scale by a camera height of " + to_text(camera_height_m) + " m");
+              }
+              return ground;
+            });
+          },
+          py::arg("camera_height_m"),
+          "Makes metres of view steps by the height of the camera above level ground, like "
+          "`panonav scale --camera-height-m`. Changes nothing if `unit_m` of the result is None.")
       .def(
           "load",
           [](SharedFile& s) {

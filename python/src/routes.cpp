@@ -1,3 +1,6 @@
+#include <map>
+#include <string>
+
 #include "memories.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/memoriser.hpp"
@@ -129,8 +132,22 @@ void bind_following(py::module_& m) {
           .c_str());
 }
 
-RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesystem::path& memory,
-                                     RouteRecorderOptions options, int threads) {
+/// A recorded route, and what became of the images that are no line of it.
+struct RecordedRoute : RouteRecorder::Recorded {
+  bool length_estimated = false;
+  std::size_t without_pose = 0;
+  std::size_t unusable = 0;
+  /// Returns the numbers of images by reason, as `panonav route record --json` names them.
+  [[nodiscard]] std::map<std::string, std::size_t> left_out() const {
+    return {{"too_near", too_near},
+            {"known_before", known_before},
+            {"without_pose", without_pose},
+            {"unusable", unusable}};
+  }
+};
+
+RecordedRoute record_route(const Dataset& dataset, const std::filesystem::path& memory,
+                           RouteRecorderOptions options, int threads) {
   InterruptibleExecutor executor(threads);
   const bool memory_existed = memory_exists(memory);
   MemoryFile file =
@@ -144,7 +161,8 @@ RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesyst
   options.assumed_unit_m = drive.assumed_unit_m;
   options.is_in_map_unit = drive.is_in_map_unit;
   RouteRecorder recorder(std::move(file), dataset.source, options);
-  return recorder.record(drive.drive, drive.poses, executor);
+  return {recorder.record(drive.drive, drive.poses, executor), drive.is_scale_estimated,
+          dataset.entries.size() - drive.drive.entries.size(), dataset.unusable.size()};
 }
 
 void bind_recording(py::module_& m) {
@@ -172,13 +190,18 @@ void bind_recording(py::module_& m) {
         return "RoutePanorama(" + std::to_string(route.size()) + " lines, " +
                std::to_string(route.columns()) + " columns)";
       });
-  Record<RouteRecorder::Recorded>(m, "RecordedRoute", "A route as stored in a memory file.")
-      .field("route", &RouteRecorder::Recorded::route,
-             "All lines, including those of earlier drives.")
-      .field("appended", &RouteRecorder::Recorded::appended, "Number of new lines.")
-      .field("bytes", &RouteRecorder::Recorded::bytes, "Stored size of lines and poses.")
-      .field("bytes_per_km", &RouteRecorder::Recorded::bytes_per_km,
-             "Bytes per kilometre; 0 for a route of length 0.");
+  Record<RecordedRoute>(m, "RecordedRoute", "A route as stored in a memory file.")
+      .field("route", &RecordedRoute::route, "All lines, including those of earlier drives.")
+      .field("appended", &RecordedRoute::appended, "Number of new lines.")
+      .field("bytes", &RecordedRoute::bytes, "Stored size of lines and poses.")
+      .field("bytes_per_km", &RecordedRoute::bytes_per_km,
+             "Bytes per kilometre; 0 for a route of length 0.")
+      .field("length_estimated", &RecordedRoute::length_estimated,
+             "True if the unit was estimated from the memory's views; lengths may be wrong by a "
+             "factor.")
+      .field("left_out", &RecordedRoute::left_out,
+             "Numbers of images that became no line, by reason: too_near, known_before, "
+             "without_pose, unusable.");
   m.def(
       "record_route",
       [](const std::filesystem::path& memory, const py::object& recording, const std::string& name,

@@ -12,6 +12,12 @@ using World = std::shared_ptr<const simulation::SimulatedWorld>;
 
 /// Makes a world from the keyword arguments. The caller must read the options of a recording
 /// before.
+/// Warns in Python; throws if its filter makes errors of warnings. Needs no GIL.
+void warn(const std::string& warning) {
+  const py::gil_scoped_acquire held;
+  if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 World make_world(const std::string& scene, simulation::SimulatedWorldOptions options,
                  Keywords& parsed, int threads) {
   parsed.options(options.simulation)
@@ -33,7 +39,7 @@ World make_world(const std::string& scene, simulation::SimulatedWorldOptions opt
         const auto found = std::ranges::find(explicit_options, name);
         return found == explicit_options.end() ? std::nullopt : std::optional(*found);
       },
-      executor);
+      executor, warn);
 }
 
 simulation::SimulatedWorldOptions read_recording_options(Keywords& parsed) {
@@ -60,6 +66,8 @@ Dataset record(const simulation::SimulatedWorld& world, const std::filesystem::p
   }
   InterruptibleExecutor executor(threads);
   const auto poses = trajectory ? world.plan_along(trajectory->poses()) : world.plan();
+  const std::string impossible = trajectory ? world.describe_impossible_poses(poses) : "";
+  if (!impossible.empty()) warn("trajectory: " + impossible);
   const bool with_path =
       trajectory || world.options().recording.path != simulation::RecordingPath::random;
   return simulation::record_dataset(world, folder, poses, with_path, executor);
@@ -243,9 +251,11 @@ void bind_worlds(py::module_& m) {
       },
       py::arg("scene"), py::arg("folder"), py::kw_only(), py::arg("mirror") = py::none(),
       py::arg("trajectory") = py::none(), py::arg("threads") = 0,
-      append_option_list("Renders a data set of a simulated robot, like `panonav simulate`: "
-                         "SimulatedWorld(scene).record(folder).",
-                         recording_option_list)
+      append_option_list(
+          "Renders a data set of a simulated robot, like `panonav simulate`: "
+          "SimulatedWorld(scene).record(folder). Warns (UserWarning) of what a scene "
+          "file lacks, and of poses at which the robot cannot be.",
+          recording_option_list)
           .c_str());
   py::tuple names(simulation::scene_names().size());
   for (std::size_t i = 0; i < simulation::scene_names().size(); ++i)

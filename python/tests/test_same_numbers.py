@@ -1,4 +1,5 @@
 """Every number of the command comes through Python to the bit."""
+import math
 import os
 import shutil
 import signal
@@ -346,6 +347,7 @@ def same_route(recording, folder, every_m):
     printed = command_json("route", "record", folder / "theirs.panonav", recording, "--every-m", every_m)[0]
     assert (len(ours.route), ours.appended, ours.bytes, ours.bytes_per_km, ours.route.length_m) == tuple(
         printed[key] for key in ("lines", "appended", "bytes", "bytes_per_km", "length_m"))
+    assert (ours.length_estimated, ours.left_out) == (printed["length_estimated"], printed["left_out"])
     assert numpy.array_equal(panonav.read_route(panonav.MemoryFile(folder / "theirs.panonav")).lines(),
                              ours.route.lines())
     steps = panonav.follow_route(memory, recording)
@@ -353,6 +355,24 @@ def same_route(recording, folder, every_m):
     assert [step_as_printed(step) for step in steps] == [
         {key: value for key, value in line.items() if key not in ("stamp_s", "ground_truth")} for line in followed]
     assert any(step.on_route for step in steps)
+
+
+def test_scale_by_camera_height(tmp_path):
+    drive = panonav.simulate("office", tmp_path / "drive", path="tour", spacing_m=0.3, kind="panorama", heading="path")
+    (tmp_path / "walk").mkdir()
+    for entry in drive:
+        shutil.copy(tmp_path / "drive" / entry.name, tmp_path / "walk")
+    band = math.radians(-30), math.radians(40)
+    panonav.memorise(tmp_path / "a.panonav", tmp_path / "walk", panonav.PictureSource("panorama", elevations=band))
+    shutil.copy(tmp_path / "a.panonav", tmp_path / "b.panonav")
+    ours = panonav.MemoryFile(tmp_path / "a.panonav", write=True)
+    scale = ours.scale_by_camera_height(0.6)
+    printed = command_json("scale", tmp_path / "b.panonav", "--camera-height-m", 0.6)[0]
+    assert scale.unit_m == printed["factor"] and abs(scale.unit_m - 0.3) < 0.02
+    assert {key: value for key, value in scale.to_dict().items() if key != "unit_m"} == printed["ground"]
+    assert ours.length_unit == "m"
+    with pytest.raises(panonav.Error, match="allowed: > 0"):
+        ours.scale_by_camera_height(0)
 
 
 def test_route_office(office, tmp_path):

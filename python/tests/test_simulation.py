@@ -34,6 +34,11 @@ def test_simulate_writes_what_the_command_writes(office, tmp_path):
     same_files(tmp_path / "ours", tmp_path / "theirs")
 
 
+def test_impossible_poses_are_warned_of(tmp_path):
+    with pytest.warns(UserWarning, match="^trajectory: the robot cannot be at 1 of 2"):
+        panonav.simulate("office", tmp_path / "out", trajectory=[[0, 1, 1, 0], [1, 99, 99, 0]], **SMALL)
+
+
 def test_worlds(tmp_path):
     world = panonav.SimulatedWorld("office", **SMALL)
     pose = world.random_pose(4)
