@@ -85,6 +85,27 @@ TEST_F(ScaledMaps, UndoOfAScalingBeforeNewViewsSaysWhatToDo) {
   EXPECT_EQ(answer_of({"undo", memory(), "--json"})["unit"], "m");
 }
 
+// One factor holds for one part of the map only, and its user reads so.
+TEST_F(ScaledMaps, ScalingOfAMapInPartsSaysWhatItMeans) {
+  memorise();
+  const auto whole =
+      run_panonav({"scale", memory(), "--distance", view_name(0), view_name(25), "2m"});
+  EXPECT_FALSE(contains(whole.out, "not connected")) << whole.out;
+  const std::string other = folder / "other";
+  fs::create_directory(other);
+  for (std::size_t i = 0; i < 12; ++i) {
+    write_picture(other + "/z" + view_name(i), landmark_world(77),
+                  {0.08 * static_cast<double>(i) - 0.5, 0.3, 0.0});
+  }
+  run_well({"memorise", memory(), other, "--kind", "panorama", "--elevation-deg", "-20", "20"});
+  const std::vector<std::string> again{"scale",      memory(),      "--distance",
+                                       view_name(0), view_name(25), "3m"};
+  const auto parts = run_panonav(again);
+  EXPECT_TRUE(contains(parts.out, "parts that are not connected")) << parts.out;
+  EXPECT_TRUE(contains(parts.out, "may be wrong by a factor")) << parts.out;
+  EXPECT_EQ(answer_of(with(again, {"--json"}))["part_sizes"], json({count, 12}));
+}
+
 // Their map has no consecutive views, and a drive along it would jump.
 TEST_F(ScaledMaps, ImagesInNoOrderGetNoDriveUnnoticed) {
   const fs::path mixed = std::string(folder / "mixed");

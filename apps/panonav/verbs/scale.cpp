@@ -74,11 +74,13 @@ void print_result(const ScaleArguments& arguments, const MemoryFile& memory, dou
   const TopologicalMap map = memory.map(map_name).value();
   const auto step_m = compute_view_step(map);
   const auto routes = find_scaled_routes(memory);
+  const std::vector<std::size_t> parts = describe_map(memory).value().part_sizes;
   if (session.json()) {
     ordered_json json{{"memory", arguments.memory},
                       {"factor", factor},
                       {"view_step_m", to_json_or_null(step_m)},
                       {"routes", routes},
+                      {"part_sizes", parts},
                       {"ground", nullptr}};
     if (ground) {
       json["ground"] = {{"measured", ground->measured},
@@ -97,6 +99,14 @@ void print_result(const ScaleArguments& arguments, const MemoryFile& memory, dou
                   format_count(ground->tried, "pair") +
                   " of neighbouring views; standard deviation of the scale: " +
                   format_number(100.0 * ground->deviation, {}, 2) + " %.");
+  }
+  if (parts.size() > 1) {
+    session.print("The map has " +
+                  session.red(std::to_string(parts.size()) + " parts that are not connected") +
+                  ". All are scaled by " +
+                  (ground ? "the median over all parts" : "the distance in one part") +
+                  "; lengths in the others may be wrong by a factor, and distances between parts "
+                  "have no meaning.");
   }
   if (!routes.empty()) {
     std::string names;
@@ -170,7 +180,9 @@ Verb scale_verb() {
       "A map that was computed from images alone has no scale: its positions are in view steps, "
       "the median distance between consecutive views or, if the images are in no order, between a "
       "view and the nearest one. The known distance between two views, or "
-      "the height of the camera above the ground, makes them metres. Run the verb again to correct "
+      "the height of the camera above the ground, makes them metres. All parts of a map are scaled "
+      "by one factor, which may be wrong for parts that are not connected. Run the verb again to "
+      "correct "
       "the scale. Routes in the unit of the map are scaled, too; those recorded with odometry or "
       "positions are not. panonav undo reverts a scaling.",
       "  panonav scale walk.panonav --distance view_00003.png view_00027.png 3.2m\n"
