@@ -116,9 +116,9 @@ TEST_F(Arrange, TellsHowManyViewsTheLargestComponentHolds) {
   const auto largest = components[0]["views"].get<std::size_t>();
   EXPECT_LE(largest, own);
   const std::string out = run_panonav({"arrange", both}).out;
-  EXPECT_TRUE(contains(out, std::to_string(components.size()) + " connected components holds " +
-                                std::to_string(largest) + " of the " +
-                                std::to_string(poses.size()) + " views"))
+  EXPECT_TRUE(contains(out, std::to_string(components.size()) +
+                                " parts that are not connected holds " + std::to_string(largest) +
+                                " of the " + std::to_string(poses.size()) + " views"))
       << out;
   EXPECT_TRUE(contains(out, " over " + std::to_string(largest) + " views")) << out;
   EXPECT_TRUE(contains(out, "no path leads from one to another")) << out;

@@ -186,7 +186,8 @@ TEST_F(Home, BetweenPicturesOfNoiseThereIsNoAnswer) {
         run_panonav({"home", folder / "a.png", folder / "b.png", "--kind", "panorama"});
     EXPECT_EQ(text.exit_code, 1);
     EXPECT_TRUE(contains(text.out,
-                         "no answer: the views are not more similar than views of two buildings"));
+                         "no answer: the images have no more in common than those of unrelated "
+                         "places"));
     EXPECT_FALSE(contains(text.out, "probability"));
     PictureSource source;
     const HomingResult way =

@@ -288,6 +288,17 @@ TEST_F(OwnImages, TryNoticesImagesInNoOrder) {
   EXPECT_TRUE(contains(bytes_of(folder / "tried/index.html"), "Map of the images"));
 }
 
+TEST_F(OwnImages, ImagesMemorisedOneByOneAreOneWalk) {
+  json stored;
+  for (std::size_t i = 0; i < 12; ++i) {
+    stored = answer_of({"memorise", memory(), walk() / view_name(i), "--kind", "panorama",
+                        "--elevation-deg", "-20", "20", "--json"});
+  }
+  EXPECT_EQ(stored["map"]["part_sizes"], json({12})) << stored;
+  expect_refusal({"try", memory()}, "is a memory");
+  expect_refusal({"memorise", folder / "new.panonav", walk()}, "to find it out: panonav try ");
+}
+
 // "Record again" has a reason and what to do, also where images have positions.
 TEST_F(OwnImages, TrySaysWhyImagesAreNotRecognised) {
   const fs::path sparse = std::string(folder / "sparse");

@@ -101,9 +101,10 @@ viewer::MapAnimation LatticeSteps::make_animation(const Lattice& lattice,
     if (sizes.empty()) return;  // there is nothing to draw before the first views are joined
     const auto largest =
         std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; });
-    viewer::MapLayer spring_layer{.label = "springs", .colour = viewer::PlotColour::light_grey};
-    viewer::MapLayer views{.label = "largest group", .colour = viewer::PlotColour::blue};
-    viewer::MapLayer others{.label = "other groups", .colour = viewer::PlotColour::orange};
+    viewer::MapLayer spring_layer{.label = "pairs of similar views",
+                                  .colour = viewer::PlotColour::light_grey};
+    viewer::MapLayer views{.label = "largest part", .colour = viewer::PlotColour::blue};
+    viewer::MapLayer others{.label = "other parts", .colour = viewer::PlotColour::orange};
     for (const auto& [a, b] : springs) {
       if (!places[a] || !places[b] || components[a] != components[b]) continue;
       spring_layer.lines.push_back({*places[a], *places[b]});
@@ -161,7 +162,7 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
       "position, with its shape at that step.");
   page.add_plots(
       {{steps.make_animation(lattice, memory),
-        "Grey lines are springs: pairs of views with an estimated distance and direction"}});
+        "Grey lines are pairs of similar views with an estimated distance and direction"}});
   if (comparison) {
     page.begin_section("Comparison with the true positions");
     page.add_text(

@@ -26,7 +26,7 @@ std::string describe_rotation(double heading_rad) {
 }
 
 std::string explain_no_direction(const HomingResult& result) {
-  if (!result.evidence) return "the views are not more similar than views of two buildings";
+  if (!result.evidence) return "the images have no more in common than those of unrelated places";
   // Correlation from which on each view explains more than half of the other's variance; chosen.
   constexpr double min_home_correlation = std::numbers::sqrt2 / 2.0;
   if (result.evidence->vector.correlation >= min_home_correlation)

@@ -30,7 +30,7 @@ std::string make_caption(const HomeAnswer& answer) {
   if (!result.direction_rad)
     return answer.file + ": no direction home, " + explain_no_direction(result);
   return answer.file + ": home is " + describe_direction(*result.direction_rad) + ", about " +
-         format_fixed(result.distance_r(), 2) + " R away (R: distance of the surroundings); " +
+         format_fixed(result.distance_r(), 2) + " times as far as the objects around; " +
          describe_rotation(-result.turn_rad());
 }
 

@@ -15,7 +15,8 @@ namespace {
 /// Draws the springs that were not rejected as lines between `positions`.
 viewer::MapLayer draw_springs(const Lattice& lattice,
                               const std::vector<std::optional<Point2>>& positions) {
-  viewer::MapLayer layer{.label = "springs", .colour = viewer::PlotColour::light_grey};
+  viewer::MapLayer layer{.label = "pairs of similar views",
+                         .colour = viewer::PlotColour::light_grey};
   for (const Lattice::Spring& spring : lattice.springs) {
     const auto& a = positions[spring.a];
     const auto& b = positions[spring.b];

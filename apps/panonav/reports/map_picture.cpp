@@ -52,7 +52,7 @@ std::vector<Point2> apply_alignment(const std::vector<Point2>& points, const Ali
 
 void declare_map_files(Arguments& arguments, MapFileArguments& files) {
   arguments.option("--tum FILE", files.tum,
-                   "Write the poses of the largest connected component to this file: as CSV if the "
+                   "Write the poses of the largest part of the map to this file: as CSV if the "
                    "name ends in .csv, otherwise as TUM text");
   arguments.option("--graphml FILE", files.graph, "Write the map as a GraphML graph to this file");
   arguments.option(

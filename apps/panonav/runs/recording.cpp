@@ -368,9 +368,9 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   } catch (const OptionError& error) {
     throw UsageError(replace_option_names(error.what()));
   } catch (const FileError& error) {
-    const std::string_view text = error.what();
-    if (text.find("'source'") != text.npos) throw UsageError(replace_option_names(error.what()));
-    throw Error(replace_option_names(error.what()));
+    const std::string reason = replace_option_names(error.what());
+    if (std::string(error.what()).find("'source'") == std::string::npos) throw Error(reason);
+    throw UsageError(reason + "; to find it out: panonav try " + quote_for_shell(input));
   }
 }
 

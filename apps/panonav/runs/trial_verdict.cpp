@@ -208,8 +208,12 @@ TrialVerdict judge_trial(const Trial& trial) {
   if (!trial.guess.source) return judge_unusable_images(trial);
   TrialVerdict verdict;
   if (trial.queries.size() < 2) {
-    verdict.headline = "There are fewer than two images that can be read.";
-    verdict.findings.push_back("Record a walk of 30 images or more, one every 20 to 50 cm.");
+    const bool is_one_image = trial.image_count == 1 && trial.unread.empty();
+    verdict.headline = is_one_image ? "This is one image, and a trial needs a walk."
+                                    : "There are fewer than two images that can be read.";
+    verdict.findings.push_back(
+        "Record a walk of 30 images or more, one every 20 to 50 cm, and try their folder or the "
+        "video.");
     add_image_findings(trial, verdict.findings);
     verdict.findings.push_back(trial.guess.explanation);
     return verdict;

@@ -95,7 +95,7 @@ ordered_json to_json(const ArrangeArguments& arguments, const Lattice& lattice,
 /// Prints what the lattice is for and, if the views have no positions, what makes some.
 void print_use(const ArrangeArguments& arguments, const MemoryFile& file, Session& session) {
   if (!arguments.no_save) {
-    session.print("The lattice is stored for panonav navigate (--edges lattice).");
+    session.print("The arrangement is stored for panonav navigate (--edges lattice).");
   }
   if (file.info().views_with_position > 0) return;
   session.print(
@@ -107,9 +107,10 @@ void print_use(const ArrangeArguments& arguments, const MemoryFile& file, Sessio
 
 void print_result(const Lattice& lattice, const VisualMemory& memory, Session& session) {
   session.print(session.bold(format_count(lattice.nodes.size(), "view")) + " arranged by " +
-                std::to_string(lattice.springs.size()) + " springs of " +
-                std::to_string(lattice.candidates) + " candidates, " +
-                std::to_string(count_rejected_springs(lattice)) + " of them rejected; unit: " +
+                format_count(lattice.springs.size(), "pair") + " of similar views (of " +
+                std::to_string(lattice.candidates) + " compared); " +
+                std::to_string(count_rejected_springs(lattice)) +
+                " pairs contradict the others; unit: " +
                 (lattice.metric ? "metres" : "median distance to the nearest view"));
   if (lattice.components.size() > 1) {
     std::string others;
@@ -122,12 +123,13 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
     if (single_views > 0)
       others +=
           "; " + format_count(single_views, "view") + " without a connection to any other view";
-    session.print("The largest of " +
-                  session.red(std::to_string(lattice.components.size()) + " connected components") +
-                  " holds " + std::to_string(lattice.components.front().views) + " of the " +
-                  format_count(lattice.nodes.size(), "view") + others +
-                  ". Their positions relative to each other are unknown, and no path leads from "
-                  "one to another.");
+    session.print(
+        "The largest of " +
+        session.red(std::to_string(lattice.components.size()) + " parts that are not connected") +
+        " holds " + std::to_string(lattice.components.front().views) + " of the " +
+        format_count(lattice.nodes.size(), "view") + others +
+        ". Their positions relative to each other are unknown, and no path leads from "
+        "one to another.");
   }
   if (!lattice.components.front().handedness_known) {
     session.print("The result may be mirrored: left and right cannot be distinguished.");
@@ -190,8 +192,7 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
     print_result(lattice, memory, session);
     print_use(arguments, file, session);
     if (arguments.files.picture && lattice.components.size() > 1) {
-      session.print(*arguments.files.picture +
-                    " shows the largest connected component of the map, " +
+      session.print(*arguments.files.picture + " shows the largest part of the map, " +
                     std::to_string(lattice.components.front().views) + " of " +
                     format_count(lattice.nodes.size(), "view") + ".");
     }
@@ -228,8 +229,8 @@ Verb arrange_verb() {
           VerbGroup::maps_and_routes,
           "Compute positions of views from their similarity",
           "The views may be in any order. Poses in the memory are only used to measure the error "
-          "of the result. If the views form several unconnected groups, each group is a separate "
-          "component. The result is stored in the memory as a map with the name 'lattice', which "
+          "of the result. Parts that are not connected have no common frame. The result is stored "
+          "in the memory as a map with the name 'lattice', which "
           "navigate uses; it does not change the positions of views (memorise makes them).",
           "  panonav arrange office.panonav --report arranged\n"
           "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",

@@ -65,7 +65,7 @@ std::string format_line(const HomeAnswer& answer, Session& session) {
   if (result.direction_rad) {
     return answer.file + "  home is " + session.green(describe_direction(*result.direction_rad)) +
            ", about " + format_fixed(result.distance_r(), 2) +
-           " R away (R: distance of the surroundings); " + describe_rotation(-result.turn_rad()) +
+           " times as far as the objects around; " + describe_rotation(-result.turn_rad()) +
            "; probability " + format_fixed(result.probability(), 2);
   }
   return answer.file + "  " + session.red("no direction home") + ": " +
@@ -197,7 +197,7 @@ Verb home_verb() {
           VerbGroup::localisation,
           "Compute the direction back to a place from its image",
           "Directions are relative to the robot's current heading, which may be unknown. The "
-          "distance is given in units of R, the typical distance of the objects around the robot. "
+          "distance is given relative to that of the objects around the robot. "
           "If an image is in the folder of a data set, the type of the image is read "
           "from dataset.toml. The exit code is 1 if no direction is found, because the robot is "
           "already at home or because the images are not more similar than random images.",

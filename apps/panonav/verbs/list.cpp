@@ -58,8 +58,8 @@ std::vector<std::string> format_table(const std::vector<ViewRecord>& views, Leng
       {"stamp [s]",
        [](const ViewRecord& v) { return v.info.stamp_s ? format_fixed(*v.info.stamp_s, 3) : ""; }},
       {"links", [](const ViewRecord& v) { return v.links > 0 ? std::to_string(v.links) : ""; }},
-      {"component",
-       [](const ViewRecord& v) { return v.component ? std::to_string(*v.component) : ""; }},
+      {"part",
+       [](const ViewRecord& v) { return v.component ? std::to_string(*v.component + 1) : ""; }},
       {"thumbnail", [](const ViewRecord& v) -> std::string { return v.thumbnail ? "yes" : ""; }}};
   std::vector<std::string> lines(views.size() + 1);
   for (const Column& column : columns) {
@@ -137,7 +137,8 @@ Verb list_verb() {
           VerbGroup::memory,
           "List the views, routes and maps of a memory",
           "Each line describes one view: id, name, position, heading, time stamp, number of links "
-          "to other views, connected component of the map that contains it, and whether it has a "
+          "to other views, part of the map that contains it (views of one part are connected), and "
+          "whether it has a "
           "thumbnail. The exit code is 1 if no view is listed.",
           "  panonav list office.panonav\n"
           "  panonav list office.panonav --near 1,1,0.5\n"

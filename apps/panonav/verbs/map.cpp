@@ -106,7 +106,7 @@ void print_components(const std::vector<std::size_t>& sizes, Session& session) {
   std::string text;
   for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
   session.print(
-      session.red("The map has " + std::to_string(sizes.size()) + " connected components") +
+      session.red("The map has " + std::to_string(sizes.size()) + " parts that are not connected") +
       ", with these numbers of places: " + text + ".");
   session.print(
       "To connect them, take images at shorter distances, record odometry, or drive through the "
@@ -177,16 +177,16 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
   if (comparison) print_comparison(*comparison, run, session);
   if (arguments.files.picture) {
     session.print(*arguments.files.picture + " shows " +
-                  (sizes.size() > 1 ? "the largest connected component of the map, " +
-                                          std::to_string(std::ranges::max(sizes)) + " of " +
-                                          format_count(nodes, "place")
-                                    : "the map"));
+                  (sizes.size() > 1
+                       ? "the largest part of the map, " + std::to_string(std::ranges::max(sizes)) +
+                             " of " + format_count(nodes, "place")
+                       : "the map"));
   }
   session.print(arguments.memory + " contains the map and the views of its places.");
   print_views_without_position(MemoryFile::open(arguments.memory, Access::read_only), session);
   if (arguments.files.tum) {
     session.print(*arguments.files.tum + " contains the poses" +
-                  (sizes.size() > 1 ? " of the largest connected component." : "."));
+                  (sizes.size() > 1 ? " of its largest part." : "."));
   }
   if (arguments.files.graph)
     session.print(*arguments.files.graph + " contains the map as a graph.");
@@ -481,7 +481,7 @@ Verb map_verb() {
       "images. If the data set has odometry, the steps come from the odometry instead, and the "
       "images only correct the rotations of these steps. When the robot returns to a place, the "
       "map is corrected (loop closure). Without odometry, set --camera-height-m to compute lengths "
-      "in metres. If the map has several unconnected parts, each part is a separate component.",
+      "in metres. Parts of the map that are not connected have no common frame.",
       "  panonav map office.panonav office_run\n"
       "  panonav map office.panonav office_run --report mapped --graphml map.graphml\n"
       "  panonav map walk.panonav walk --camera-height-m 0.6\n"

@@ -142,9 +142,12 @@ ordered_json to_json(const std::optional<MemoryMap>& map) {
 void print_map(const std::string& path, const MemoryMap& map, bool is_stored, Session& session) {
   const std::size_t parts = map.part_sizes.size();
   if (!is_stored) {
-    session.print(session.red("There is no map") + ": the largest connected part has " +
-                  format_count(map.part_sizes.front(), "view") +
-                  ". Take an image every 20 to 50 cm.");
+    session.print(session.red("There is no map") + ": it needs " +
+                  std::to_string(ObservationModel::min_views) +
+                  " connected views, and the largest part has " +
+                  std::to_string(map.part_sizes.front()) +
+                  ". Take an image every 20 to 50 cm, and memorise their folder, or each after the "
+                  "one before it.");
     return;
   }
   if (parts > 1) {
@@ -160,7 +163,8 @@ void print_map(const std::string& path, const MemoryMap& map, bool is_stored, Se
                                       std::to_string(ObservationModel::min_views) + ". "
                                 : "") +
                   "Parts are placed beside each other; distances between them have no meaning. To "
-                  "connect them, take an image every 20 to 50 cm.");
+                  "connect them, memorise a walk that leads through them, with an image every 20 "
+                  "to 50 cm.");
   }
   if (map.unit == LengthUnit::view_steps) {
     session.print("Positions are in view steps (" + std::string(map.view_step) +

@@ -68,7 +68,7 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
         arguments.first + ".");
   } else {
     session.print(session.red("no place in common was found") +
-                  ": the map contains both as separate components" +
+                  ": the map contains both as parts that are not connected" +
                   (merged.without_position > 0
                        ? ", and " + format_count(merged.without_position, "view") + " of " +
                              arguments.second +
@@ -110,7 +110,8 @@ Verb merge_verb() {
           "Merge two memories that have places in common",
           "Common places are found by their appearance. The maps of both memories are joined at "
           "these places and optimised together, in the coordinate frame of FIRST. If no common "
-          "place is found, the new memory contains both maps as separate components, and the exit "
+          "place is found, the new memory contains both maps as parts that are not connected, and "
+          "the exit "
           "code is 1. A view that both memories contain is stored only once. The files FIRST and "
           "SECOND are not changed.",
           "  panonav merge monday.panonav tuesday.panonav -o both.panonav\n"

@@ -2,6 +2,9 @@
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "reports/report_page.hpp"
 #include "reports/try_report.hpp"
 #include "runs/trial.hpp"
@@ -43,6 +46,13 @@ ordered_json to_json(const Trial& trial, const TrialVerdict& verdict,
 
 ExitCode try_images(const TryArguments& arguments, Session& session) {
   namespace fs = std::filesystem;
+  for (const std::string& input : arguments.inputs) {
+    if (fs::path(input).extension() != ".panonav" || !memory_exists(input)) continue;
+    throw FileError(input,
+                    "is a memory; allowed: a folder of images, a video or a recording. To see what "
+                    "the memory contains: panonav info " +
+                        quote_for_shell(input));
+  }
   const std::string stem = fs::path(arguments.inputs.front()).lexically_normal().stem().string();
   const fs::path folder = arguments.out.value_or((stem.empty() ? "images" : stem) + "_try");
   const Trial trial = run_trial(arguments.inputs, folder, session);
