@@ -102,7 +102,8 @@ void store_map(MemoryFile& memory, TopologicalMap map, LengthUnit unit,
 void add_path_starts(MemoryFile& memory, std::span<const ViewId> starts);
 
 /// Makes the map of a memory whose views have no positions from data sets, in the order of their
-/// ids (`TopologicalMapper`) and of their paths (`read_path_starts`). Views in no order are arranged by similarity instead
+/// ids (`TopologicalMapper`) and of their paths (`read_path_starts`). Views in no order are
+/// arranged by similarity instead
 /// (`arrange`), or join a path if they were added to paths (`join_small_components`). Replaces an
 /// earlier map. Lengths are in metres if odometry is known or the earlier map is in metres.
 ///
