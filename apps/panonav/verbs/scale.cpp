@@ -104,9 +104,9 @@ void print_result(const ScaleArguments& arguments, const MemoryFile& memory, dou
     session.print("The map has " +
                   session.red(std::to_string(parts.size()) + " parts that are not connected") +
                   ". All are scaled by " +
-                  (ground ? "the median over all parts" : "the distance in one part") +
-                  "; lengths in the others may be wrong by a factor, and distances between parts "
-                  "have no meaning.");
+                  (ground ? "the median over all parts; lengths in a single part"
+                          : "the distance in one part; lengths in the others") +
+                  " may be wrong by a factor, and distances between parts have no meaning.");
   }
   if (!routes.empty()) {
     std::string names;

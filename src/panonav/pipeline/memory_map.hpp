@@ -103,9 +103,9 @@ void add_path_starts(MemoryFile& memory, std::span<const ViewId> starts);
 
 /// Makes the map of a memory whose views have no positions from data sets, in the order of their
 /// ids (`TopologicalMapper`) and of their paths (`read_path_starts`). Views in no order are
-/// arranged by similarity instead
-/// (`arrange`), or join a path if they were added to paths (`join_small_components`). Replaces an
-/// earlier map. Lengths are in metres if odometry is known or the earlier map is in metres.
+/// arranged by similarity instead (`arrange`), or join a path if they were added to paths
+/// (`join_small_components`). Replaces an earlier map. Lengths are in metres if odometry is known
+/// or the earlier map is in metres.
 ///
 /// `odometry`: poses of views by name. Calls `mapped` after each view. Returns nullopt and
 /// changes nothing if a view has a position from a data set or there are fewer than two views.
