@@ -145,7 +145,7 @@ void add_samples(const simulation::PlaceRecording& place, const std::string& sce
         groups[name_of_group].radii_m.push_back(*found.position->radius_m);
       }
     }
-    const LocalLayout local = layout.around(near);
+    const LocalLayout local = layout.around({near, {}});
     if (local.kind != LocalLayout::Kind::line) continue;
     const auto terms = bound_terms(model, match->column_difference);
     if (!terms) continue;

@@ -14,6 +14,12 @@ namespace panonav::python {
 
 namespace {
 
+constexpr const char* floor_text = "In whose frame the positions are; None: it has no name.";
+
+std::optional<std::string> name_floor(std::string_view floor) {
+  return floor.empty() ? std::nullopt : std::optional(std::string(floor));
+}
+
 /// A place with the name of its image.
 struct NamedPlace : Place {
   std::string name;
@@ -66,6 +72,8 @@ void bind_places(py::module_& m) {
   Record<AlternativePlace>(m, "AlternativePlace", "Another place that the image may show.")
       .field("match", &AlternativePlace::match, "Its best match.")
       .field("probability", &AlternativePlace::probability, "That the image was taken there.")
+      .field(
+          "floor", [](const AlternativePlace& p) { return name_floor(p.floor()); }, floor_text)
       .field("position", &AlternativePlace::position, "None: unknown.")
       .field("heading_rad", &AlternativePlace::heading_rad, "None: unknown.");
   Record<NamedPlace>(m, "Place", "The position and heading of an image.")
@@ -76,6 +84,8 @@ void bind_places(py::module_& m) {
              "That the image was taken at `position`; the rest is shared by `alternatives`.")
       .field("alternatives", &NamedPlace::alternatives,
              "Other places that the image does not exclude, most probable first.")
+      .field(
+          "floor", [](const NamedPlace& p) { return name_floor(p.floor()); }, floor_text)
       .field("position", &NamedPlace::position, "None: unknown.")
       .field("heading_rad", &NamedPlace::heading_rad, "None: unknown.")
       .field("matches", &NamedPlace::matches, "Best first; also given for unknown places.")
@@ -259,6 +269,8 @@ std::vector<NamedEstimate> track_recording(Tracker& tracker, const Dataset& reco
 void bind_tracker(py::module_& m) {
   Record<PoseMode>(m, "PoseMode", "A cluster of particles.")
       .field("weight", &PoseMode::weight, "Sum of the weights of its particles.")
+      .field(
+          "floor", [](const PoseMode& mode) { return name_floor(mode.floor); }, floor_text)
       .field("mean", &PoseMode::mean, "Weighted mean; the heading is the circular mean.")
       .field(
           "covariance",
@@ -274,6 +286,8 @@ void bind_tracker(py::module_& m) {
       .field(
           "state", [](const NamedEstimate& e) { return to_string(e.state); },
           "'localised', 'position_known', 'ambiguous' or 'lost'.")
+      .field(
+          "floor", [](const NamedEstimate& e) { return name_floor(e.floor()); }, floor_text)
       .field("pose", &NamedEstimate::pose,
              "Mean of the largest mode; None if lost or if the heading is unknown.")
       .field("position", &NamedEstimate::position, "(x_m, y_m) of the largest mode; None if lost.")
@@ -381,8 +395,7 @@ void bind_tracker(py::module_& m) {
       .def(
           "particles",
           [](const SharedTracker& tracker) {
-            const Particles all =
-                tracker.read([](const Tracker& t) { return t.localiser().particles(); });
+            const Particles all = tracker.read([](const Tracker& t) { return t.particles(); });
             py::array_t<double> rows({static_cast<py::ssize_t>(all.size()), py::ssize_t{4}});
             auto row = rows.mutable_unchecked<2>();
             for (std::size_t i = 0; i < all.size(); ++i) {

@@ -4,6 +4,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/open_input.hpp"
@@ -320,8 +321,11 @@ void bind_memorising(py::module_& m) {
       "memorise",
       [=](const std::filesystem::path& memory, const py::object& recording,
           const std::optional<PictureSource>& source, bool thumbnails, bool features, int threads,
-          const py::kwargs& keywords) {
-        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
+          const std::string& floor, const py::kwargs& keywords) {
+        Dataset dataset = to_dataset_for_memory(memory, recording, source);
+        for (DatasetEntry& entry : dataset.entries) {
+          entry.file = make_name_on_floor(floor, entry.file);
+        }
         const auto options = options_from(dataset.source, thumbnails, features, keywords);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
@@ -342,11 +346,12 @@ void bind_memorising(py::module_& m) {
       },
       py::arg("memory"), py::arg("recording"), py::arg("source") = py::none(),
       py::arg("thumbnails") = true, py::arg("features") = true, py::arg("threads") = 0,
+      py::arg("floor") = "",
       ("Stores the images of a recording as views in a memory, like `panonav memorise`.\n\n"
        "`memory`: the file, new or existing; `recording`: a Dataset, a path or a list "
        "of images. An "
        "image that cannot be read raises FileError; those before it are stored. threads: 0: "
-       "one per core." +
+       "one per core; floor: where the images were taken, in whose frame the positions are." +
        option_text)
           .c_str());
 }

@@ -31,12 +31,13 @@ def plain(place, areas=False):
             one["verified_features"] = match.verified_features
         return one
 
-    alternatives = [{"match": plain_match(other.match), "probability": other.probability,
+    alternatives = [{"match": plain_match(other.match), "probability": other.probability, "floor": other.floor,
                      "position": plain_position(other.position), "heading_rad": other.heading_rad}
                     for other in place.alternatives]
     reported = {"file": place.name, "known": place.known, "known_probability": place.known_probability,
             "probability": place.probability, "alternatives": alternatives,
-            "matches": [plain_match(match) for match in place.matches], "position": plain_position(place.position),
+            "matches": [plain_match(match) for match in place.matches], "floor": place.floor,
+            "position": plain_position(place.position),
             "heading_rad": place.heading_rad, "components": place.components, "bytes_read": place.bytes_read,
             "turned_rad": 0.0}
     if areas:

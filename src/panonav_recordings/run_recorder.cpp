@@ -24,6 +24,11 @@ namespace panonav::recordings {
 
 namespace {
 
+// Adds the floor to the diagnostics if it has a name.
+void add_floor(RunMoment& moment, std::string_view floor) {
+  if (!floor.empty()) moment.values.emplace_back("floor", floor);
+}
+
 /// Makes a grid whose cells within two cells of a reference are free and all others unknown.
 /// `nullopt` if the references are too far apart for a grid.
 std::optional<ros::OccupancyGrid> make_visited_grid(const std::vector<Point2>& positions,
@@ -118,6 +123,7 @@ void set_localisation(RunMoment& moment, const MonteCarloEstimate& estimate) {
                    {"inside", format_fixed(estimate.p_inside, 4)},
                    {"modes", std::to_string(estimate.modes.size())},
                    {"particles", std::to_string(estimate.particles)}};
+  add_floor(moment, estimate.floor());
 }
 
 void set_localisation(RunMoment& moment, const Place& place) {
@@ -125,6 +131,7 @@ void set_localisation(RunMoment& moment, const Place& place) {
   moment.state = place.known ? "known place" : "unknown place";
   moment.probability = place.probability;
   moment.values = {{"known_probability", format_fixed(place.known_probability, 4)}};
+  add_floor(moment, place.floor());
   for (const AlternativePlace& other : place.alternatives) {
     moment.values.emplace_back(
         "alternative", other.match.name + ", probability " + format_fixed(other.probability, 4));

@@ -67,7 +67,7 @@ void GoalDriver::make_route_driver(const Mission& mission) {
 
 void GoalDriver::set_goal(Point2 goal) {
   const Tracker& tracker = memory_->tracker;
-  const ViewId nearest = tracker.localiser().find_nearest_view(goal);
+  const ViewId nearest = tracker.find_nearest_view(goal);
   const VisualMemory loaded = tracker.index()->load({&nearest, 1});
   if (loaded.empty()) throw Error("the view nearest to the goal was removed; set the goal again");
   const std::string& name = loaded.info(nearest).name;
@@ -91,7 +91,7 @@ void GoalDriver::drive(const Observation& observation, const std::optional<Pose2
 
 void GoalDriver::drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose) {
   RobotReport report;
-  if (pose) report.estimate = memory_->tracker.localiser().find_nearest_view(pose->position());
+  if (pose) report.estimate = memory_->tracker.find_nearest_view(pose->position());
   const RobotNavigator::Step step = navigator_->step(observation, report);
   const NavigationDecision& decision = step.decision;
   const std::string state(to_string(decision.state));
@@ -156,7 +156,7 @@ void GoalDriver::stop_if_silent() {
 void GoalDriver::publish_areas() {
   recordings::PointValues cloud;
   const auto& planner = navigator_->planner();
-  for (const auto& [view, pose] : memory_->tracker.index()->posed_views()) {
+  for (const auto& [view, pose] : memory_->tracker.posed_views()) {
     const auto node = planner.graph().node_of(view);
     if (node) cloud.add(pose.position(), static_cast<double>(planner.areas().area_of[*node]));
   }

@@ -6,6 +6,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_list.hpp"
@@ -81,7 +82,7 @@ void MemoryLocaliser::add_view(const std::string& name) {
   }
   last_observation_->pose =
       ReferencePose{last_pose_->x_m, last_pose_->y_m, last_pose_->heading_rad};
-  last_observation_->name = name;
+  last_observation_->name = make_name_on_floor(loaded().tracker.floor(), name);
   Memoriser memoriser(loaded().path, {.source = setup_.tracker.source});
   memoriser.add(*last_observation_);
   memoriser.finish();
@@ -123,6 +124,7 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
   tracker.move_to(*observation.odometry);
   const PackedSignature view = tracker.encoder().packed(observation);
   MonteCarloEstimate estimate = tracker.observe(view);
+  if (tracker.floor() != published_floor_) publish_references();
   last_pose_ = estimate.pose;
   if (estimate.pose) estimate.pose = *estimate.pose * inverse(base_from_camera_);
   recordings::RunMoment moment;
@@ -173,7 +175,7 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
   if (last_pose_) poses_.publish(recordings::pose_message(moment, stamp_ns, setup_.frames.map));
   if (particles_.subscribers() > 0) {
     moment.particles =
-        recordings::resample_systematically(tracker.localiser().particles(), max_shown_particles);
+        recordings::resample_systematically(tracker.particles(), max_shown_particles);
     particles_.publish(recordings::poses_message(moment.particles, stamp_ns, setup_.frames.map));
   }
   if (best_matches_.subscribers() > 0) {
@@ -188,10 +190,11 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
   }
 }
 
-/// Publishes the positions of the views, each with its index.
-void MemoryLocaliser::publish_references() const {
+/// Publishes the positions of the views on the robot's floor, each with its index.
+void MemoryLocaliser::publish_references() {
+  published_floor_ = memory_->tracker.floor();
   recordings::PointValues cloud;
-  for (const PosedView& view : memory_->tracker.index()->posed_views()) {
+  for (const PosedView& view : memory_->tracker.posed_views()) {
     cloud.add(view.pose.position(), static_cast<double>(cloud.values.size() / 4));
   }
   references_.publish(cloud.message(now_ns_(), setup_.frames.map, "number"));

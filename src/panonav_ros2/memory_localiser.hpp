@@ -54,7 +54,7 @@ class MemoryLocaliser {
                       recordings::RunMoment& moment);
   void publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns,
                         const PackedSignature& view) const;
-  void publish_references() const;
+  void publish_references();
 
   const LocalisationNodeSetup& setup_;
   RobotMotion& motion_;
@@ -63,6 +63,7 @@ class MemoryLocaliser {
   Publisher<recordings::ros::PoseWithCovarianceStamped> poses_;
   Publisher<recordings::ros::PoseArray> particles_;
   Publisher<recordings::ros::PointCloud2> references_;
+  std::string published_floor_;  // of `references_`
   Publisher<recordings::ros::CompressedImage> best_matches_;
   Pose2 base_from_camera_;
   std::unique_ptr<LoadedMemory> memory_;

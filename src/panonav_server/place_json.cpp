@@ -16,6 +16,10 @@ ordered_json to_json_or_null(const std::optional<double>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
 
+ordered_json floor_json(std::string_view floor) {
+  return floor.empty() ? ordered_json() : ordered_json(floor);
+}
+
 ordered_json match_json(const PlaceMatch& match) {
   ordered_json json{{"file", match.name},
                     {"dissimilarity", match.dissimilarity},
@@ -46,6 +50,7 @@ ordered_json place_json(const Place& place) {
   for (const AlternativePlace& other : place.alternatives) {
     alternatives.push_back({{"match", match_json(other.match)},
                             {"probability", other.probability},
+                            {"floor", floor_json(other.floor())},
                             {"position", position_json(other.position)},
                             {"heading_rad", to_json_or_null(other.heading_rad)}});
   }
@@ -53,6 +58,7 @@ ordered_json place_json(const Place& place) {
           {"known_probability", place.known_probability},
           {"probability", place.probability},
           {"matches", std::move(matches)},
+          {"floor", floor_json(place.floor())},
           {"position", position_json(place.position)},
           {"heading_rad", to_json_or_null(place.heading_rad)},
           {"alternatives", std::move(alternatives)},

@@ -138,13 +138,13 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
   ASSERT_EQ(all.size(), 20U);
   for (const auto& answer : all) {
     EXPECT_EQ(keys_of(answer),
-              (std::set<std::string>{"alternatives", "bytes_read", "components", "file",
+              (std::set<std::string>{"alternatives", "bytes_read", "components", "file", "floor",
                                      "heading_rad", "known", "known_probability", "matches",
                                      "position", "probability", "turned_rad"}));
     double shared = answer["probability"];
     for (const auto& other : answer["alternatives"]) {
-      EXPECT_EQ(keys_of(other),
-                (std::set<std::string>{"heading_rad", "match", "position", "probability"}));
+      EXPECT_EQ(keys_of(other), (std::set<std::string>{"floor", "heading_rad", "match", "position",
+                                                       "probability"}));
       shared += other["probability"].get<double>();
     }
     EXPECT_NEAR(shared, answer["known_probability"].get<double>(), 1e-9);

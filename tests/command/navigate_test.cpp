@@ -9,6 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/pose2.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/robot_navigator.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
@@ -324,6 +325,31 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
   EXPECT_LT(max_loaded, 45U) << "of " << poses.size();
   EXPECT_THROW(static_cast<void>(navigator.step(Image(97, 12))), ContractError);
   EXPECT_THROW(navigator.set_goal("nowhere.png"), FileError);
+}
+
+TEST_F(Navigate, AGoalOnAnotherFloorIsRefused) {
+  const std::string building = *folder / "building.panonav";
+  run_well({"simulate", "lab", *folder / "upstairs", "--grid", "1", "--kind", "panorama", "--rows",
+            "40", "--columns", "256"});
+  run_well({"memorise", building, *folder / "run", "--floor", "ground"});
+  run_well({"memorise", building, *folder / "upstairs", "--floor", "first"});
+  run_well({"arrange", building});
+  const auto views = answer_of({"list", building, "--json"})["views"];
+  const std::string goal = views.back()["name"];
+  ASSERT_EQ(views.back()["floor"], "first");
+  const auto& start = views.front()["pose"];
+  const auto refused =
+      run_panonav({"navigate", building, "--goal", goal, "--scene", "office", "--start",
+                   start["x_m"].dump() + "," + start["y_m"].dump() + ",40"});
+  EXPECT_EQ(refused.exit_code, 1) << refused.err;
+  EXPECT_TRUE(contains(refused.out, "unreachable after ")) << refused.out;
+  EXPECT_TRUE(contains(refused.out, "the goal is on floor first, the robot on floor ground at "))
+      << refused.out;
+  EXPECT_FALSE(contains(refused.out, "distance from the goal's view")) << refused.out;
+  const RobotNavigator robot(building, goal);
+  for (const NavigationGraph::Edge& edge : robot.graph().edges()) {
+    EXPECT_EQ(floor_of(robot.info(edge.a).name), floor_of(robot.info(edge.b).name));
+  }
 }
 
 }  // namespace

@@ -106,10 +106,10 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     const json& image = all[i];
     EXPECT_EQ(keys_of(image),
-              (std::set<std::string>{"file", "stamp_s", "state", "pose", "inside", "probability",
-                                     "modes", "spread_m", "particles", "effective_particles",
-                                     "resampled", "injected", "difference_here",
-                                     "difference_anywhere", "ground_truth"}));
+              (std::set<std::string>{"file", "stamp_s", "state", "floor", "pose", "inside",
+                                     "probability", "modes", "spread_m", "particles",
+                                     "effective_particles", "resampled", "injected",
+                                     "difference_here", "difference_anywhere", "ground_truth"}));
     EXPECT_EQ(image["file"], view_name(i));
     EXPECT_EQ(image["stamp_s"], 0.5 * static_cast<double>(i));
     const std::string state = image["state"];
@@ -137,7 +137,7 @@ TEST_F(Track, JsonLinesHaveExactlyTheDocumentedFields) {
     double last = 1.0;
     for (const auto& mode : image["modes"]) {
       EXPECT_EQ(keys_of(mode),
-                (std::set<std::string>{"weight", "x_m", "y_m", "heading_rad", "spread_m",
+                (std::set<std::string>{"weight", "floor", "x_m", "y_m", "heading_rad", "spread_m",
                                        "heading_spread_rad", "covariance"}));
       const double own = mode["weight"];
       EXPECT_LE(own, last);

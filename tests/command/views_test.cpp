@@ -53,7 +53,7 @@ TEST_F(Views, ListShowsWhatTheFileKnows) {
   EXPECT_EQ(keys_of(said), (std::set<std::string>{"maps", "memory", "routes", "views"}));
   ASSERT_EQ(said["views"].size(), 16U);
   EXPECT_EQ(said["views"][5],
-            json::parse(R"({"id":6,"name":"view_005.png","pose":{"x_m":0.5,"y_m":0.5,
+            json::parse(R"({"id":6,"name":"view_005.png","floor":null,"pose":{"x_m":0.5,"y_m":0.5,
                             "heading_rad":0.0},"stamp_s":null,"links":0,
                             "connected_component":null,"thumbnail":true})"));
 
@@ -322,6 +322,43 @@ TEST_F(Views, ARenamedRouteIsFollowedAndComesBack) {
   run_well({"verify", memory});
   run_well({"undo", memory});
   EXPECT_EQ(follow("route"), before);
+}
+
+TEST_F(Views, FloorsAreFramesOfTheirOwn) {
+  const std::string building = folder / "building.panonav";
+  const std::string grid = folder / "grid";
+  const std::string first = folder / "first";
+  write_dataset(first, landmark_world(6), grid_poses(4));
+  run_well({"memorise", building, grid, "--floor", "ground"});
+  run_well({"memorise", building, first, "--floor", "first"});
+  run_well({"memorise", building, first, "--floor", "first"});
+  const json info = answer_of({"info", building, "--json"});
+  EXPECT_EQ(info["views"], 32);
+  EXPECT_EQ(info["floors"], (json{{"first", 16}, {"ground", 16}}));
+  EXPECT_TRUE(contains(run_panonav({"info", building}).out, "floor       ground, 16 views"));
+  EXPECT_EQ(answer_of({"list", building, "--json"})["views"][20]["floor"], "first");
+  EXPECT_EQ(run_panonav({"verify", building}).exit_code, 0);
+
+  for (const auto& [input, floor] : {std::pair(grid, "ground"), std::pair(first, "first")}) {
+    const auto run = run_panonav({"localise", building, input, "--json"});
+    for (const std::string& line : lines(run.out)) {
+      const auto place = json::parse(line);
+      EXPECT_EQ(place["floor"], floor) << line;
+    }
+    const auto text = run_panonav({"localise", building, input + "/" + view_name(5)});
+    EXPECT_TRUE(contains(text.out, "floor " + std::string(floor) + "  x 0.5")) << text.out;
+  }
+
+  // A copy of the data set has the floors, too.
+  const std::string copy = folder / "copy";
+  const std::string again = folder / "again.panonav";
+  run_well({"export", building, "--out", copy});
+  run_well({"memorise", again, copy});
+  EXPECT_EQ(answer_of({"info", again, "--json"})["floors"], info["floors"]);
+
+  const auto refused = run_panonav({"memorise", building, first, "--floor", "a/b"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_TRUE(contains(refused.err, "floor is \"a/b\"")) << refused.err;
 }
 
 }  // namespace

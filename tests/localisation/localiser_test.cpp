@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -45,6 +46,39 @@ TEST(Localiser, FindsAMemorisedViewItsPositionAndTheTurn) {
     // The turn lies between two steps of the columns.
     EXPECT_LT(distance(turned.position->position(), truth.position()), 0.25 * place.step_m);
   }
+}
+
+TEST(Localiser, TellsTheFloorAndUsesOnlyItsViews) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  const RememberedRoom a(61, {}, 0.4);
+  const RememberedRoom b(62, {}, 0.4);
+  const VisualMemory memory = remember_floors(a, b);
+  const Localiser localiser(memory);
+  EXPECT_NEAR(localiser.position_model().spacing_m, 0.4, 1e-6);
+  EXPECT_NEAR(NeighbourSupport(ColumnRanking(memory)).spacing_m(), 0.4, 1e-6);
+  Random random(61);
+  int known = 0;
+  int near = 0;
+  for (int i = 0; i < 60; ++i) {
+    const RememberedRoom& room = i % 2 == 0 ? a : b;
+    const std::string floor = i % 2 == 0 ? "a" : "b";
+    const Pose2 pose = room.room.between(room.grid, 0.4, random);
+    const Place place =
+        localiser.localise(pack(compute_signature(room.room.see(pose)), memory.full_scale()));
+    if (!place.known) continue;
+    ++known;
+    EXPECT_EQ(place.floor(), floor);
+    ASSERT_TRUE(place.position);
+    near += distance(place.position->position(), pose.position()) <= 0.4 ? 1 : 0;
+    for (const PositionEstimate::Share& share : place.position->shares) {
+      EXPECT_EQ(floor_of(memory.info(share.view).name), floor);
+    }
+    for (const AlternativePlace& other : place.alternatives) {
+      EXPECT_EQ(floor_of(other.match.name), other.floor());
+    }
+  }
+  EXPECT_GE(known, 54);
+  EXPECT_GE(near, known - 3);
 }
 
 // The hall looks the same after half a turn about its centre.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "panonav/localisation/localiser.hpp"
@@ -31,6 +32,28 @@ TEST(NeighbourSupport, NeighboursOfAGridAreTheEightAround) {
     inner += found.size() == 8 ? 1 : 0;
   }
   EXPECT_GE(inner, 16);
+}
+
+TEST(NeighbourSupport, NeighboursAreOnTheSameFloor) {
+  const RememberedRoom a(84, {4.0, 4.0, 0, 0.15}, 0.5);
+  const RememberedRoom b(85, {4.0, 4.0, 0, 0.15}, 0.5);
+  const VisualMemory memory = remember_floors(a, b);
+  const ColumnRanking ranking(memory);
+  const NeighbourSupport support(ranking);
+  const ColumnRanking alone(a.memory);
+  const NeighbourSupport expected(alone);
+  EXPECT_DOUBLE_EQ(support.spacing_m(), expected.spacing_m());
+  const auto names = [](const VisualMemory& of, const std::vector<ViewId>& views) {
+    std::vector<std::string> all;
+    for (const ViewId view : views) all.push_back(of.info(view).name);
+    return all;
+  };
+  for (const ViewId view : a.memory.views()) {
+    auto on_a = names(a.memory, expected.neighbours(view));
+    for (std::string& name : on_a) name = make_name_on_floor("a", name);
+    const ViewId here = *memory.find(make_name_on_floor("a", a.memory.info(view).name));
+    EXPECT_EQ(names(memory, support.neighbours(here)), on_a);
+  }
 }
 
 TEST(NeighbourSupport, OfAViewWithoutNeighboursIsItsOwnDifference) {

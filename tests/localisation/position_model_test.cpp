@@ -398,7 +398,7 @@ TEST(ReferenceLayout, TellsAreasEdgesLinesAndBendsApart) {
     for (const Point2 p : positions) poses.push_back(ReferencePose{p.x_m, p.y_m, {}});
     const VisualMemory memory =
         make_memory(std::vector<FourierSignature>(positions.size(), view), poses);
-    return ReferenceLayout(memory, 1.0).around(at);
+    return ReferenceLayout(memory, 1.0).around({at, {}});
   };
   std::vector<Point2> grid;
   std::vector<Point2> drive;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "support/remembered_worlds.hpp"
@@ -105,6 +106,38 @@ TEST_F(Merge, WithNothingInCommonTheSecondHasNoPositions) {
   const VisualMemory memory = file.load();
   EXPECT_TRUE(memory.info(memory.find("7").value()).pose);
   EXPECT_FALSE(memory.info(memory.find("other_7").value()).pose);
+}
+
+TEST_F(Merge, FloorsKeepTheirFramesAndOnlyTheSharedOneIsAligned) {
+  const fs::path ground = remember("ground.panonav", 5, drive(0, 110), "floor=ground/");
+  const fs::path first = remember("first.panonav", 6, drive(0, 60), "floor=first/");
+  const MergedMemory apart = merge_memories(ground, first, merged);
+  EXPECT_FALSE(apart.has_shared_floor);
+  EXPECT_EQ(apart.without_position, 0U);
+  const auto load = [](const fs::path& path) {
+    return MemoryFile::open(path, Access::read_only).load();
+  };
+  const VisualMemory before = load(first);
+  const VisualMemory after = load(merged);
+  for (const ViewId view : before.views()) {
+    EXPECT_EQ(after.info(after.find(before.info(view).name).value()).pose, before.info(view).pose);
+  }
+
+  const fs::path again = remember("again.panonav", 5, drive(40, 110), "floor=ground/");
+  const fs::path all = folder / "all.panonav";
+  const MergedMemory joined = merge_memories(merged, again, all);
+  EXPECT_TRUE(joined.has_shared_floor);
+  ASSERT_TRUE(joined.alignment);
+  EXPECT_EQ(joined.without_position, 0U);
+  const VisualMemory three = load(all);
+  EXPECT_EQ(three.size(), 280U);
+  EXPECT_EQ(list_floors(three), (std::vector<std::string>{"first", "ground"}));
+  EXPECT_TRUE(three.find("floor=ground/again/7"));
+  for (const ViewId view : before.views()) {
+    EXPECT_EQ(three.info(three.find(before.info(view).name).value()).pose, before.info(view).pose);
+  }
+  EXPECT_THROW((void)merge_memories(merged, all, folder / "none.panonav"), FileError)
+      << "two floors are in both";
 }
 
 TEST_F(Merge, WhatBothHaveIsKeptOnce) {

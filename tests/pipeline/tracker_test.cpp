@@ -3,13 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
 #include "support/landmark_pictures.hpp"
@@ -185,6 +188,50 @@ TEST_F(TrackerTest, MissingOdometryIsFilledFromThePictures) {
       const Pose2 expected = odometry_from_world * poses[i];
       EXPECT_LT(distance(run.entries[i].odometry->position(), expected.position()), 0.1) << i;
     }
+  }
+}
+
+TEST_F(TrackerTest, TellsTheFloorOfTheRobot) {
+  const std::filesystem::path building = *folder_ / "building.panonav";
+  const std::array worlds{world(), landmark_world(8)};
+  const std::array<std::string, 2> floors{"ground", "first"};
+  {
+    Memoriser memoriser(building, {.source = landmark_panoramas()});
+    const auto poses = grid_poses(7);
+    for (std::size_t f = 0; f < floors.size(); ++f) {
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        Observation seen(landmark_picture(worlds[f], poses[i]));
+        seen.name = make_name_on_floor(floors[f], view_name(i));
+        seen.pose = ReferencePose{poses[i].x_m, poses[i].y_m, 0.0};
+        memoriser.add(seen);
+      }
+    }
+    memoriser.finish();
+  }
+  for (std::size_t f = 0; f < floors.size(); ++f) {
+    Tracker tracker(building);
+    MonteCarloEstimate last;
+    for (int i = 0; i < 20; ++i) {
+      Observation seen(landmark_picture(worlds[f], pose(i)));
+      seen.odometry = pose(i);
+      last = tracker.observe(seen);
+    }
+    ASSERT_EQ(last.state, LocalisationState::localised);
+    EXPECT_EQ(last.floor(), floors[f]);
+    EXPECT_EQ(tracker.floor(), floors[f]);
+    EXPECT_LT(distance(last.pose->position(), pose(19).position()), 0.25);
+    EXPECT_EQ(last.modes.front().mean, *last.pose);
+    EXPECT_LT(last.spread_m, 10.0);
+    EXPECT_EQ(tracker.posed_views().size(), 49U);
+    const Particles on_floor = tracker.particles();
+    for (std::size_t i = 0; i < on_floor.size(); ++i) {
+      EXPECT_LT(distance(on_floor.position(i), {1.5, 1.5}), 10.0);
+    }
+    // A start is on the floor where the robot was last.
+    tracker.start_at(pose(0), 0.1, 0.1);
+    EXPECT_EQ(tracker.particles().size(), tracker.localiser().particles().size());
+    const VisualMemory& views = tracker.memory();
+    EXPECT_EQ(floor_of(views.info(tracker.find_nearest_view({1.0, 1.0})).name), floors[f]);
   }
 }
 

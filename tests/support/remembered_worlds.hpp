@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/memory/floors.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav/motion/velocity.hpp"
@@ -92,6 +93,19 @@ struct RememberedRoom {
     return make_memory(signatures, poses);
   }
 };
+
+/// A memory of the views of both rooms on the floors "a" and "b", in the same coordinates.
+inline VisualMemory remember_floors(const RememberedRoom& a, const RememberedRoom& b) {
+  VisualMemory memory(a.memory.shape(), a.memory.full_scale(), a.memory.elevations());
+  for (const auto& [floor, room] : {std::pair("a", &a), std::pair("b", &b)}) {
+    for (const ViewId view : room->memory.views()) {
+      ReferenceInfo info = room->memory.info(view);
+      info.name = make_name_on_floor(floor, info.name);
+      memory.append(room->memory.signature(view), info);
+    }
+  }
+  return memory;
+}
 
 /// Radius of the robot of these tests.
 inline constexpr double robot_radius_m = 0.15;

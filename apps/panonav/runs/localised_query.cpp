@@ -96,6 +96,7 @@ std::string format_position(const PositionEstimate& position, LengthUnit unit) {
 std::string format_alternative(const AlternativePlace& other, LengthUnit unit) {
   std::string text =
       "\n    or near " + other.match.name + "  probability " + format_fixed(other.probability, 2);
+  if (!other.floor().empty()) text += "  floor " + std::string(other.floor());
   if (other.position) text += "  " + format_position(*other.position, unit);
   if (other.heading_rad) {
     text += "  heading " + format_fixed(degrees(*other.heading_rad), 1) + " degrees";
@@ -125,6 +126,7 @@ std::string format_line(const LocalisedQuery& answer, Session& session) {
   }
   line +=
       session.green("near " + nearest.name) + "  probability " + format_fixed(found.probability, 2);
+  if (!found.floor().empty()) line += "  floor " + std::string(found.floor());
   if (found.position) line += "  " + format_position(*found.position, session.length_unit());
   if (found.heading_rad) {
     line += "  heading " + format_fixed(degrees(*found.heading_rad), 1) + " degrees";

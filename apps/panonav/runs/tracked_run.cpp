@@ -88,11 +88,11 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
   StageClock clock;
   image.estimate = tracker.observe(view);
   clock.stage("filter");
-  image.particles = recordings::resample_systematically(tracker.localiser().particles(),
-                                                        settings.particles_per_image);
+  image.particles =
+      recordings::resample_systematically(tracker.particles(), settings.particles_per_image);
   if (moment) {
     set_localisation(*moment, image.estimate);
-    moment->particles = recordings::resample_systematically(tracker.localiser().particles(), 500);
+    moment->particles = recordings::resample_systematically(tracker.particles(), 500);
     if (moment->panorama) {
       if (settings.shown_references != nullptr)
         settings.shown_references->compare(*moment, tracker.memory(), view);

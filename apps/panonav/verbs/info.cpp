@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <map>
 
 #include "cli/texts.hpp"
 #include "cli/verbs.hpp"
@@ -8,6 +9,7 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/observation_model.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/route/route_panorama.hpp"
@@ -96,6 +98,15 @@ std::vector<std::string> find_memory_verbs(const MemoryFile& memory) {
   return verbs;
 }
 
+/// Returns the number of views on each floor that has a name.
+std::map<std::string, std::size_t> count_views_by_floor(const MemoryFile& memory) {
+  std::map<std::string, std::size_t> counts;
+  for (const std::string& name : memory.names()) {
+    if (const auto floor = floor_of(name); !floor.empty()) ++counts[std::string(floor)];
+  }
+  return counts;
+}
+
 ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
   const auto& header = memory.header();
   const auto& steps = header.preprocessing;
@@ -107,6 +118,7 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
                     {"links", info.links},
                     {"thumbnails", info.thumbnails},
                     {"views_with_features", info.views_with_features},
+                    {"floors", count_views_by_floor(memory)},
                     {"feature_bytes", info.feature_bytes},
                     {"file_bytes", info.file_bytes},
                     {"rows", header.shape.rows},
@@ -172,6 +184,9 @@ ExitCode print_memory(const std::string& path, Session& session) {
   session.print("  signatures  " + std::to_string(header.shape.rows) + " rows x " +
                 std::to_string(header.shape.components) + " components, " +
                 std::to_string(2 * header.shape.size()) + " bytes per view");
+  for (const auto& [floor, views] : count_views_by_floor(memory)) {
+    session.print("  floor       " + to_readable_line(floor) + ", " + format_count(views, "view"));
+  }
   if (info.views_with_features > 0) {
     session.print("  features    " + format_count(info.views_with_features, "view") +
                   " with local features, " +

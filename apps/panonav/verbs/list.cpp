@@ -3,6 +3,7 @@
 
 #include "cli/verbs.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/memory/floors.hpp"
 #include "runs/view_selection.hpp"
 
 namespace panonav::command {
@@ -19,6 +20,7 @@ ordered_json to_json(const ViewRecord& record) {
   const auto& [view, info, links, thumbnail, component] = record;
   return {{"id", view.value},
           {"name", info.name},
+          {"floor", floor_of(info.name).empty() ? ordered_json() : floor_of(info.name)},
           {"pose", pose_json(info.pose)},
           {"stamp_s", to_json_or_null(info.stamp_s)},
           {"links", links},

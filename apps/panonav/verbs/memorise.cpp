@@ -7,6 +7,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/localisation/observation_model.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -30,6 +31,7 @@ struct MemoriseArguments {
   bool no_thumbnails = false;
   bool no_features = false;
   bool strict = false;
+  std::string floor;
   LiveArguments live;
 };
 
@@ -219,7 +221,10 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
                       make_options(arguments, source->pictures(), skipped, session));
   LiveRun loop(*source, arguments.pictures.part, arguments.live, session);
   loop.run([](const Observation&) { return ""; },
-           [&](Observation&& observation) { memoriser.add(std::move(observation)); });
+           [&](Observation&& observation) {
+             observation.name = make_name_on_floor(arguments.floor, observation.name);
+             memoriser.add(std::move(observation));
+           });
   const LiveCounts& counts = loop.finish();
   if (counts.pictures == 0) throw FileError(arguments.inputs.front(), "provided no image");
   const auto stored = memoriser.finish(session.executor());
@@ -231,6 +236,7 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
 }
 
 ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments, Session& session) {
+  require_floor(arguments.floor);
   const bool memory_existed = memory_exists(arguments.memory);
   const bool live = recordings::is_live(arguments.inputs.front());
   if (!live) reject_live_options(declared, arguments.inputs.front(), true);
@@ -245,7 +251,10 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
   PictureArguments pictures = arguments.pictures;
   pictures.check = PictureArguments::Check::none;
   pictures.further_videos.assign(arguments.inputs.begin() + 1, arguments.inputs.end());
-  const Dataset recording = open_recording(arguments.inputs.front(), pictures, remembered, session);
+  Dataset recording = open_recording(arguments.inputs.front(), pictures, remembered, session);
+  for (DatasetEntry& entry : recording.entries) {
+    entry.file = make_name_on_floor(arguments.floor, entry.file);
+  }
   std::vector<Skipped> skipped;
   for (const Dataset::Unusable& one : recording.unusable) {
     if (arguments.strict) throw FileError(one.path.string(), one.fault);
@@ -301,6 +310,9 @@ Run declare_memorise(Arguments& arguments) {
   arguments.flag("--strict", values->strict,
                  "Stop at the first image that cannot be read, or whose size differs from that of "
                  "the other images; by default, such images are reported and skipped");
+  arguments.option("--floor NAME", values->floor,
+                   "Floor on which the images were taken; each floor has its own frame of "
+                   "positions. Names of its views begin with floor=NAME/");
   arguments.flag("--recursive", values->pictures.recursive, "Also read the images in subfolders");
   arguments.options("signature", values->signature);
   arguments.options("preprocessing", values->preprocessing);

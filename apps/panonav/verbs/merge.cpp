@@ -41,8 +41,9 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
   session.set_length_unit(read_length_unit(MemoryFile::open(arguments.memory, Access::read_only)));
   const bool has_nothing_new =
       merged.views == MemoryFile::open(arguments.first, Access::read_only).info().views;
-  const ExitCode exit_code =
-      merged.alignment || has_nothing_new ? ExitCode::done : ExitCode::no_answer;
+  const ExitCode exit_code = merged.alignment || has_nothing_new || !merged.has_shared_floor
+                                 ? ExitCode::done
+                                 : ExitCode::no_answer;
   if (session.json()) {
     session.print(
         session.json_line(ordered_json{{"memory", arguments.memory},
@@ -66,6 +67,8 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
         ", y " + session.format_length(pose.y_m, 2) + ", rotated by " +
         format_fixed(degrees(pose.heading_rad), 1) + " degrees, in the frame of " +
         arguments.first + ".");
+  } else if (!merged.has_shared_floor) {
+    session.print("The memories are of different floors, each of which keeps its positions.");
   } else {
     session.print(session.red("no place in common was found") +
                   ": the map contains both as parts that are not connected" +

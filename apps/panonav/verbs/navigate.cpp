@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "cli/option_values.hpp"
@@ -149,6 +150,26 @@ std::string_view explain_end(NavigationDecision::State state) {
   return "";
 }
 
+/// Returns why the run cannot reach a goal on another floor; empty if it ended otherwise.
+std::string explain_other_floor(const simulation::MissionRun& run, const RobotNavigator& robot) {
+  const auto& nearest = run.decisions.back().nearest;
+  const bool is_unreachable = run.end == NavigationDecision::State::unreachable;
+  return is_unreachable && nearest ? robot.explain_other_floor(*nearest) : std::string();
+}
+
+/// Sets the distances to the goal to infinity if it is on another floor.
+void clear_distances_between_floors(simulation::MissionRun& run, const RobotNavigator& robot) {
+  if (explain_other_floor(run, robot).empty()) return;
+  run.end_distance_m = std::numeric_limits<double>::infinity();
+  run.shortest_m = std::numeric_limits<double>::infinity();
+}
+
+/// Explains the end of a run in one line.
+std::string explain_end(const simulation::MissionRun& run, const RobotNavigator& robot) {
+  const std::string other_floor = explain_other_floor(run, robot);
+  return other_floor.empty() ? std::string(explain_end(run.end)) : other_floor;
+}
+
 ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& robot,
                           const std::string& goal, const Pose2& start,
                           const simulation::MissionRun& run) {
@@ -163,7 +184,7 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
           {"edges", graph.edges().size()},
           {"areas", planner.areas().nodes.size()},
           {"end", to_string(run.end)},
-          {"reason", explain_end(run.end)},
+          {"reason", explain_end(run, robot)},
           {"steps", run.decisions.size()},
           {"closed_edges", planner.blocked_edge_count()},
           {"start", pose_json(start)},
@@ -175,12 +196,12 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
            run.kidnapped_at ? ordered_json(*run.kidnapped_at + 1) : ordered_json()}};
 }
 
-void print_summary(const simulation::MissionRun& run, Session& session) {
+void print_summary(const simulation::MissionRun& run, const RobotNavigator& robot,
+                   Session& session) {
   const std::string name(to_string(run.end));
   session.print(
       (run.end == NavigationDecision::State::arrived ? session.green(name) : session.red(name)) +
-      " after " + format_count(run.decisions.size(), "step") + ": " +
-      std::string(explain_end(run.end)));
+      " after " + format_count(run.decisions.size(), "step") + ": " + explain_end(run, robot));
   if (std::isfinite(run.end_distance_m)) {
     session.print("distance from the goal's view: " +
                   session.bold(format_fixed(run.end_distance_m, 3) + " m"));
@@ -221,9 +242,10 @@ simulation::Mission make_mission(const NavigateArguments& arguments, ViewId goal
 
 // Writes the requested log, picture and report.
 void write_results(const NavigateArguments& arguments, const simulation::MissionPlace& place,
-                   const simulation::RememberedPlace& remembered, ViewId goal,
-                   const std::string& goal_file, const simulation::MissionRun& run,
-                   const viewer::RunPage& replay_page) {
+                   const simulation::RememberedPlace& remembered, const RobotNavigator& robot,
+                   const simulation::MissionRun& run, const viewer::RunPage& replay_page) {
+  const ViewId goal = robot.goal();
+  const std::string goal_file = robot.info(goal).name;
   if (arguments.log) write_log(*arguments.log, run);
   if (arguments.picture) {
     viewer::write_mission_picture(
@@ -234,7 +256,7 @@ void write_results(const NavigateArguments& arguments, const simulation::Mission
   if (arguments.report) {
     write_navigate_report(
         *arguments.report,
-        {goal_file, std::string(explain_end(run.end)), run,
+        {goal_file, explain_end(run, robot), run,
          viewer::make_mission_plot("", place, remembered, arguments.mission.planner, goal, run)},
         replay_page);
   }
@@ -306,7 +328,7 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
   const auto seed = static_cast<std::uint64_t>(arguments.simulation.simulation.scene.seed);
   const simulation::Mission mission = make_mission(arguments, robot.goal(), place, seed);
   if (!session.json()) print_graph(robot, session);
-  const simulation::MissionRun run = simulation::run_mission(
+  simulation::MissionRun run = simulation::run_mission(
       place, remembered, robot.navigator(), mission, arguments.mission, seed,
       [&](const NavigationDecision& decision, const Pose2& pose) {
         if (record.is_active()) {
@@ -317,12 +339,13 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
       },
       [&] { return set_goal_of_viewer(robot, remembered, record, session); });
   record.close();
+  clear_distances_between_floors(run, robot);
   const std::string goal_file = robot.info(robot.goal()).name;  // may have changed in the viewer
-  write_results(arguments, place, remembered, robot.goal(), goal_file, run, replay_page);
+  write_results(arguments, place, remembered, robot, run, replay_page);
   if (session.json()) {
     session.print(json_line(summary_json(arguments, robot, goal_file, mission.start, run)));
   } else {
-    print_summary(run, session);
+    print_summary(run, robot, session);
     if (arguments.report) print_report_path(*arguments.report, session);
   }
   return run.end == NavigationDecision::State::arrived ? ExitCode::done : ExitCode::no_answer;

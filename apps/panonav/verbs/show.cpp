@@ -5,6 +5,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/mapping/topological_map.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
@@ -23,11 +24,11 @@ struct ShowArguments {
 /// Returns id, name and distance of another view as JSON; the distance is null if a position is
 /// unknown.
 ordered_json neighbour_json(const VisualMemory& memory, ViewId view, ViewId other) {
-  const auto& here = memory.info(view).pose;
-  const auto& there = memory.info(other).pose;
+  const auto here = find_position(memory.info(view));
+  const auto there = find_position(memory.info(other));
   ordered_json json{
       {"id", other.value}, {"name", memory.info(other).name}, {"distance_m", nullptr}};
-  if (here && there) json["distance_m"] = distance(here->position(), there->position());
+  if (here && there && here->floor == there->floor) json["distance_m"] = distance(*here, *there);
   return json;
 }
 
@@ -55,12 +56,11 @@ ordered_json find_similar_views(const VisualMemory& memory, ViewId view) {
 
 ordered_json find_nearest_views(const VisualMemory& memory, ViewId view) {
   std::vector<std::pair<double, ViewId>> near;
-  const auto& pose = memory.info(view).pose;
+  const auto position = find_position(memory.info(view));
   for (const ViewId other : memory.views()) {
-    const auto& there = memory.info(other).pose;
-    if (pose && there && other != view) {
-      near.emplace_back(distance(pose->position(), there->position()), other);
-    }
+    const auto there = find_position(memory.info(other));
+    if (position && there && there->floor == position->floor && other != view)
+      near.emplace_back(distance(*position, *there), other);
   }
   std::ranges::sort(near);
   auto list = ordered_json::array();

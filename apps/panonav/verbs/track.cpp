@@ -92,11 +92,19 @@ void set_start(Tracker& tracker, const TrackArguments& arguments) {
   }
 }
 
+ordered_json floor_or_null(std::string_view floor) {
+  return floor.empty() ? ordered_json() : ordered_json(floor);
+}
+
 ordered_json to_json(const PoseMode& mode, bool is_heading_known) {
   const auto heading = is_heading_known ? std::optional(mode.mean.heading_rad) : std::nullopt;
-  return {{"weight", mode.weight},        {"x_m", mode.mean.x_m},
-          {"y_m", mode.mean.y_m},         {"heading_rad", to_json_or_null(heading)},
-          {"spread_m", mode.spread_m},    {"heading_spread_rad", mode.heading_spread_rad},
+  return {{"weight", mode.weight},
+          {"floor", floor_or_null(mode.floor)},
+          {"x_m", mode.mean.x_m},
+          {"y_m", mode.mean.y_m},
+          {"heading_rad", to_json_or_null(heading)},
+          {"spread_m", mode.spread_m},
+          {"heading_spread_rad", mode.heading_spread_rad},
           {"covariance", mode.covariance}};
 }
 
@@ -114,6 +122,7 @@ ordered_json to_json(const TrackedImage& image) {
   return {{"file", image.file},
           {"stamp_s", to_json_or_null(image.stamp_s)},
           {"state", to_string(estimate.state)},
+          {"floor", floor_or_null(estimate.floor())},
           {"pose", pose_json(pose)},
           {"inside", estimate.p_inside},
           {"probability", estimate.probability},
@@ -140,16 +149,17 @@ std::string format_line(const TrackedImage& image, Session& session) {
     return line + session.red(state);
   }
   const PoseMode& best = estimate.modes.front();
+  const std::string floor = best.floor.empty() ? "" : "  floor " + best.floor;
   if (is_localised(image)) {
-    return line + session.green(state) + "  " + format_position(*estimate.pose, session) +
+    return line + session.green(state) + floor + "  " + format_position(*estimate.pose, session) +
            "  heading " + format_fixed(degrees(estimate.pose->heading_rad), 1) +
            " degrees  spread " + session.format_length(best.spread_m, 2);
   }
   if (is_position_known(image)) {
-    return line + session.green(state) + "  " + format_position(best.mean, session) + "  spread " +
-           session.format_length(best.spread_m, 2);
+    return line + session.green(state) + floor + "  " + format_position(best.mean, session) +
+           "  spread " + session.format_length(best.spread_m, 2);
   }
-  line += session.bold(state) + "  ";
+  line += session.bold(state) + floor + "  ";
   if (estimate.modes.size() == 1) {
     return line + "an area around " + format_position(best.mean, session) + "  spread " +
            session.format_length(best.spread_m, 2);

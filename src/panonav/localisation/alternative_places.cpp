@@ -27,7 +27,7 @@ constexpr std::size_t compared_views = 4;
 constexpr double min_difference = 1e-3;
 
 // Groups the posed matches by single linkage: a chain of matches within `elsewhere_spacings` of
-// each other is one place, such as the next metres of a drive.
+// each other on one floor is one place, such as the next metres of a drive.
 std::vector<PlaceShare> group_by_place(const VisualMemory& memory, double spacing_m,
                                        std::span<const RankedMatch> matches) {
   std::vector<RankedMatch> rest;
@@ -36,8 +36,8 @@ std::vector<PlaceShare> group_by_place(const VisualMemory& memory, double spacin
     if (memory.info(match.match.view).pose) rest.push_back(match);
   }
   const auto is_linked = [&](const RankedMatch& a, const RankedMatch& b) {
-    return distance(memory.info(a.match.view).pose->position(),
-                    memory.info(b.match.view).pose->position()) <= elsewhere_spacings * spacing_m;
+    return distance(*find_position(memory.info(a.match.view)),
+                    *find_position(memory.info(b.match.view))) <= elsewhere_spacings * spacing_m;
   };
   std::vector<PlaceShare> places;
   while (!rest.empty() && places.size() < max_places) {

@@ -6,6 +6,7 @@
 
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/sample.hpp"
+#include "panonav/memory/floors.hpp"
 
 namespace panonav {
 
@@ -57,7 +58,7 @@ FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupp
         const auto there = std::ranges::lower_bound(views, other) - views.begin();
         return static_cast<double>(std::abs(there - rank));
       }
-      return distance(memory.info(other).pose->position(), memory.info(view).pose->position());
+      return distance(*find_position(memory.info(other)), *find_position(memory.info(view)));
     };
     // Excludes views at the same position, because a standing robot takes the same view repeatedly.
     std::vector<ViewId> excluded;

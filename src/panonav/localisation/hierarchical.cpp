@@ -11,7 +11,7 @@ namespace panonav {
 ReferenceAreas::ReferenceAreas(const VisualMemory& memory) : ReferenceAreas(PosedViews(memory)) {}
 
 ReferenceAreas::ReferenceAreas(PosedViews posed)
-    : views_(std::move(posed.views)), cells_(posed.positions) {
+    : views_(std::move(posed.views)), plane_(std::move(posed.plane)), cells_(posed.positions) {
   areas_m2_.reserve(cells_.sites().size());
   for (std::size_t site = 0; site < cells_.sites().size(); ++site) {
     areas_m2_.push_back(cells_.area_m2(site));
@@ -26,7 +26,9 @@ std::optional<std::size_t> ReferenceAreas::find_site(ViewId view) const {
 
 std::vector<Point2> ReferenceAreas::cell(ViewId view) const {
   const auto here = find_site(view);
-  return here ? cells_.cell(*here) : std::vector<Point2>{};
+  auto corners = here ? cells_.cell(*here) : std::vector<Point2>{};
+  for (Point2& corner : corners) corner = plane_.to_floor(corner).point;
+  return corners;
 }
 
 std::optional<std::vector<std::size_t>> ReferenceAreas::find_sites(
@@ -55,7 +57,12 @@ std::optional<Circle> ReferenceAreas::enclosing_circle(std::span<const Match> vi
   const auto sites = find_sites(views);
   if (!sites || sites->empty()) return std::nullopt;
   std::vector<Point2> positions;
-  for (const std::size_t site : *sites) positions.push_back(cells_.sites()[site]);
+  const std::string_view floor = plane_.to_floor(cells_.sites()[sites->front()]).floor;
+  for (const std::size_t site : *sites) {
+    const FloorPosition position = plane_.to_floor(cells_.sites()[site]);
+    if (position.floor != floor) return std::nullopt;
+    positions.push_back(position.point);
+  }
   Circle circle = smallest_enclosing_circle(positions);
   circle.radius_m += cells_.spacing_m() / std::sqrt(2.0);
   return circle;

@@ -7,6 +7,7 @@
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/localiser_options.hpp"
 #include "panonav/localisation/place.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
@@ -27,7 +28,8 @@ class ReferenceAreas {
   /// Returns the area of the union of the views' cells; nullopt if one of them has no pose.
   [[nodiscard]] std::optional<double> area_m2(std::span<const Match> views) const;
   /// Returns the smallest circle around the views' positions, enlarged by half a cell's diagonal so
-  /// that it covers their cells; nullopt if there are no views or one has no pose.
+  /// that it covers their cells; nullopt if there are no views, one has no pose, or they are on
+  /// several floors.
   [[nodiscard]] std::optional<Circle> enclosing_circle(std::span<const Match> views) const;
 
  private:
@@ -38,7 +40,8 @@ class ReferenceAreas {
       std::span<const Match> views) const;
 
   std::vector<ViewId> views_;  // with a pose, ascending; same order as the positions of `cells_`
-  VoronoiCells cells_;
+  FloorPlane plane_;
+  VoronoiCells cells_;            // of positions in `plane_`
   std::vector<double> areas_m2_;  // by site
 };
 

@@ -12,6 +12,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/alternative_places.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/signature/compass.hpp"
 
 namespace panonav {
@@ -60,6 +61,7 @@ std::optional<double> estimate_heading(const VisualMemory& memory,
   for (const PlaceMatch& match : matches.first(std::min(nearest_reference_count, matches.size()))) {
     const auto& pose = memory.info(match.view).pose;
     if (!pose || !pose->heading_rad || !match.heading_rad) continue;
+    if (floor_of(match.name) != floor_of(matches.front().name)) continue;
     const double heading_rad = *pose->heading_rad + *match.heading_rad;
     if (!centre_rad) centre_rad = heading_rad;
     const double offset = angle_difference(heading_rad, *centre_rad);
@@ -75,13 +77,13 @@ std::optional<double> estimate_heading(const VisualMemory& memory,
 // Moves the best reference nearest to the interpolated position to the front. The position
 // identifies it better than column differences, because noise dominates the differences between
 // neighbours.
-void move_nearest_first(const VisualMemory& memory, Point2 position,
+void move_nearest_first(const VisualMemory& memory, const FloorPosition& position,
                         std::vector<PlaceMatch>& matches) {
   const auto end = matches.begin() +
                    static_cast<std::ptrdiff_t>(std::min(nearest_reference_count, matches.size()));
   const auto distance_m = [&](const PlaceMatch& match) {
-    const auto& pose = memory.info(match.view).pose;
-    return pose ? distance(pose->position(), position) : std::numeric_limits<double>::infinity();
+    const auto there = find_position(memory.info(match.view));
+    return there ? distance(*there, position) : std::numeric_limits<double>::infinity();
   };
   const auto nearest = std::ranges::min_element(matches.begin(), end, {}, distance_m);
   std::rotate(matches.begin(), nearest, nearest + 1);
@@ -328,7 +330,9 @@ class Localiser::Query {
     place_.position = interpolate(ranked_);
     place_.heading_rad = estimate_heading(*compared_->memory, place_.matches);
     if (place_.position && options_.reranked_views > 0 && !is_ranked_by_features_) {
-      move_nearest_first(*compared_->memory, place_.position->position(), place_.matches);
+      move_nearest_first(*compared_->memory,
+                         {place_.position->position(), floor_of(place_.matches.front().name)},
+                         place_.matches);
     }
     if (place_.position) find_alternatives();
   }

@@ -78,6 +78,10 @@ struct MonteCarloEstimate {
   /// (docs/decisions.md).
   double probability = 0.0;
   std::uint64_t views_compared = 0;  ///< column by column
+  /// Returns the floor of the heaviest mode; empty without modes, or if the floor has no name.
+  [[nodiscard]] std::string_view floor() const noexcept {
+    return modes.empty() ? std::string_view{} : modes.front().floor;
+  }
 };
 
 /// Localises a robot by a particle filter over the posed views of a memory [M03 section 4].

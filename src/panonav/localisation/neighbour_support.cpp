@@ -9,6 +9,7 @@
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/voronoi.hpp"
+#include "panonav/memory/floors.hpp"
 
 namespace panonav {
 
@@ -36,20 +37,24 @@ double NeighbourSupport::radius_m(double spacing_m) noexcept {
 
 NeighbourSupport::NeighbourSupport(const ColumnRanking& ranking, std::optional<double> spacing_m)
     : ranking_(&ranking) {
+  const VisualMemory& memory = ranking.memory();
+  FloorPlane plane;
   std::vector<Point2> positions;
   std::vector<ViewId> views;
-  for (const ViewId view : ranking.memory().views()) {
-    if (const ReferencePose* const pose = find_pose(view)) {
-      positions.push_back(pose->position());
-      views.push_back(view);
-    }
+  for (const ViewId view : memory.views()) {
+    if (find_pose(view) == nullptr) continue;
+    positions.push_back(plane.to_plane(*find_position(memory.info(view))));
+    views.push_back(view);
   }
   if (positions.size() < 2) return;
   spacing_m_ = spacing_m ? *spacing_m : VoronoiCells(positions).spacing_m();
   radius_m_ = radius_m(spacing_m_);
   if (!(radius_m_ > 0.0)) return;
-  grid_.emplace(radius_m_);
-  for (std::size_t i = 0; i < views.size(); ++i) grid_->add(views[i].value, positions[i]);
+  for (const ViewId view : views) {
+    const auto found = find_position(memory.info(view));
+    grids_.try_emplace(std::string(found->floor), radius_m_)
+        .first->second.add(view.value, found->point);
+  }
 }
 
 const ReferencePose* NeighbourSupport::find_pose(ViewId view) const {
@@ -59,9 +64,11 @@ const ReferencePose* NeighbourSupport::find_pose(ViewId view) const {
 
 std::vector<ViewId> NeighbourSupport::neighbours(ViewId view) const {
   const ReferencePose* const pose = find_pose(view);
-  if (pose == nullptr || !grid_) return {};
+  if (pose == nullptr) return {};
+  const auto grid = grids_.find(floor_of(ranking_->memory().info(view).name));
+  if (grid == grids_.end()) return {};
   std::vector<std::pair<double, ViewId>> found;
-  grid_->visit_near(pose->position(), [&](std::uint32_t other, Point2 position) {
+  grid->second.visit_near(pose->position(), [&](std::uint32_t other, Point2 position) {
     const double distance_m = distance(position, pose->position());
     if (other != view.value && distance_m <= radius_m_)
       found.emplace_back(distance_m, ViewId{other});
@@ -116,7 +123,7 @@ std::optional<double> NeighbourSupport::supported_difference(
 void NeighbourSupport::rank_by_support(const ColumnProfiles& query,
                                        std::vector<RankedMatch>& ranked,
                                        std::span<const ViewId> excluded) const {
-  if (ranked.empty() || !grid_) return;
+  if (ranked.empty() || grids_.empty()) return;
   const double limit = max_score_ratio * ranked.front().score();
   const RankedMatch* chosen = nullptr;
   double min_score = std::numeric_limits<double>::infinity();

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <functional>
+#include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "panonav/geometry/point_grid.hpp"
@@ -15,8 +18,8 @@ namespace panonav {
 /// Uses only references with headings.
 class NeighbourSupport {
  public:
-  /// Indexes the references; neighbours are the 8 nearest ones within 1.5 spacings. `spacing_m`:
-  /// spacing of the references; computed if nullopt. The ranking must outlive *this.
+  /// Indexes the references; neighbours are the 8 nearest ones of its floor within 1.5 spacings.
+  /// `spacing_m`: spacing of the references; computed if nullopt. The ranking must outlive *this.
   explicit NeighbourSupport(const ColumnRanking& ranking,
                             std::optional<double> spacing_m = std::nullopt);
 
@@ -53,7 +56,8 @@ class NeighbourSupport {
   const ColumnRanking* ranking_;
   double spacing_m_ = 0.0;
   double radius_m_ = 0.0;
-  std::optional<PointGrid> grid_;  // of references with headings; nullopt: no neighbours
+  /// References with headings, by floor; empty: no neighbours.
+  std::map<std::string, PointGrid, std::less<>> grids_;
 };
 
 }  // namespace panonav

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "panonav/geometry/pose2.hpp"
@@ -49,6 +50,7 @@ struct PoseMode {
   std::array<double, 9> covariance{};  ///< of x, y (m) and heading (rad), row by row
   double spread_m = 0.0;               ///< root mean square distance from the mean
   double heading_spread_rad = 0.0;     ///< the same of the headings
+  std::string floor;                   ///< in whose frame the mean is (`Tracker`); may be empty
 };
 
 }  // namespace panonav

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "panonav/geometry/voronoi.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
@@ -73,8 +74,8 @@ struct PositionEstimate {
     double weight = 0.0;  ///< may be negative; all sum to 1
   };
 
-  double x_m = 0.0;  ///< in the frame of the memory's positions
-  double y_m = 0.0;  ///< in the frame of the memory's positions
+  double x_m = 0.0;  ///< in the frame of the floor
+  double y_m = 0.0;  ///< in the frame of the floor
   /// Bound of the position along a line of views, narrower than the radius.
   struct AlongRoute {
     double direction_rad = 0.0;  ///< of the line at the estimate, in [-pi/2, pi/2]
@@ -102,6 +103,8 @@ struct AlternativePlace {
   double probability = 0.0;                  ///< that the query was taken there
   std::optional<PositionEstimate> position;  ///< as `Place::position`
   std::optional<double> heading_rad;         ///< as `Place::heading_rad`
+  /// Returns the floor of the place, in whose frame the position is; empty if it has no name.
+  [[nodiscard]] std::string_view floor() const noexcept { return floor_of(match.name); }
 };
 
 /// Result of localising one view.
@@ -133,6 +136,11 @@ struct Place {
   std::uint64_t bytes_read = 0;      ///< bytes read by the search
   std::uint64_t bytes_in_full = 0;   ///< bytes that a scan of all views would read
   std::uint64_t views_compared = 0;  ///< number of views compared column by column
+  /// Returns the floor of the place, in whose frame the position is; empty if the place is unknown
+  /// or its floor has no name.
+  [[nodiscard]] std::string_view floor() const noexcept {
+    return known ? floor_of(matches.front().name) : std::string_view{};
+  }
   /// Areas from coarse to fine; empty without the option `PlaceRecogniserOptions::areas`.
   std::vector<LocalisationLevel> areas;
 };

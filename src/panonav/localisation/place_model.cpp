@@ -12,6 +12,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/localisation/sample.hpp"
+#include "panonav/memory/floors.hpp"
 
 namespace panonav {
 
@@ -26,14 +27,14 @@ PackedSignature mirror(PackedSignature signature) {
 // Returns the nearest view taken at another position. Views at the same position are ignored, as a
 // standing robot takes the same view repeatedly.
 std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId view) {
-  const auto& pose = memory.info(view).pose;
-  if (!pose) return std::nullopt;
+  const auto position = find_position(memory.info(view));
+  if (!position) return std::nullopt;
   std::optional<ViewId> nearest;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (const ViewId other : memory.views()) {
-    const auto& there = memory.info(other).pose;
+    const auto there = find_position(memory.info(other));
     if (!there) continue;
-    const double distance_m = distance(there->position(), pose->position());
+    const double distance_m = distance(*there, *position);
     if (distance_m > 0.0 && distance_m < nearest_m) {
       nearest_m = distance_m;
       nearest = other;

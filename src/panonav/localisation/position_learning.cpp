@@ -46,7 +46,7 @@ constexpr double min_difference_unit = 1e-4;
 
 /// Views left out of the memory in turn, and the views that resemble them.
 struct LeftOutViews {
-  std::vector<Point2> true_positions;
+  std::vector<FloorPosition> true_positions;
   /// All matches of the search, aliased views included. The interpolation is learnt from these,
   /// since they matter if there are few views.
   std::vector<ResemblingViews> found;
@@ -67,18 +67,18 @@ struct LeftOutViews {
 
 // Returns the best match at each place farther than `elsewhere_spacings` from `truth` and from the
 // others: perceptual aliasing.
-std::vector<ViewId> find_aliased_views(const VisualMemory& memory, Point2 truth,
+std::vector<ViewId> find_aliased_views(const VisualMemory& memory, const FloorPosition& truth,
                                        std::span<const RankedMatch> ranked, double spacing_m) {
-  std::vector<Point2> places{truth};
+  std::vector<FloorPosition> places{truth};
   std::vector<ViewId> aliased;
   for (const RankedMatch& match : ranked) {
-    const auto& pose = memory.info(match.match.view).pose;
-    if (!pose || std::ranges::any_of(places, [&](Point2 place) {
-          return distance(pose->position(), place) <= elsewhere_spacings * spacing_m;
+    const auto position = find_position(memory.info(match.match.view));
+    if (!position || std::ranges::any_of(places, [&](const FloorPosition& place) {
+          return distance(*position, place) <= elsewhere_spacings * spacing_m;
         })) {
       continue;
     }
-    places.push_back(pose->position());
+    places.push_back(*position);
     aliased.push_back(match.match.view);
   }
   return aliased;
@@ -89,7 +89,7 @@ void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& sup
                        LeftOutViews& left_out) {
   const VisualMemory& memory = ranking.memory();
   const PackedSignature own = memory.packed(view);
-  const Point2 truth = memory.info(view).pose->position();
+  const FloorPosition truth = *find_position(memory.info(view));
   std::vector<ViewId> excluded{view};
   const SearchResult found =
       memory.search(own, {.top = searched_match_count, .components = ranking.components()},
@@ -148,7 +148,7 @@ bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
         if (!left_out.is_found_near(i, model.spacing_m)) continue;
         const KrigedPosition kriged =
             krige(left_out.found[i], neighbourhood_m, exponent, model.difference_unit);
-        sum_m += distance(kriged.position, left_out.true_positions[i]);
+        sum_m += distance(kriged.position, left_out.true_positions[i].point);
       }
       if (sum_m < best_sum_m) {
         best_sum_m = sum_m;
@@ -173,7 +173,7 @@ std::vector<LeftOutError> interpolate_all(const LeftOutViews& left_out,
   for (std::size_t i = 0; i < left_out.size(); ++i) {
     const KrigedPosition found =
         krige(left_out.answered[i], model.neighbourhood_m, model.exponent, model.difference_unit);
-    const Point2 truth = left_out.true_positions[i];
+    const Point2 truth = left_out.true_positions[i].point;
     errors.push_back(
         {{found.position.x_m - truth.x_m, found.position.y_m - truth.y_m}, found.variance});
   }

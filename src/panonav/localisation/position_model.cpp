@@ -106,12 +106,12 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
                                                      std::span<const RankedMatch> matches,
                                                      std::span<const ViewId> excluded) {
   if (matches.empty()) return std::nullopt;
-  const auto& nearest = ranking.memory().info(matches[0].match.view).pose;
+  const auto nearest = find_position(ranking.memory().info(matches[0].match.view));
   if (!nearest) return std::nullopt;
   PositionEstimate estimate;
   if (!model.learnt) {
-    estimate.x_m = nearest->x_m;
-    estimate.y_m = nearest->y_m;
+    estimate.x_m = nearest->point.x_m;
+    estimate.y_m = nearest->point.y_m;
     estimate.shares = {{matches[0].match.view, 1.0}};
     return estimate;
   }
@@ -120,7 +120,7 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
       krige(near, model.neighbourhood_m, model.exponent, model.difference_unit);
   estimate.x_m = kriged.position.x_m;
   estimate.y_m = kriged.position.y_m;
-  const LocalLayout local = layout.around(nearest->position(), excluded);
+  const LocalLayout local = layout.around(*nearest, excluded);
   const double difference = matches[0].columns.difference;
   const bool is_ambiguous =
       model.ambiguous_from && ratio_to_elsewhere(near, model.spacing_m) >= *model.ambiguous_from;

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "panonav/geometry/angles.hpp"
-#include "panonav/localisation/internal/posed_views.hpp"
 
 namespace panonav {
 
@@ -93,10 +92,11 @@ std::optional<double> find_line_direction(std::span<const Point2> points) {
 ReferenceLayout::ReferenceLayout(const VisualMemory& memory, double spacing_m)
     : spacing_m_(spacing_m) {
   if (!(spacing_m > 0.0)) return;
-  const PosedViews posed(memory);
-  grid_.emplace((1.0 + rounding_share) * reach_m(spacing_m));
-  for (std::size_t i = 0; i < posed.views.size(); ++i) {
-    grid_->add(posed.views[i].value, posed.positions[i]);
+  const PointGrid empty((1.0 + rounding_share) * reach_m(spacing_m));
+  for (const ViewId view : memory.views()) {
+    if (const auto found = find_position(memory.info(view)))
+      grids_.try_emplace(std::string(found->floor), empty)
+          .first->second.add(view.value, found->point);
   }
 }
 
@@ -104,10 +104,13 @@ double ReferenceLayout::reach_m(double spacing_m) noexcept {
   return reach_spacings * spacing_m;
 }
 
-LocalLayout ReferenceLayout::around(Point2 position, std::span<const ViewId> excluded) const {
-  if (!grid_) return {};
+LocalLayout ReferenceLayout::around(const FloorPosition& there,
+                                    std::span<const ViewId> excluded) const {
+  const auto grid = grids_.find(there.floor);
+  if (grid == grids_.end()) return {};
+  const Point2 position = there.point;
   std::vector<Point2> near;
-  grid_->visit_near(position, [&](std::uint32_t number, Point2 point) {
+  grid->second.visit_near(position, [&](std::uint32_t number, Point2 point) {
     if (distance(point, position) > (1.0 + rounding_share) * reach_m(spacing_m_)) return;
     if (std::ranges::find(excluded, ViewId{number}) == excluded.end()) near.push_back(point);
   });

@@ -1,10 +1,12 @@
 #pragma once
 
-#include <optional>
+#include <functional>
+#include <map>
 #include <span>
+#include <string>
 
 #include "panonav/geometry/point_grid.hpp"
-#include "panonav/geometry/pose2.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
@@ -33,11 +35,12 @@ class ReferenceLayout {
   [[nodiscard]] static double reach_m(double spacing_m) noexcept;
   /// Returns the layout around a view's position, without the views `excluded`. Cost: a few
   /// microseconds.
-  [[nodiscard]] LocalLayout around(Point2 position, std::span<const ViewId> excluded = {}) const;
+  [[nodiscard]] LocalLayout around(const FloorPosition& there,
+                                   std::span<const ViewId> excluded = {}) const;
 
  private:
   double spacing_m_;
-  std::optional<PointGrid> grid_;  // of the views' ids; nullopt: no spacing
+  std::map<std::string, PointGrid, std::less<>> grids_;  // of the views' ids, by floor
 };
 
 }  // namespace panonav

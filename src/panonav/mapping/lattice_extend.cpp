@@ -6,6 +6,7 @@
 #include "panonav/mapping/internal/lattice_solver.hpp"
 #include "panonav/mapping/internal/lattice_springs.hpp"
 #include "panonav/mapping/lattice.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {
@@ -105,6 +106,7 @@ class Extender {
                                       {.excluded_views = excluded});
     for (const Match& match : found.matches) {
       if (match.dissimilarity > lattice_.curve.max_dissimilarity()) continue;
+      if (floor_of(memory_.info(match.view).name) != floor_of(memory_.info(view).name)) continue;
       Lattice::Spring spring{.a = node_of_view_.at(match.view),
                              .b = node,
                              .dissimilarity = static_cast<double>(match.dissimilarity)};

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/point_grid.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 
@@ -83,10 +85,11 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
     const ViewId view = *at;
     HomingView coefficients = homing_view(memory, view);
     const auto& pose = memory.info(view).pose;
+    const std::string_view floor = floor_of(memory.info(view).name);
     std::optional<SparseSelection::Redundant> best;
     const auto consider = [&](ViewId other, std::optional<double> distance_m) {
       const auto found = kept.find(other);
-      if (found == kept.end()) return;
+      if (found == kept.end() || floor_of(memory.info(other).name) != floor) return;
       const double difference = image_difference(found->second, coefficients);
       const bool outdated = distance_m && *distance_m < options.outdated_within_m;
       const bool is_similar =
@@ -184,9 +187,9 @@ SparseSelection::Loss measure_loss(const VisualMemory& memory, const SparseSelec
     const auto error_m = [&](std::span<const ViewId> excluded) -> std::optional<double> {
       const auto found = memory.search(query, {.top = 1}, {.excluded_views = excluded});
       if (found.matches.empty()) return std::nullopt;
-      const auto& other = memory.info(found.matches.front().view).pose;
-      if (!other) return std::nullopt;
-      return distance(other->position(), pose->position());
+      const auto other = find_position(memory.info(found.matches.front().view));
+      if (!other || other->floor != floor_of(memory.info(redundant.view).name)) return std::nullopt;
+      return distance(other->point, pose->position());
     };
     const auto before = error_m(itself);
     const auto after = error_m(dropped);

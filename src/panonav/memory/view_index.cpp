@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "panonav/memory/floors.hpp"
+
 namespace panonav {
 
 SearchResult HeldViewIndex::search(const PackedSignature& query, const SearchOptions& options,
@@ -40,8 +42,13 @@ std::vector<ViewId> HeldViewIndex::views_within(std::span<const PositionBounds> 
 
 std::vector<PosedView> HeldViewIndex::posed_views() {
   std::vector<PosedView> posed;
+  FloorPlane plane;
   for (const ViewId view : memory_->views()) {
-    if (const auto& pose = memory_->info(view).pose) posed.push_back({view, *pose});
+    const ReferenceInfo& info = memory_->info(view);
+    const auto position = find_position(info);
+    if (!position) continue;
+    const Point2 in_plane = plane.to_plane(*position);
+    posed.push_back({view, {in_plane.x_m, in_plane.y_m, info.pose->heading_rad}});
   }
   return posed;
 }

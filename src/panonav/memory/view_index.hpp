@@ -45,7 +45,8 @@ class ViewIndex {
   /// Returns the views with positions within one of the rectangles, ascending, each once.
   [[nodiscard]] virtual std::vector<ViewId> views_within(
       std::span<const PositionBounds> bounds) = 0;
-  /// Returns all views with positions, ascending. Cost: 40 bytes for each.
+  /// Returns all views with positions, ascending. Cost: 40 bytes for each. Floors lie apart in one
+  /// plane (`make_floor_plane`).
   [[nodiscard]] virtual std::vector<PosedView> posed_views() = 0;
 };
 

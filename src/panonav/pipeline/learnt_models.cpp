@@ -9,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/storage/checksum.hpp"
 
@@ -110,6 +111,7 @@ std::string compute_fingerprint(const VisualMemory& memory) {
     scratch.clear();
     scratch.add(std::int64_t{view.value});
     if (const auto& pose = memory.info(view).pose) {
+      if (const auto floor = floor_of(memory.info(view).name); !floor.empty()) scratch.add(floor);
       scratch.add(pose->x_m);
       scratch.add(pose->y_m);
       if (pose->heading_rad) scratch.add(*pose->heading_rad);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <random>
@@ -16,6 +17,7 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/temporary_file.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
@@ -38,14 +40,15 @@ std::optional<Pose2> get_complete_pose(const ReferenceInfo& info) {
   return Pose2{info.pose->x_m, info.pose->y_m, *info.pose->heading_rad};
 }
 
-/// Returns the file's map, or makes one from the views' poses if there is none. The largest
-/// connected component becomes number 0.
-TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& views) {
+/// Returns the file's map, or makes one from the views' poses on a floor if there is none. The
+/// largest connected component becomes number 0.
+TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& views,
+                                std::string_view floor) {
   TopologicalMap map = file.map(map_name).value_or(TopologicalMap{});
   if (map.nodes.empty()) {
     for (const ViewId view : views.views()) {
       const auto pose = get_complete_pose(views.info(view));
-      if (!pose) continue;
+      if (!pose || floor_of(views.info(view).name) != floor) continue;
       if (!map.nodes.empty()) {
         const TopologicalMap::Node& before = map.nodes.back();
         map.edges.push_back({before.view, view, inverse(before.pose) * *pose});
@@ -153,12 +156,13 @@ void require_same_settings(const MemoryFile& first, const MemoryFile& second) {
   require_same("preprocessing", a.preprocessing == b.preprocessing);
 }
 
-/// Returns `name` if it is free, else the name prefixed by that of its file.
+/// Returns `name` if it is free, else the name prefixed by that of its file, on the same floor.
 template <class IsTaken>
 std::string make_free_name(const std::string& name, const MemoryFile& from,
                            const IsTaken& is_taken) {
   if (!is_taken(name)) return name;
-  const std::string base = fs::path(memory_name(from.path())).stem().string() + "/" + name;
+  const std::string file = fs::path(memory_name(from.path())).stem().string();
+  const std::string base = add_prefix_on_floor(file + "/", name);
   std::string new_name = base;
   for (int i = 2; is_taken(new_name); ++i) new_name = base + " (" + std::to_string(i) + ")";
   return new_name;
@@ -231,6 +235,7 @@ class Merge {
       : files_{&first, &second},
         views_{first.load(), second.load()},
         positions_from_maps_(are_positions_from_maps(first, second)),
+        floor_(find_shared_floor()),
         alignment_(alignment),
         graph_(graph) {}
 
@@ -254,6 +259,7 @@ class Merge {
     }
     for (std::size_t i = 0; i < 2; ++i) add_routes(file, i);
     result_.views = all.size();
+    result_.has_shared_floor = floor_.has_value();
     result_.connected_components = count_components(map);
     return result_;
   }
@@ -317,12 +323,12 @@ class Merge {
   }
 
   TopologicalMap join_maps(const VisualMemory& all) {
-    std::array own{read_or_make_map(*files_[0], views_[0]),
-                   read_or_make_map(*files_[1], views_[1])};
+    std::array own{read_or_make_map(*files_[0], views_[0], floor_.value_or("")),
+                   read_or_make_map(*files_[1], views_[1], floor_.value_or(""))};
     for (std::size_t i = 0; i < 2; ++i) scale_lengths(own[i], read_assumed_unit_m(*files_[i]));
     const std::array maps{replace_ids(own[0], ids_[0]), replace_ids(own[1], ids_[1])};
     const std::array largest{select_components(maps[0], true), select_components(maps[1], true)};
-    result_.alignment = align_sessions(all, largest[0], largest[1], alignment_);
+    if (floor_) result_.alignment = align_sessions(all, largest[0], largest[1], alignment_);
     TopologicalMap map = largest[0];
     if (result_.alignment) {
       map = join_sessions(largest[0], largest[1], *result_.alignment, graph_);
@@ -350,7 +356,8 @@ class Merge {
     for (const auto& both : ids_[0]) of_first.insert(both.second);
     for (const auto& [old, view] : ids_[1]) {
       const auto& pose = views_[1].info(old).pose;
-      if (!pose || of_first.contains(view)) continue;
+      if (!pose || of_first.contains(view) || floor_of(views_[1].info(old).name) != floor_)
+        continue;
       if (!result_.alignment) {
         file.set_pose(view, std::nullopt);
         ++result_.without_position;
@@ -398,9 +405,25 @@ class Merge {
     }
   }
 
+  /// Returns the floor of which both memories have views; nullopt: none. Throws FileError if there
+  /// are several, as the frames of each would need an alignment of their own.
+  [[nodiscard]] std::optional<std::string> find_shared_floor() const {
+    std::vector<std::string> shared;
+    std::ranges::set_intersection(list_floors(views_[0]), list_floors(views_[1]),
+                                  std::back_inserter(shared));
+    if (shared.size() > 1) {
+      throw FileError(files_[1]->path().string(),
+                      "has " + std::to_string(shared.size()) + " floors that " +
+                          files_[0]->path().string() +
+                          " has, too; allowed: one, so merge memories of single floors");
+    }
+    return shared.empty() ? std::nullopt : std::optional(shared.front());
+  }
+
   std::array<const MemoryFile*, 2> files_;
   std::array<VisualMemory, 2> views_;
   bool positions_from_maps_;
+  std::optional<std::string> floor_;  // that both memories have
   const SessionAlignmentOptions& alignment_;
   const PoseGraphOptions& graph_;
   std::array<NewIds, 2> ids_;

@@ -23,20 +23,21 @@ struct MergedMemory {
   /// Number of views of the second memory whose positions were dropped, because their frame could
   /// not be related to that of the first.
   std::size_t without_position = 0;
+  /// False if each floor is in one of the memories only; its views then keep their positions.
+  bool has_shared_floor = true;
 };
 
 /// Merges the memories of two sessions or robots in one environment: finds common places by
 /// appearance (`align_sessions`) and transforms the second into the frame of the first's poses
-/// (`join_sessions`). Moves only their largest connected components. Without common places
-/// the two stay unconnected, and the second loses its positions.
+/// (`join_sessions`). Moves only their largest connected components, on the floor that both have.
+/// Without common places on it, the second loses its positions there.
 ///
 /// A view with the same name and picture in both is stored once, as in the first. Other names of
-/// the second that the first already uses become "STEM/NAME". Writes `memory` completely or not at
-/// all.
+/// the second that the first uses become "STEM/NAME".
 ///
-/// Throws FileError on files that cannot be read or written, if `memory` exists, and on positions
-/// without headings; ContractError if shape, preprocessing or elevations differ; OptionError. Holds
-/// both memories. Cost: `align_sessions`, and writing all views twice.
+/// Throws FileError on unreadable files, if `memory` exists, if several floors are in both, and on
+/// positions without headings; ContractError if shape, preprocessing or elevations differ;
+/// OptionError. Holds both memories. Cost: `align_sessions`, and writing views twice.
 MergedMemory merge_memories(const std::filesystem::path& first, const std::filesystem::path& second,
                             const std::filesystem::path& memory,
                             const SessionAlignmentOptions& alignment = {},

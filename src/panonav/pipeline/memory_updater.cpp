@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/number_text.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
@@ -62,6 +63,12 @@ MemoryUpdate::UseStatistics parse_memory_use(const std::optional<std::string>& t
 
 ObservationModel load_or_learn_model(const MemoryFile& file, const ColumnRanking& ranking) {
   const VisualMemory& memory = ranking.memory();
+  if (const auto floors = list_floors(memory); !floors.empty() && !floors.back().empty()) {
+    throw FileError(file.path().string(),
+                    "holds views on floor " + floors.back() +
+                        "; allowed where views are updated: views on no floor, so leave out the "
+                        "option update");
+  }
   const auto oriented = std::ranges::count_if(memory.views(), [&](ViewId view) {
     const auto& pose = memory.info(view).pose;
     return pose && pose->heading_rad;

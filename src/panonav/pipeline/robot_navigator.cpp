@@ -9,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/mapping/lattice.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
@@ -65,6 +66,22 @@ NavigationGraph load_requested_graph(
     auto graph = load_graph(origin, source, executor);
     if (graph) return std::move(*graph);
   }
+}
+
+/// Leaves out edges between two floors.
+NavigationGraph keep_edges_on_floors(NavigationGraph graph, const MemoryFile& file) {
+  const std::vector<ViewId> views = file.views();
+  const std::vector<std::string> names = file.names();
+  const auto floor = [&](ViewId view) {
+    const auto found = std::ranges::lower_bound(views, view) - views.begin();
+    return floor_of(names.at(static_cast<std::size_t>(found)));
+  };
+  std::vector<NavigationGraph::Edge> kept;
+  for (const NavigationGraph::Edge& edge : graph.edges()) {
+    if (floor(edge.a) == floor(edge.b)) kept.push_back(edge);
+  }
+  if (kept.size() == graph.edges().size()) return graph;
+  return {{graph.views().begin(), graph.views().end()}, std::move(kept)};
 }
 
 /// Returns the route with the views near it. Route and views must have been recorded with the
@@ -133,8 +150,9 @@ RobotNavigator::RobotNavigator(const std::filesystem::path& memory, const std::s
       encoder_(views_.file().header(), source.value_or(views_.file().header().source)) {
   validate(options_.base);
   Executor own(1);
-  NavigationGraph graph =
-      load_requested_graph(views_, options_.edges, origin_, executor == nullptr ? own : *executor);
+  NavigationGraph graph = keep_edges_on_floors(
+      load_requested_graph(views_, options_.edges, origin_, executor == nullptr ? own : *executor),
+      views_.file());
   navigator_.emplace(views_, AreaPlanner(std::move(graph), options_.planner), options_.navigator);
   set_goal(goal);
   if (!options_.route) return;
@@ -170,6 +188,18 @@ NavigationDecision RobotNavigator::observe(const Observation& observation, Robot
   }
   report.moved = moved_;
   return navigator_->observe(encoder_.signature(observation), report);
+}
+
+std::string RobotNavigator::explain_other_floor(ViewId view) const {
+  const std::string goal = info(goal_).name;
+  const std::string here = info(view).name;
+  if (floor_of(goal) == floor_of(here)) return {};
+  const auto describe = [](std::string_view name) {
+    const std::string_view floor = floor_of(name);
+    return floor.empty() ? "on the floor without a name" : "on floor " + std::string(floor);
+  };
+  return "the goal is " + describe(goal) + ", the robot " + describe(here) + " at " + here +
+         "; choose a goal on its floor";
 }
 
 RobotNavigator::Step RobotNavigator::step(const Observation& observation, RobotReport report) {

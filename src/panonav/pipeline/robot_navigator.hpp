@@ -45,8 +45,8 @@ struct RobotNavigatorOptions {
 
 /// Drives a robot to a memorised view: takes an image, returns a velocity. Reads views from the
 /// memory file when needed; holds the whole graph, but only the views in and around the current
-/// area. Making the graph temporarily loads the views of all nodes of a map, or all views for an
-/// arrangement. One thread at a time.
+/// area. Drives on one floor: no edge leads to another. Making the graph temporarily loads the
+/// views of all nodes of a map, or all views for an arrangement. One thread at a time.
 class RobotNavigator {
  public:
   /// The robot's next motion after an observation.
@@ -88,6 +88,8 @@ class RobotNavigator {
   [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
   /// Reads name, pose and stamp of a view from the file.
   [[nodiscard]] ReferenceInfo info(ViewId view) const;
+  /// Returns why no path leads from a view to the goal, if they are on two floors; else empty.
+  [[nodiscard]] std::string explain_other_floor(ViewId view) const;
   /// Returns the navigator, for programs that compute observations and velocities themselves.
   [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
   /// Returns the encoder that makes queries of pictures.

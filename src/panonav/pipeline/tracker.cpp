@@ -1,6 +1,7 @@
 #include "panonav/pipeline/tracker.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "panonav/geometry/position_bound.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/sample.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/memory_map.hpp"
@@ -41,6 +43,20 @@ void require_positions(const MemoryFile& file, const VisualMemory& memory) {
 // stored models were learnt.
 bool can_use_stored_models(const TrackerOptions& options) {
   return options.filter.seed == LearningOptions{}.seed;
+}
+
+// Returns the root mean square distance of the particles, whose weights sum to 1, from their mean.
+double compute_spread_m(const Particles& particles) {
+  Point2 mean;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    mean.x_m += particles.weight[i] * particles.x_m[i];
+    mean.y_m += particles.weight[i] * particles.y_m[i];
+  }
+  double sum = 0.0;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    sum += particles.weight[i] * std::pow(distance(particles.position(i), mean), 2.0);
+  }
+  return std::sqrt(sum);
 }
 
 MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& memory,
@@ -104,7 +120,9 @@ struct Tracker::Implementation {
         localiser(make_localiser(file, *memory, options)),
         noise(options.odometry),
         max_learnt_views(options.max_learnt_views),
-        unit(read_length_unit(file)) {}
+        unit(read_length_unit(file)),
+        plane(make_floor_plane(*memory)),
+        floor(plane.to_floor(HeldViewIndex(*memory).posed_views().front().pose.position()).floor) {}
   Implementation(std::unique_ptr<IndexedMemory> index, const MemoryFile& file,
                  const TrackerOptions& options)
       : indexed(std::move(index)),
@@ -135,7 +153,51 @@ struct Tracker::Implementation {
   MonteCarloLocaliser localiser;
   std::optional<OdometryNoise> noise;  // of the options
   std::size_t max_learnt_views;
-  LengthUnit unit;  // of the positions
+  LengthUnit unit;    // of the positions
+  FloorPlane plane;   // of the filter; the floors of a memory that is not held are not told apart
+  std::string floor;  // of the last estimated position
+
+  [[nodiscard]] bool is_on_floor(Point2 in_plane) const {
+    return plane.to_floor(in_plane).floor == floor;
+  }
+  /// Converts the poses to the frames of their floors, and the spread to that on the floor of the
+  /// heaviest mode.
+  [[nodiscard]] MonteCarloEstimate to_floors(MonteCarloEstimate estimate) {
+    const auto convert = [&](auto& pose) {
+      const Point2 point = plane.to_floor({pose.x_m, pose.y_m}).point;
+      pose.x_m = point.x_m;
+      pose.y_m = point.y_m;
+    };
+    if (estimate.position) floor = plane.to_floor(*estimate.position).floor;
+    for (PoseMode& mode : estimate.modes) {
+      mode.floor = plane.to_floor(mode.mean.position()).floor;
+      convert(mode.mean);
+    }
+    if (estimate.pose) convert(*estimate.pose);
+    if (estimate.position) convert(*estimate.position);
+    const Particles on_floor = particles();
+    if (on_floor.size() < localiser.particles().size() && !on_floor.empty()) {
+      estimate.spread_m = compute_spread_m(on_floor);
+    }
+    return estimate;
+  }
+  /// Returns the particles on the floor, in its frame.
+  [[nodiscard]] Particles particles() const {
+    const Particles& all = localiser.particles();
+    Particles kept;
+    double sum = 0.0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!is_on_floor(all.position(i))) continue;
+      const Point2 point = plane.to_floor(all.position(i)).point;
+      kept.add({point.x_m, point.y_m, all.heading_rad[i]}, all.weight[i]);
+      sum += all.weight[i];
+    }
+    if (kept.size() < all.size() && sum > 0.0) {
+      for (double& weight : kept.weight) weight /= sum;
+    }
+    return kept;
+  }
+
   /// Metres per unit of visual length by the latest images with odometry; nullopt if these are too
   /// few or show no motion.
   [[nodiscard]] std::optional<double> measure_scale_m() const {
@@ -211,7 +273,10 @@ void Tracker::start_globally(std::optional<double> heading_rad) {
   implementation_->localiser.start_globally(heading_rad);
 }
 void Tracker::start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad) {
-  implementation_->localiser.start_at(pose, deviation_m, heading_deviation_rad);
+  Implementation& own = *implementation_;
+  const Point2 start = own.plane.to_plane({pose.position(), own.floor});
+  own.localiser.start_at({start.x_m, start.y_m, pose.heading_rad}, deviation_m,
+                         heading_deviation_rad);
 }
 
 MonteCarloEstimate Tracker::observe(const Observation& observation) {
@@ -229,7 +294,7 @@ MonteCarloEstimate Tracker::observe(const Observation& observation) {
 
 MonteCarloEstimate Tracker::observe(const PackedSignature& view) {
   implementation_->is_moved = false;
-  return implementation_->localiser.observe(view);
+  return implementation_->to_floors(implementation_->localiser.observe(view));
 }
 
 void Tracker::move(const std::optional<Pose2>& odometry, const FourierSignature* view) {
@@ -314,6 +379,28 @@ bool Tracker::is_memory_held() const noexcept {
 const VisualMemory& Tracker::memory() const {
   if (!is_memory_held()) throw ContractError("memory", "not held", "one that is held");
   return *implementation_->memory;
+}
+const std::string& Tracker::floor() const noexcept {
+  return implementation_->floor;
+}
+Particles Tracker::particles() const {
+  return implementation_->particles();
+}
+ViewId Tracker::find_nearest_view(Point2 position) const {
+  FloorPlane plane = implementation_->plane;
+  return implementation_->localiser.find_nearest_view(
+      plane.to_plane({position, implementation_->floor}));
+}
+std::vector<PosedView> Tracker::posed_views() const {
+  std::vector<PosedView> views = index()->posed_views();
+  std::erase_if(views, [&](const PosedView& view) {
+    return !implementation_->is_on_floor(view.pose.position());
+  });
+  for (PosedView& view : views) {
+    const Point2 point = implementation_->plane.to_floor(view.pose.position()).point;
+    view.pose = {point.x_m, point.y_m, view.pose.heading_rad};
+  }
+  return views;
 }
 std::unique_ptr<ViewIndex> Tracker::index() const {
   const Implementation& own = *implementation_;

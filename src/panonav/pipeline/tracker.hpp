@@ -111,6 +111,15 @@ class Tracker {
   [[nodiscard]] bool is_memory_held() const noexcept;
   /// Returns the views. Throws ContractError if they are not held in RAM (`is_memory_held`).
   [[nodiscard]] const VisualMemory& memory() const;
+  /// Returns the floor of the last estimated position; before the first, that of the memory's first
+  /// view with a position. The functions below use it and its frame, as does `start_at`.
+  [[nodiscard]] const std::string& floor() const noexcept;
+  /// Returns the particles on the floor.
+  [[nodiscard]] Particles particles() const;
+  /// Returns the view on the floor that is nearest to the position.
+  [[nodiscard]] ViewId find_nearest_view(Point2 position) const;
+  /// Returns the views with positions on the floor, ascending. Throws FileError like `index`.
+  [[nodiscard]] std::vector<PosedView> posed_views() const;
   /// Opens an index of the views for one query. Throws FileError if the server cannot be reached.
   [[nodiscard]] std::unique_ptr<ViewIndex> index() const;
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Returns the encoder.

@@ -1,6 +1,7 @@
 #include "panonav/pipeline/visual_motion.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/topological_mapper.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/motion/trajectory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 
@@ -28,7 +30,7 @@ double compute_scale(const VisualMemory& memory) {
     if (memory.info(view).pose) posed.push_back(view);
   }
   const auto distance_m = [&](ViewId a, ViewId b) {
-    return distance(memory.info(a).pose->position(), memory.info(b).pose->position());
+    return distance(*find_position(memory.info(a)), *find_position(memory.info(b)));
   };
   constexpr std::size_t sampled = 64;
   const std::size_t every = std::max<std::size_t>(1, posed.size() / sampled);
@@ -37,7 +39,9 @@ double compute_scale(const VisualMemory& memory) {
     std::optional<ViewId> nearest;
     for (const ViewId other : posed) {
       const double off_m = distance_m(posed[i], other);
-      if (off_m > 0.0 && (!nearest || off_m < distance_m(posed[i], *nearest))) nearest = other;
+      if (off_m > 0.0 && std::isfinite(off_m) &&
+          (!nearest || off_m < distance_m(posed[i], *nearest)))
+        nearest = other;
     }
     if (!nearest) continue;
     const auto step = visual_step(OdometryView(memory.signature(posed[i])),

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 
 namespace panonav::fleet {
@@ -170,7 +171,7 @@ void Synchronisation::clear_recordings() {
 }
 
 std::string Synchronisation::robot_prefixed_name(const std::string& name, int count) const {
-  return server_.robot() + "/" + name +
+  return add_prefix_on_floor(server_.robot() + "/", name) +
          (count == 1 ? std::string() : " (" + std::to_string(count) + ")");
 }
 

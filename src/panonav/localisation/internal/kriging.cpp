@@ -26,10 +26,10 @@ ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
   for (const RankedMatch& ranked : matches) {
     if (near.views.size() == PositionModel::max_candidates) break;
     const ViewId view = ranked.match.view;
-    const auto& pose = ranking.memory().info(view).pose;
-    if (!pose) continue;
+    const auto position = find_position(ranking.memory().info(view));
+    if (!position) continue;
     near.views.push_back(view);
-    near.positions.push_back(pose->position());
+    near.positions.push_back(*position);
     squared_query_differences.push_back(squared(ranked.columns.difference));
     profiles.push_back(ranking.profiles(view));
   }
@@ -91,13 +91,13 @@ KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double
   for (Eigen::Index i = 0; i < size; ++i) {
     const double weight = solution(i) / total;
     result.weights.push_back(weight);
-    const Point2 p = near.positions[result.used[i]];
+    const Point2 p = near.positions[result.used[i]].point;
     result.position = {result.position.x_m + weight * p.x_m, result.position.y_m + weight * p.y_m};
   }
   // With an exponent above 1 the variogram may be invalid for the L1 distance. The solution can
   // then leave the neighbourhood; the position of the best match replaces it.
-  if (!(distance(result.position, near.positions[0]) <= neighbourhood_m)) {
-    result.position = near.positions[0];
+  if (!(distance(result.position, near.positions[0].point) <= neighbourhood_m)) {
+    result.position = near.positions[0].point;
     result.used = {0};
     result.weights = {1.0};
     result.variance = 2.0 * variogram(near.squared_query_differences(0));

@@ -7,6 +7,7 @@
 
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/memory/floors.hpp"
 
 namespace panonav {
 
@@ -17,7 +18,7 @@ inline constexpr double elsewhere_spacings = 3.0;
 /// Posed views that resemble a query, the best match first.
 struct ResemblingViews {
   std::vector<ViewId> views;
-  std::vector<Point2> positions;
+  std::vector<FloorPosition> positions;
   Eigen::VectorXd
       squared_query_differences;  ///< squared column differences between the query and each view
   /// Squared column differences between the views: (i, j) compares view j as query with reference
@@ -35,14 +36,14 @@ struct ResemblingViews {
 
 /// A position by ordinary kriging.
 struct KrigedPosition {
-  Point2 position;
+  Point2 position;                ///< on the floor of the best match
   std::vector<std::size_t> used;  ///< indices of the interpolated resembling views
   std::vector<double> weights;    ///< of the `used` views; sum to 1
   /// Kriging variance: expected squared error in units of the variogram.
   double variance = 0.0;
 };
-/// Interpolates over the views within `neighbourhood_m` of the best match; the variogram is the
-/// squared difference over `unit`, to the power of `exponent`.
+/// Interpolates over the views within `neighbourhood_m` of the best match, on its floor; the
+/// variogram is the squared difference over `unit`, to the power of `exponent`.
 [[nodiscard]] KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m,
                                    double exponent, double unit);
 

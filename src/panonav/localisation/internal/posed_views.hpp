@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "panonav/geometry/pose2.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
@@ -11,14 +12,15 @@ namespace panonav {
 struct PosedViews {
   explicit PosedViews(const VisualMemory& memory) {
     for (const ViewId view : memory.views()) {
-      if (const auto& pose = memory.info(view).pose) {
+      if (const auto position = find_position(memory.info(view))) {
         views.push_back(view);
-        positions.push_back(pose->position());
+        positions.push_back(plane.to_plane(*position));
       }
     }
   }
   std::vector<ViewId> views;
-  std::vector<Point2> positions;
+  FloorPlane plane;               // in which the floors lie apart
+  std::vector<Point2> positions;  // in `plane`
 };
 
 }  // namespace panonav

@@ -10,6 +10,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/internal/lattice_graph.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {
@@ -63,6 +64,8 @@ std::vector<NodePair> SpringViews::find_most_similar_pairs(const LatticeOptions&
       const auto answer = memory_->search(packed_[i], {options.neighbours, components_},
                                           {.excluded_views = views.subspan(i, 1)});
       for (const Match& match : answer.matches) {
+        if (floor_of(memory_->info(match.view).name) != floor_of(memory_->info(views[i]).name))
+          continue;
         const auto j =
             static_cast<std::size_t>(std::ranges::lower_bound(views, match.view) - views.begin());
         found[i].push_back(std::minmax(i, j));
