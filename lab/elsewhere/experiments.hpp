@@ -29,6 +29,9 @@ struct ElsewhereExperiments : Experiments {
   /// Measures how many own places are recognised, how many foreign places are mistaken for own
   /// ones, and how many positions are within the stated 95 % radius.
   void reproduce_known_places();
+  /// Memorises two variants of each built-in scene as floors of one building, in the same
+  /// coordinates, and measures how often the floor is right.
+  void reproduce_buildings();
   /// Measures how well the covariance of tracked poses that are reported as localised fits their
   /// errors.
   void reproduce_tracked_poses();

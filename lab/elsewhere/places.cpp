@@ -150,6 +150,40 @@ void ElsewhereExperiments::reproduce_known_places() {
               0.05);
 }
 
+void ElsewhereExperiments::reproduce_buildings() {
+  Rates known;
+  Rates right;
+  Rates inside;
+  double max_spacing_ratio = 0.0;
+  for (const RecordedGround& ground : grounds) {
+    if (ground.variants.size() < 2) continue;
+    const std::array floors{&ground.variants[0], &ground.variants[1]};
+    const BuildingResult found = run_building_experiment(floors, executor);
+    known.add(ground.name, success_rate(found.known, found.queries), found.queries);
+    if (found.known > 0)
+      right.add(ground.name, success_rate(found.right_floor, found.known), found.known);
+    if (found.stated > 0)
+      inside.add(ground.name, success_rate(found.inside, found.stated), found.stated);
+    max_spacing_ratio = std::max(max_spacing_ratio, std::max(found.learnt_spacing_m / spacing_m,
+                                                             spacing_m / found.learnt_spacing_m));
+  }
+  if (known.trials == 0) return;
+  const auto add = [&](const std::string& id, const std::string& what, const Rates& rates,
+                       double min_rate) {
+    add_rate(result, "elsewhere.buildings." + id,
+             "two variants of a scene as floors of one building: " + what, rates.successes,
+             rates.trials, at_least(min_rate));
+    result.rows.back().over += "; " + rates.describe_extreme(false);
+  };
+  constexpr double min_right = 239.0 / 240.0;
+  add("known", "places known", known, 0.97);
+  add("floor", "known places on the right floor", right, min_right);
+  add("radius", "positions on the right floor and within the stated 95 % radius", inside, 0.9);
+  add_row(result, "elsewhere.buildings.spacing",
+          "the same: largest ratio of learnt and true spacing of the references", max_spacing_ratio,
+          "", at_most(1.01));
+}
+
 void ElsewhereExperiments::reproduce_tracked_poses() {
   // Quantiles of chi squared with two degrees of freedom.
   constexpr double quantile_95 = 5.991;

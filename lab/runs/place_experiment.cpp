@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -10,6 +11,8 @@
 #include "lab/statistics.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/memory/floors.hpp"
+#include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/recording.hpp"
 
 namespace panonav::lab {
@@ -117,6 +120,47 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
                        success_rate(inside, stated)});
   }
   return results;
+}
+
+BuildingResult run_building_experiment(std::span<const simulation::PlaceRecording* const> floors,
+                                       Executor& executor) {
+  std::optional<VisualMemory> memory;
+  std::map<ViewId, std::optional<LocalFeatures>> features;
+  for (std::size_t i = 0; i < floors.size(); ++i) {
+    const VisualMemory part = make_memory_of_references(*floors[i], executor);
+    if (!memory) memory.emplace(part.shape(), part.full_scale(), part.elevations());
+    const FeatureSource part_features = extract_reference_features(*floors[i], part, executor);
+    for (const ViewId view : part.views()) {
+      ReferenceInfo info = part.info(view);
+      info.name = make_name_on_floor(std::to_string(i), info.name);
+      features.emplace(memory->append(part.signature(view), info), part_features(view));
+    }
+  }
+  Localiser localiser(*memory);
+  localiser.use_features([&](ViewId view) { return features.at(view); }, false);
+  BuildingResult result{.learnt_spacing_m = localiser.position_model().spacing_m};
+  for (std::size_t i = 0; i < floors.size(); ++i) {
+    const auto& queries = floors[i]->queries;
+    const auto answers = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
+      const Panorama& view = queries[q].panorama;
+      return localiser.localise(compute_packed_signature(view, *memory), {},
+                                make_query_features(view));
+    });
+    result.queries += queries.size();
+    for (std::size_t q = 0; q < queries.size(); ++q) {
+      if (!answers[q].known) continue;
+      ++result.known;
+      const bool is_right = answers[q].floor() == std::to_string(i);
+      result.right_floor += is_right ? 1 : 0;
+      const auto& position = answers[q].position;
+      if (!position || !position->radius_m) continue;
+      ++result.stated;
+      const bool is_inside =
+          distance(position->position(), queries[q].pose.position()) <= *position->radius_m;
+      result.inside += is_right && is_inside ? 1 : 0;
+    }
+  }
+  return result;
 }
 
 std::vector<RecognitionRate> measure_recognition_rates(

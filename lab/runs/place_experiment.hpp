@@ -42,6 +42,21 @@ struct PlaceResult {
     const simulation::PlaceRecording& place, const std::vector<PlaceCondition>& conditions,
     Executor& executor);
 
+/// Results of localisation in one memory of a building with several floors.
+struct BuildingResult {
+  std::size_t queries = 0;
+  std::size_t known = 0;          ///< recognised as a place of the memory
+  std::size_t right_floor = 0;    ///< of these, the answer is on the query's floor
+  std::size_t stated = 0;         ///< positions with a stated 95 % radius
+  std::size_t inside = 0;         ///< of these, on the right floor and within the radius
+  double learnt_spacing_m = 0.0;  ///< of the references, as learnt from the memory
+};
+
+/// Memorises each place as a floor of one building, all in the same coordinates, and localises the
+/// queries of all of them.
+[[nodiscard]] BuildingResult run_building_experiment(
+    std::span<const simulation::PlaceRecording* const> floors, Executor& executor);
+
 /// Share of the queries taken in one place that the memory of another (or the same) place
 /// recognises.
 struct RecognitionRate {
