@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "panonav/core/error.hpp"
@@ -96,6 +97,70 @@ TEST(RouteLimits, RefuseOtherWorldsAndKeepTheirOwn) {
   std::printf("%d foreign and %d own lines found\n", foreign, own);
   EXPECT_LE(foreign, static_cast<int>(0.01 * worlds * (worlds - 1) * trials));
   EXPECT_GE(own, static_cast<int>(0.95 * worlds * trials));
+}
+
+// Images from past the ends of short routes look like those of the end, but few of their lines of
+// sight cross the route.
+TEST(RouteLimits, RefuseImagesFromPastTheEndsOfShortRoutes) {
+  constexpr double length_m = 1.5;
+  int asked = 0;
+  int wrong = 0;
+  int refused = 0;
+  int within = 0;
+  int found = 0;
+  for (std::uint64_t world = 0; world < 8; ++world) {
+    const ToyWorld room = pillared_room(60 + world);
+    RoutePanorama route;
+    for (int i = 0; i <= 15; ++i) {
+      const Pose2 pose{0.1 * i - 0.75, -0.2, 0.0};
+      route.append(pose, room.line(pose));
+    }
+    const RouteTracker tracker(route);
+    for (const double y_m : {-0.2, -0.1, -0.35}) {
+      for (int i = 1; i <= 8; ++i) {
+        for (const double past_m : {-0.05 * i, length_m + 0.05 * i}) {
+          const Pose2 robot{past_m - 0.75, y_m, 0.4};
+          const auto fix = tracker.search(room.line(robot));
+          ++asked;
+          if (!fix || distance(fix->pose.position(), robot.position()) < 0.05) continue;
+          ++(tracker.lines().is_better_past_end(room.line(robot), *fix) ? refused : wrong);
+        }
+        const Pose2 robot{length_m * i / 9.0 - 0.75, y_m, 0.4};
+        const auto fix = tracker.search(room.line(robot));
+        ++within;
+        const bool is_refused = fix && tracker.lines().is_better_past_end(room.line(robot), *fix);
+        if (fix && !is_refused && distance(fix->pose.position(), robot.position()) < 0.05) ++found;
+      }
+    }
+  }
+  std::printf("%d of %d past the ends wrong, %d refused; %d of %d found within\n", wrong, asked,
+              refused, found, within);
+  EXPECT_GT(refused, 0);
+  EXPECT_LE(wrong, asked / 200);
+  EXPECT_GE(found, within * 95 / 100);
+}
+
+// A route with so few lines that they do not predict those between them.
+TEST(RouteLimits, RefuseOtherWorldsWhereLinesAreFarApart) {
+  int asked = 0;
+  int foreign = 0;
+  for (std::uint64_t world = 0; world < 6; ++world) {
+    const ToyWorld room = pillared_room(900 + world);
+    RoutePanorama route;
+    for (int i = 0; i < 12; ++i) {
+      const Pose2 pose{2.5 * std::cos(1.7 * i), std::sin(2.3 * i), 0.9 * i};
+      route.append(pose, room.line(pose));
+    }
+    const RouteTracker tracker(route);
+    for (std::uint64_t other = 0; other < 30; ++other) {
+      const ToyWorld elsewhere = pillared_room(1000 + other);
+      ++asked;
+      foreign +=
+          tracker.search(elsewhere.line({0.05 * static_cast<double>(other), 0.1, 0.3})) ? 1 : 0;
+    }
+  }
+  std::printf("%d of %d foreign lines found\n", foreign, asked);
+  EXPECT_LE(foreign, asked / 50);
 }
 
 // At the ends of a short, straight route few lines of sight cross it. The robot is then found where

@@ -358,35 +358,37 @@ std::vector<float> RouteLines::shift_tolerant_residuals(const std::vector<Term>&
   return left;
 }
 
-// Returns the correlation of the differences between adjacent columns, smoothed by a degree, over
-// the columns that both lines have.
-double RouteLines::correlate_details(const std::vector<Term>& terms, std::size_t columns) {
+std::array<double, RouteFix::detail_scales_deg.size()> RouteLines::correlate_details(
+    const std::vector<Term>& terms, std::size_t columns) {
   std::vector<float> expected(columns, 0.0F);
   std::vector<float> measured(columns, 0.0F);
   std::vector<std::size_t> compared;
-  const auto add_difference = [&](const Term& left, const Term& right) {
-    if ((left.direction + 1) % columns != right.direction) return;
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    const Term& left = terms[i];
+    const Term& right = terms[(i + 1) % terms.size()];
+    if ((left.direction + 1) % columns != right.direction) continue;
     expected[left.direction] = right.expected - left.expected;
     measured[left.direction] = right.measured - left.measured;
     compared.push_back(left.direction);
-  };
-  for (std::size_t i = 0; i < terms.size(); ++i) {
-    add_difference(terms[i], terms[(i + 1) % terms.size()]);
   }
-  const double sigma = static_cast<double>(columns) / 360.0;
-  expected = smooth_line(expected, sigma);
-  measured = smooth_line(measured, sigma);
-  double xx = 0.0;
-  double yy = 0.0;
-  double xy = 0.0;
-  for (const std::size_t c : compared) {
-    const auto x = static_cast<double>(expected[c]);
-    const auto y = static_cast<double>(measured[c]);
-    xx += x * x;
-    yy += y * y;
-    xy += x * y;
+  std::array<double, RouteFix::detail_scales_deg.size()> correlations{};
+  for (std::size_t scale = 0; scale < correlations.size(); ++scale) {
+    const double sigma = RouteFix::detail_scales_deg[scale] * static_cast<double>(columns) / 360.0;
+    const auto xs = smooth_line(expected, sigma);
+    const auto ys = smooth_line(measured, sigma);
+    double xx = 0.0;
+    double yy = 0.0;
+    double xy = 0.0;
+    for (const std::size_t c : compared) {
+      const auto x = static_cast<double>(xs[c]);
+      const auto y = static_cast<double>(ys[c]);
+      xx += x * x;
+      yy += y * y;
+      xy += x * y;
+    }
+    if (xx > 0.0 && yy > 0.0) correlations[scale] = xy / std::sqrt(xx * yy);
   }
-  return xx > 0.0 && yy > 0.0 ? xy / std::sqrt(xx * yy) : 0.0;
+  return correlations;
 }
 
 void RouteLines::check_line(std::span<const float> line) const {
@@ -447,7 +449,7 @@ std::optional<RouteFix> RouteLines::make_fix(std::span<const float> line, const 
   fix.pose = pose;
   fix.columns = static_cast<int>(terms.size());
   fix.correlation = fitted.correlation;
-  fix.detail_correlation = correlate_details(terms, line.size());
+  fix.detail_correlations = correlate_details(terms, line.size());
   fix.residual = std::sqrt(fitted.variance) / fitted.deviation;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {

@@ -42,9 +42,12 @@ struct RouteFix {
   double residual = 1.0;
   /// Correlation of the scanline and the expected line, -1 .. 1; changed parts have less weight.
   double correlation = 0.0;
-  /// Correlation of the changes from degree to degree of both lines, -1 .. 1. Lines of different
-  /// places may be similar on the whole, as rooms are, but not in detail.
-  double detail_correlation = 0.0;
+  /// Standard deviations of the smoothing of `detail_correlations`.
+  static constexpr std::array<double, 4> detail_scales_deg{1.0, 2.0, 4.0, 8.0};
+  /// Correlation of the changes from column to column of both lines, smoothed at each scale,
+  /// -1 .. 1. Lines of different places may be similar on the whole, as rooms are, but not in
+  /// detail.
+  std::array<double, detail_scales_deg.size()> detail_correlations{};
   int columns = 0;  ///< directions in which the line of sight crosses the path
   /// Robust standard deviation of the scanline from the expected line, 0 .. 1; at least a grey
   /// level.
@@ -93,6 +96,12 @@ class RouteLines {
   /// Converts a line for `find_candidate`.
   [[nodiscard]] std::vector<float> to_coarse_line(std::span<const float> line) const;
 
+  /// True if a position past an end of the route explains the line better than the fix. Few lines
+  /// of sight from there cross the path, so that a fit ends elsewhere. The view past an end is that
+  /// from the end, after a step outward among things that are all equally far away. Throws
+  /// ContractError on a wrong length. Cost: half a million multiplications.
+  [[nodiscard]] bool is_better_past_end(std::span<const float> line, const RouteFix& fix) const;
+
   /// The pose from which each line was taken, in the route's frame.
   [[nodiscard]] std::span<const Pose2> poses() const& noexcept { return poses_; }
   std::span<const Pose2> poses() const&& = delete;                 // would dangle
@@ -125,8 +134,8 @@ class RouteLines {
   [[nodiscard]] bool collect_terms(const Level& level, std::span<const float> line,
                                    const Pose2& pose, const Window& window,
                                    std::vector<Term>& terms) const;
-  [[nodiscard]] static double correlate_details(const std::vector<Term>& terms,
-                                                std::size_t columns);
+  [[nodiscard]] static std::array<double, RouteFix::detail_scales_deg.size()> correlate_details(
+      const std::vector<Term>& terms, std::size_t columns);
   [[nodiscard]] static std::vector<float> shift_tolerant_residuals(const std::vector<Term>& terms,
                                                                    std::size_t columns, double gain,
                                                                    double offset, int shift);

@@ -25,10 +25,10 @@ constexpr double square_of_position = 5.991;
 constexpr std::size_t min_fits = 3;
 
 /// Returns the correlation that 1 % of correlations of the same distribution exceed, by the normal
-/// distribution of Fisher's z. Needs two correlations or more.
+/// distribution of Fisher's z and Student's distribution of its estimated spread. Needs two
+/// correlations or more.
 double compute_upper_limit(const std::vector<double>& correlations) {
   constexpr double max_correlation = 0.999;  // of which z is finite
-  constexpr double quantile_99 = 2.326;      // of the standard normal distribution
   std::vector<double> z;
   for (const double value : correlations) {
     z.push_back(std::atanh(std::clamp(value, -max_correlation, max_correlation)));
@@ -36,8 +36,30 @@ double compute_upper_limit(const std::vector<double>& correlations) {
   const double middle = mean(z);
   double squares = 0.0;
   for (const double value : z) squares += (value - middle) * (value - middle);
-  return std::tanh(middle +
-                   quantile_99 * std::sqrt(squares / (static_cast<double>(z.size()) - 1.0)));
+  const auto n = static_cast<double>(z.size());
+  // Quantile of 99 % of Student's distribution, by its expansion in the degrees of freedom.
+  constexpr double quantile_99 = 2.326;
+  constexpr double cubed = quantile_99 * quantile_99 * quantile_99;
+  const double freedom = n - 1.0;
+  const double student_99 =
+      quantile_99 + (cubed + quantile_99) / (4.0 * freedom) +
+      (5.0 * cubed * quantile_99 * quantile_99 + 16.0 * cubed + 3.0 * quantile_99) /
+          (96.0 * freedom * freedom);
+  return std::tanh(middle + student_99 * std::sqrt(squares / freedom * (1.0 + 1.0 / n)));
+}
+
+/// Returns a line with the structures of `line` that shows no place: its eighths, mirrored and in
+/// another order.
+std::vector<float> shuffle_line(std::span<const float> line) {
+  constexpr std::array<std::size_t, 8> order{0, 3, 6, 1, 4, 7, 2, 5};
+  std::vector<float> shuffled;
+  shuffled.reserve(line.size());
+  for (const std::size_t eighth : order) {
+    const std::size_t begin = eighth * line.size() / order.size();
+    const std::size_t end = (eighth + 1) * line.size() / order.size();
+    for (std::size_t c = end; c > begin; --c) shuffled.push_back(line[c - 1]);
+  }
+  return shuffled;
 }
 
 /// Error of a fit, with the covariance by the noise of the lines.
@@ -122,6 +144,9 @@ RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions
                            const RouteFitOptions& fit)
     : options_(options), metre_(fit.metre), lines_(route, fit) {
   validate(options);
+  // Errors if nothing can be learnt: even between two lines.
+  const double spacing_m = route.length_m() / static_cast<double>(route.size() - 1);
+  model_variance_m2_ = spacing_m * spacing_m / 12.0;
   constexpr std::size_t min_lines = 6;
   // Threshold if nothing can be learnt: half of the variance is explained.
   constexpr double default_correlation = 0.7071;
@@ -138,41 +163,46 @@ bool RouteTracker::has_enough_columns(const RouteFix& fix) const {
 
 bool RouteTracker::is_match(const RouteFix& fix) const {
   return has_enough_columns(fix) && fix.correlation >= min_correlation_ &&
-         fix.detail_correlation >= min_detail_;
+         fix.detail_correlations[detail_scale_] >= min_detail_;
 }
 
 void RouteTracker::learn_limits(const TestRoute& test) {
-  std::vector<double> right;
-  std::vector<double> right_details;
-  std::vector<double> wrong;
-  std::vector<double> wrong_details;
+  std::vector<RouteFix> right;
+  std::vector<RouteFix> wrong;
+  const auto add_wrong = [&](std::span<const float> line) {
+    if (auto fix = find_best_on_route(line)) wrong.push_back(*std::move(fix));
+  };
   for (std::size_t i = 0; i < test.poses.size(); ++i) {
-    auto line = test.values[i];
-    if (const auto fix = test.lines.fit(line, test.poses[i])) {
-      right.push_back(fix->correlation);
-      right_details.push_back(fix->detail_correlation);
-    }
+    const auto& line = test.values[i];
+    if (auto fix = test.lines.fit(line, test.poses[i])) right.push_back(*std::move(fix));
     // As detailed as the lines of the route, but of no place. Unlike the mirror image of a line,
-    // its negative is no view in a symmetric corridor either.
-    for (float& value : line) value = 1.0F - value;
-    for (int mirrored = 0; mirrored < 2; ++mirrored) {
-      if (const auto fix = find_best_on_route(line)) {
-        wrong.push_back(fix->correlation);
-        wrong_details.push_back(fix->detail_correlation);
-      }
-      std::ranges::reverse(line);
-    }
+    // its negative and its shuffled parts are no view in a symmetric corridor either. A negative
+    // has dark spots for bright ones, which correlate with the route less than other places do.
+    std::vector<float> negative(line);
+    for (float& value : negative) value = 1.0F - value;
+    add_wrong(negative);
+    add_wrong(shuffle_line(line));
   }
   if (right.size() < min_fits || wrong.size() < min_fits) return;
-  // Puts the limits nearer to the wrong fits, as a line taken off the path or in a changed scene
-  // fits worse than one from the path.
-  const auto choose_limit = [](double low, double high) {
-    return low + std::max(0.0, high - low) / 3.0;
+  const auto collect = [](const std::vector<RouteFix>& fixes, const auto& correlation) {
+    std::vector<double> values;
+    for (const RouteFix& fix : fixes) values.push_back(correlation(fix));
+    return values;
   };
-  min_correlation_ = choose_limit(std::max(0.0, order_statistic(std::move(wrong), 0.95)),
-                                  order_statistic(std::move(right), 0.05));
-  const double detail = order_statistic(std::move(right_details), 0.05);
-  min_detail_ = std::min(detail, choose_limit(compute_upper_limit(wrong_details), detail));
+  const auto whole = [](const RouteFix& fix) { return fix.correlation; };
+  const double low = std::max(0.0, order_statistic(collect(wrong, whole), 0.95));
+  const double high = order_statistic(collect(right, whole), 0.05);
+  // Nearer to the wrong fits, as a line taken off the path or in a changed scene fits worse than
+  // one from the path.
+  min_correlation_ = low + std::max(0.0, high - low) / 3.0;
+  // Details that the route itself does not show twice, such as noise, tell no places apart: the
+  // finest scale at which most of its lines exceed the limit counts, the coarsest if there is none.
+  for (std::size_t scale = 0; scale < RouteFix::detail_scales_deg.size(); ++scale) {
+    const auto detail = [&](const RouteFix& fix) { return fix.detail_correlations[scale]; };
+    detail_scale_ = scale;
+    min_detail_ = compute_upper_limit(collect(wrong, detail));
+    if (order_statistic(collect(right, detail), 0.5) > min_detail_) break;
+  }
 }
 
 void RouteTracker::learn_model_errors(const TestRoute& test) {
@@ -183,10 +213,12 @@ void RouteTracker::learn_model_errors(const TestRoute& test) {
     // To the left and right in turn.
     const double lateral_m = (i % 2 == 0 ? 1.0 : -1.0) * options_.surprise_m * metre_;
     const auto fix = test.lines.fit(test.values[i], truth * Pose2{0.0, lateral_m, 0.0});
-    if (!fix || !is_match(*fix)) continue;
+    if (!fix || !has_enough_columns(*fix)) continue;
     const FitError error{{fix->pose.x_m - truth.x_m, fix->pose.y_m - truth.y_m},
                          angle_difference(fix->pose.heading_rad, truth.heading_rad),
                          fix->covariance};
+    // A fit that moves away from the truth has found another minimum, which the limits refuse.
+    if (std::hypot(error.position.x_m, error.position.y_m) > std::abs(lateral_m)) continue;
     variances_m2.push_back(error.missing_variance_m2());
     variances_rad2.push_back(error.missing_variance_rad2());
   }
