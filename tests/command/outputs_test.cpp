@@ -59,7 +59,7 @@ TEST_F(Outputs, NothingThatTheCommandReadsIsReplaced) {
     expect_kept({"localise", "m.panonav", "mask.png", "-o", target}, target, "MEMORY m.panonav");
   }
   for (const std::string target : {"run/poses.csv", "same/poses.csv", "elsewhere/pictures/a.png"}) {
-    expect_kept({"track", "n.panonav", "run", "--tum", target}, target, "DATASET run");
+    expect_kept({"track", "n.panonav", "run", "--tum", target}, target, "INPUT run");
   }
   expect_kept({"unwrap", "run", "--camera", "camera.toml", "-o", "mask.png"}, "mask.png",
               "--camera camera.toml");

@@ -76,6 +76,7 @@ TEST_F(OwnImages, RoutesSayWhichFrameTheirPosesHave) {
   EXPECT_TRUE(contains(followed.out, "in the route's own frame")) << followed.out;
   const auto on_map = run_panonav({"route", "follow", memory(), walk(), "--name", "a"});
   EXPECT_FALSE(contains(on_map.out, "in the route's own frame")) << on_map.out;
+  EXPECT_FALSE(contains(on_map.out, "x, y and heading are in")) << on_map.out;
 }
 
 TEST_F(OwnImages, AMergeWithACopyAddsNothing) {

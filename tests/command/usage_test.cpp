@@ -173,7 +173,7 @@ TEST(Usage, FilesOfOptionsProposeTheNearestNameAndOnlyThisVerbsSections) {
 TEST(Usage, SwappedArgumentsAreRecognised) {
   expect_refusal({"localise", "my image.jpg", "memory.panonav"},
                  "did you mean 'panonav localise memory.panonav 'my image.jpg''?");
-  for (const auto& [verb, input] : {std::pair("memorise", "INPUT"), {"map", "DATASET"}}) {
+  for (const auto& [verb, input] : {std::pair("memorise", "INPUT"), {"map", "INPUT"}}) {
     const auto line = refusal({verb, "folder", "m.panonav", "--kind", "panorama", "-q"});
     EXPECT_TRUE(contains(line, "MEMORY is 'folder' and " + std::string(input) + " is 'm.panonav'"));
     EXPECT_TRUE(contains(line, "did you mean 'panonav " + std::string(verb) +

@@ -164,10 +164,10 @@ void write_track_report(const std::filesystem::path& folder, const Tracker& trac
   page.begin_section("The run, image by image");
   page.add_text(
       "Each small dot is a particle: a possible position of the robot. Grey dots are the stored "
-      "views, " +
+      "views; the median distance of a view to the nearest other one is " +
       (is_metric ? format_fixed(100.0 * spacing_m, 0) + " cm"
                  : format_fixed(spacing_m, 1) + " view steps") +
-      " apart. The large dot is the estimate: the mean of the group of particles with the "
+      ". The large dot is the estimate: the mean of the group of particles with the "
       "highest probability. There is no large dot while the robot is lost." +
       std::string(truth_known ? " The ring is the true position." : ""));
   page.add_run(replay_page);

@@ -246,10 +246,8 @@ TrialVerdict judge_trial(const Trial& trial) {
   verdict.findings.push_back(trial.guess.explanation);
   if (trial.has_map() && trial.map_summary->unit == LengthUnit::view_steps) {
     verdict.findings.push_back(
-        "Images alone do not show how long a metre is, so positions are in view steps: the median "
-        "distance between " +
-        std::string(trial.is_arranged() ? "neighbouring" : "consecutive") +
-        " images. panonav scale makes metres of them.");
+        "Images alone do not show how long a metre is, so positions are in view steps: the " +
+        std::string(trial.map_summary->view_step) + ". panonav scale makes metres of them.");
   }
   if (verdict.is_good) {
     verdict.findings.insert(verdict.findings.begin(),

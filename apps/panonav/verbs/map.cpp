@@ -433,7 +433,7 @@ Run declare_map(Arguments& arguments) {
   auto values = std::make_shared<MapArguments>();
   arguments.positional("MEMORY", values->memory,
                        "Memory file (NAME.panonav), to which new views are added");
-  arguments.positionals("DATASET", values->inputs,
+  arguments.positionals("INPUT", values->inputs,
                         "Data set, folder of images, video (several are joined) or recording with "
                         "images in the order of the drive");
   declare_pictures(arguments, values->pictures);

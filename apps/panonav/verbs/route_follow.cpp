@@ -114,11 +114,25 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   }
 }
 
-/// Prints that the poses are in the route's own frame, if the views have positions in another one.
-void print_frame(const RouteSource& route, const MemoryFile& memory, Session& session) {
-  if (!route.from_odometry || memory.info().views_with_position == 0) return;
-  session.print(
-      "x, y and heading are in the route's own frame, not in that of the views (localise).");
+/// True if the poses of the route are in the frame of the data set from which it was recorded.
+bool is_in_data_set_frame(const RouteSource& route) {
+  return !route.from_odometry && !route.assumed_unit_m && !route.is_in_map_unit;
+}
+
+/// Prints the frame of the poses if the views or the data set have positions in another one.
+void print_frame(const RouteSource& route, const MemoryFile& memory, bool has_uncompared_truth,
+                 Session& session) {
+  const bool is_data_set = is_in_data_set_frame(route);
+  const std::string frame = is_data_set           ? "the frame of the recorded data set"
+                            : route.from_odometry ? "the route's own frame"
+                                                  : "the frame of the map";
+  const bool is_view_frame = !route.from_odometry && is_data_set != has_positions_from_map(memory);
+  if (memory.info().views_with_position > 0 && !is_view_frame) {
+    session.print("x, y and heading are in " + frame + ", not in that of the views (localise).");
+  }
+  if (has_uncompared_truth) {
+    session.print("The true positions are not compared, as x, y and heading are in " + frame + ".");
+  }
 }
 
 void write_fixes(const std::string& path, const std::vector<FollowedImage>& images,
@@ -143,12 +157,11 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
                           .tracker = arguments.tracker,
                           .fit = arguments.fit,
                           .use_odometry = !arguments.no_odometry && has_odometry(run)});
+  if (follower.source().assumed_unit_m) session.set_length_unit(LengthUnit::view_steps);
   // The poses of a data set are no ground truth for a route in another frame: of odometry or a map.
-  const bool is_unscaled = follower.source().assumed_unit_m.has_value();
-  if (is_unscaled) session.set_length_unit(LengthUnit::view_steps);
-  const bool is_other_frame =
-      follower.source().from_odometry || is_unscaled || has_positions_from_map(memory);
-  const auto truth = is_other_frame ? std::vector<Pose2>{} : dataset_poses(run);
+  const auto poses = dataset_poses(run);
+  const bool is_compared = is_in_data_set_frame(follower.source());
+  const auto truth = is_compared ? poses : std::vector<Pose2>{};
   const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
   std::vector<double> seconds;
   if (arguments.tum)
@@ -186,7 +199,7 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   const FollowSummary summary = summarise_follow(images, headings_known);
   if (!session.json()) {
     print_summary(summary, images, session);
-    print_frame(follower.source(), memory, session);
+    print_frame(follower.source(), memory, !is_compared && !poses.empty(), session);
   }
   if (arguments.report) {
     const auto panorama = memory.route(follower.name());
@@ -202,7 +215,7 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
 Run declare_route_follow(Arguments& arguments) {
   auto values = std::make_shared<FollowArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file with a route");
-  arguments.positional("DATASET", values->dataset,
+  arguments.positional("INPUT", values->dataset,
                        "Data set, folder of images, video or recording of a later drive, with "
                        "images in the order of the drive");
   declare_topics(arguments, values->run.topics);

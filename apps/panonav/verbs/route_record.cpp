@@ -298,7 +298,7 @@ Run declare_route_record(Arguments& arguments) {
   auto values = std::make_shared<RecordArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file (NAME.panonav), new or existing");
   arguments.positional(
-      "DATASET", values->dataset,
+      "INPUT", values->dataset,
       "Data set, folder of images, video or recording with images in the order of the drive. If it "
       "has neither positions nor odometry, the motion is computed from the images");
   arguments.option("--name NAME", values->name,

@@ -436,7 +436,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
 Run declare_track(Arguments& arguments) {
   auto values = std::make_shared<TrackArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positionals("DATASET", values->inputs,
+  arguments.positionals("INPUT", values->inputs,
                         "Data set, folder of images, video (several are joined) or recording with "
                         "images in the order of the run, or a live source (-, /dev/video0, "
                         "rtsp://). If there is no odometry, motion is computed from the images");
