@@ -66,6 +66,7 @@ TEST_F(Arrange, StoresAndTellsTheMap) {
   ASSERT_EQ(answer["nodes"].size(), poses.size());
   EXPECT_EQ(answer["metric"], false);
   ASSERT_GE(answer["connected_components"].size(), 1U);
+  EXPECT_TRUE(answer["joined_pieces"].is_array());
   EXPECT_GE(answer["candidates"], answer["springs"]);
   EXPECT_GT(answer["springs"], 0U);
   EXPECT_EQ(answer["connected_components"][0]["handedness_known"], true);

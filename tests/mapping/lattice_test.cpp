@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <set>
 #include <span>
@@ -245,6 +247,32 @@ TEST(Lattice, DisconnectedGroupsStayParts) {
   for (const auto& component : lattice.components) counted += component.views;
   EXPECT_EQ(counted, signatures.size());
   EXPECT_GE(lattice.components[1].views, 20U);
+}
+
+TEST(Lattice, ViewsOfTwoRoomsAreNotJoined) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    std::vector<FourierSignature> signatures;
+    std::vector<std::size_t> room_of;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Place place(20 * i + seed, 0.4);
+      for (const Pose2& pose : place.poses) {
+        signatures.push_back(compute_signature(place.room.see(pose, 24, 128)));
+        room_of.push_back(i);
+      }
+    }
+    Executor executor;
+    const Lattice lattice = arrange(make_memory(signatures), {}, {}, executor);
+    std::map<std::size_t, std::array<std::size_t, 2>> views_of_component;
+    for (std::size_t i = 0; i < room_of.size(); ++i)
+      ++views_of_component[lattice.nodes[i].component][room_of[i]];
+    // Single views may be attached to the wrong room, at even odds.
+    for (const auto& [component, views] : views_of_component) {
+      EXPECT_LE(std::min(views[0], views[1]), room_of.size() / 20)
+          << "seed " << seed << ", component " << component;
+    }
+    EXPECT_TRUE(lattice.joins.empty()) << "seed " << seed;
+    EXPECT_GE(lattice.components.at(1).views, room_of.size() / 3) << "seed " << seed;
+  }
 }
 
 TEST(Lattice, DegenerateMemories) {

@@ -75,9 +75,14 @@ ordered_json to_json(const ArrangeArguments& arguments, const Lattice& lattice,
                                          ? ordered_json(node.pose.heading_rad)
                                          : ordered_json()}});
   }
+  auto joins = ordered_json::array();
+  for (const Lattice::Join& join : lattice.joins) {
+    joins.push_back({{"views", join.views}, {"pairs", join.pairs}});
+  }
   ordered_json json{{"memory", arguments.memory},
                     {"views", lattice.nodes.size()},
                     {"connected_components", std::move(components)},
+                    {"joined_pieces", std::move(joins)},
                     {"candidates", lattice.candidates},
                     {"springs", lattice.springs.size()},
                     {"springs_rejected", count_rejected_springs(lattice)},
@@ -112,6 +117,11 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
                 std::to_string(count_rejected_springs(lattice)) +
                 " pairs contradict the others; unit: " +
                 (lattice.metric ? "metres" : "median distance to the nearest view"));
+  for (const Lattice::Join& join : lattice.joins) {
+    session.print("A piece of " + format_count(join.views, "view") + " was joined by " +
+                  std::to_string(join.pairs) +
+                  " pairs of views that agree on its pose; it may be bent where they meet.");
+  }
   if (lattice.components.size() > 1) {
     std::string others;
     std::size_t single_views = 0;

@@ -16,6 +16,7 @@
 #include "panonav/mapping/internal/lattice_springs.hpp"
 #include "panonav/mapping/internal/lattice_start.hpp"
 #include "panonav/mapping/internal/node_motions.hpp"
+#include "panonav/mapping/internal/piece_joining.hpp"
 
 namespace panonav {
 
@@ -30,6 +31,10 @@ constexpr double max_heading_error_rad = 0.25 * std::numbers::pi;
 /// A spring is kept if more than this share of its triangles close, where no motion shows which
 /// views are near (docs/decisions.md).
 constexpr double min_closing_triangles = 0.5;
+
+bool has_direction(const Lattice::Spring& spring) {
+  return spring.phases && spring.phases->has_direction;
+}
 
 /// The measured pairs of views, each once, ascending.
 class MeasuredPairs {
@@ -95,7 +100,8 @@ class Arranger {
         fit_curve_to_layout();  // [M04 section 3.2, figure 12]
       }
       if (options_.phases && motions_.empty()) {
-        grow_from_most_certain();
+        std::vector<GraphEdge> edges = grow_from_most_certain();
+        if (round + 1 == options_.rounds) join_remaining_pieces(edges);
       } else {
         choose_springs();  // [M04 eq. 5]
         lay_out_if_needed();
@@ -164,8 +170,8 @@ class Arranger {
   }
 
   /// Grows the layout from the most certain springs. Keeps the springs that agree with the layout;
-  /// views without such a spring leave their component.
-  void grow_from_most_certain() {
+  /// views without such a spring leave their component. Returns the edges of these springs.
+  std::vector<GraphEdge> grow_from_most_certain() {
     measure(proposals_);
     const double unit = lattice_.errors.phase_unit;
     auto grown = grow_components(size(), measured_.springs(), unit, layout_, step_callback_);
@@ -177,17 +183,71 @@ class Arranger {
     std::vector<GraphEdge> edges;
     for (const Lattice::Spring& spring : measured_.springs()) {
       const auto weight = grown.weights.find({spring.a, spring.b});
-      const bool has_direction = spring.phases && spring.phases->has_direction;
-      if (weight == grown.weights.end() || (!has_direction && weight->second < min_grown_weight) ||
+      if (weight == grown.weights.end() ||
+          (!has_direction(spring) && weight->second < min_grown_weight) ||
           !fits_layout(spring, unit, layout_.poses[spring.a], layout_.poses[spring.b])) {
         continue;
       }
       add_spring(spring).weight = weight->second;
       edges.push_back({spring.a, spring.b, 1.0});
     }
+    set_components(edges);
+    return edges;
+  }
+  void set_components(const std::vector<GraphEdge>& edges) {
     layout_.components = LatticeGraph(size(), edges).components();
     layout_.handedness_known.assign(size(), 0);
     for (const GraphEdge& edge : edges) layout_.handedness_known[layout_.components[edge.a]] = 1;
+  }
+
+  /// Joins the pieces of the grown layout whose pairs of views agree on one relative pose, and adds
+  /// springs for these pairs. A piece not larger than the neighbourhood of a view is one place,
+  /// whose views all resemble the same wrong one; it is not joined. Only the last round does so:
+  /// pieces that are bent would bend those that grow from them. `edges`: of the springs in the
+  /// pieces.
+  void join_remaining_pieces(std::vector<GraphEdge>& edges) {
+    const double unit = lattice_.errors.phase_unit;
+    std::vector<int> views(size());
+    for (const std::size_t component : layout_.components) ++views[component];
+    std::vector<const Lattice::Spring*> across;
+    for (const Lattice::Spring& spring : measured_.springs()) {
+      const std::size_t p = layout_.components[spring.a];
+      const std::size_t q = layout_.components[spring.b];
+      if (p != q && std::min(views[p], views[q]) > options_.neighbours && has_direction(spring) &&
+          has_agreeing_views(spring)) {
+        across.push_back(&spring);
+      }
+    }
+    const auto probabilities = compute_probabilities(across);
+    std::vector<CrossLink> links;
+    std::vector<std::size_t> numbers;  // of the links in `across`
+    for (std::size_t i = 0; i < across.size(); ++i) {
+      if (!(probabilities[i] > 0.0)) continue;  // the views seem unrelated
+      numbers.push_back(i);
+      const PhaseReading& phases = *across[i]->phases;
+      links.push_back({across[i]->a, across[i]->b, phases.a_from_b(unit), unit * phases.length,
+                       probabilities[i]});
+    }
+    for (const JoinedPieces& joined : join_pieces(links, layout_.poses, layout_.components)) {
+      lattice_.joins.push_back({joined.smaller_views, joined.agreeing.size()});
+      for (const std::size_t k : joined.agreeing) {
+        add_spring(*across[numbers[k]]).weight = links[k].probability;
+        edges.push_back({links[k].in_p, links[k].in_q, 1.0});
+      }
+    }
+    std::ranges::sort(lattice_.springs, {}, [](const auto& s) { return NodePair{s.a, s.b}; });
+    set_components(edges);
+  }
+
+  /// Returns the probability of the direction of each spring.
+  std::vector<double> compute_probabilities(std::span<const Lattice::Spring* const> springs) {
+    std::vector<double> probabilities(springs.size());
+    executor_.for_each_chunk(
+        springs.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
+          for (std::size_t i = begin; i < end; ++i)
+            probabilities[i] = views_.direction_probability({springs[i]->a, springs[i]->b});
+        });
+    return probabilities;
   }
 
   /// Chooses the springs within the curve's range whose views agree with each other and with a

@@ -86,9 +86,17 @@ struct Lattice {
     bool handedness_known = false;
   };
 
+  /// Two components that were joined after the last round, as several pairs of views agree on their
+  /// relative pose. The springs of these pairs are weak.
+  struct Join {
+    std::size_t views = 0;  ///< of the smaller piece
+    std::size_t pairs = 0;  ///< pairs of views that agree on its pose
+  };
+
   std::vector<Node> nodes;            ///< one for each view of the memory, in its order
   std::vector<Spring> springs;        ///< ascending (a, b)
   std::vector<Component> components;  ///< the largest first
+  std::vector<Join> joins;            ///< in their order
   DissimilarityCurve curve{1.0};      ///< of the last round
   Errors errors;                      ///< of the last round
   /// Number of pairs of views that were measured; those that are no springs were rejected.

@@ -14,17 +14,12 @@ namespace {
 
 // Values without another source were chosen on simulated worlds.
 
-/// Probability that a wrong link agrees with the relative pose of others: once in five times, as
-/// rooms and shelves are parallel to each other. q in docs/equations.md.
-constexpr double p_chance = 0.2;
 /// Probability that, of two right links of a view, the longer one joins the more similar views; it
 /// is 0.5 if one link is wrong.
 constexpr double p_discordant = 0.15;
 /// Smallest ratio of the lengths of two links whose similarities are compared; it exceeds the
 /// error of lengths.
 constexpr double min_longer_ratio = 1.2;
-/// Probability that adjacent views agree on their relative pose. a in docs/equations.md.
-constexpr double p_adjacent_agree = 0.7;
 /// Number of links, the most certain ones, that each propose a relative pose.
 constexpr std::size_t max_hypotheses = 8;
 

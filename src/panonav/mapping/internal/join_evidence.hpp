@@ -14,6 +14,17 @@ inline constexpr double adjacent_distance_in_links = 0.8;
 /// layouts are compared; farther away they may have drifted.
 inline constexpr double near_distance_in_links = 3.0;
 
+// Values without another source were chosen on simulated worlds.
+
+/// Probability that a wrong link agrees with the relative pose of others: once in five times, as
+/// rooms and shelves are parallel to each other. q in docs/equations.md.
+inline constexpr double p_chance = 0.2;
+/// Probability that adjacent views agree on their relative pose. a in docs/equations.md.
+inline constexpr double p_adjacent_agree = 0.7;
+/// Smallest odds for a join per view of the smaller component: 19 to 1, that is 95 %
+/// (docs/decisions.md).
+inline constexpr double min_join_odds = 19.0;
+
 /// A relative pose of two components, and its log-odds against chance.
 struct JoinHypothesis {
   double evidence;

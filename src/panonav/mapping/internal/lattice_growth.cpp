@@ -16,9 +16,6 @@ namespace panonav {
 
 namespace {
 
-/// Smallest odds for a join per view of the smaller component: 19 to 1, that is 95 %
-/// (docs/decisions.md).
-constexpr double min_join_odds = 19.0;
 /// Smallest odds to attach a single remaining view, which can misplace nothing but itself.
 constexpr double min_odds_of_single_views = 1.0;
 /// Number of final averages of each component; further ones change positions by less than the

@@ -11,6 +11,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/internal/lattice_graph.hpp"
 #include "panonav/memory/floors.hpp"
+#include "panonav/relative_pose/pair_evidence.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {
@@ -88,6 +89,11 @@ Lattice::Spring SpringViews::measure(NodePair pair,
   Lattice::Spring spring{.a = pair.first, .b = pair.second, .dissimilarity = dissimilarity(pair)};
   if (!homing_.empty()) spring.phases = read_phases(homing_[spring.a], homing_[spring.b], window);
   return spring;
+}
+
+double SpringViews::direction_probability(NodePair pair) const {
+  const PairFeatures features = compute_pair_features(homing_[pair.second], homing_[pair.first]);
+  return features.is_related() ? features.direction_probability() : 0.0;
 }
 
 bool has_agreeing_views(const Lattice::Spring& spring) {

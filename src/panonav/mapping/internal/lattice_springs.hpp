@@ -39,6 +39,10 @@ class SpringViews {
   /// the length. `window`: allowed headings of the second node minus those of the first.
   [[nodiscard]] Lattice::Spring measure(
       NodePair pair, const std::optional<HeadingWindow>& window = std::nullopt) const;
+  /// Returns the probability that the phases of a pair show the right direction, 0 if the views do
+  /// not seem to be of one building (`PairFeatures`). Needs the option `phases`. Cost: some
+  /// milliseconds.
+  [[nodiscard]] double direction_probability(NodePair pair) const;
 
  private:
   const VisualMemory* memory_;
