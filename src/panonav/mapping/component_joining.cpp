@@ -23,9 +23,9 @@ constexpr int max_compared_views = 10;
 constexpr std::size_t min_distinctness = 2;
 /// Conditions of a closure, for views in no order, which are farther apart than those of a drive:
 /// twice the length, and the residual below which at most 2 % of the pairs of views from two
-/// buildings are (`VisualOdometry`). Chosen on walks in built-in scenes and 20 random views of each:
-/// with 0.15, 5 to 17 views joined the walk in their scene and none joined another; with 0.2, up to
-/// 3 did.
+/// buildings are (`VisualOdometry`). Chosen on walks in built-in scenes and 20 random views of
+/// each: with 0.15, 5 to 17 views joined the walk in their scene and none joined another; with 0.2,
+/// up to 3 did.
 constexpr LoopClosureOptions closure_options{
     .max_residual = 0.15, .max_length = 0.6, .return_tolerance = 0.2};
 

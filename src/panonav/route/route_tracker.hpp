@@ -31,15 +31,15 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 /// continues like the original.
 class RouteTracker {
  public:
-  /// Learns from lines left out of a test route of every second line, and from lines of no place:
-  /// their negatives, and their shuffled parts:
-  /// - the smallest correlation of an accepted fit: above the 95 % quantile of lines of no place by
-  ///   a third of the distance to the 5 % quantile of the lines;
-  /// - the smallest detail correlation: the limit that 1 % of lines of no place exceed, at the
-  ///   finest scale at which most of the lines exceed it;
+  /// Learns from lines left out of a test route of every second line, and from lines of no place
+  /// (negatives and shuffled parts of them):
+  /// - the smallest correlation: above the 95 % quantile of lines of no place by a third of the
+  ///   distance to the 5 % quantile of the lines;
+  /// - the smallest detail correlation: that 1 % of lines of no place exceed, at the finest scale
+  ///   at which most lines exceed it;
   /// - the variance of errors beyond the noise of the lines, so that 95 % of the fits that start
-  ///   `surprise_m` beside the truth lie within the 95 % ellipse; that of positions between two
-  ///   lines if there are fewer than three such fits.
+  ///   `surprise_m` beside the truth lie within the ellipse; with fewer than three such fits, that
+  ///   of positions between two lines.
   ///
   /// Throws OptionError, and ContractError on a route of fewer than two lines. Cost: 80 searches.
   explicit RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options = {},
@@ -47,9 +47,8 @@ class RouteTracker {
 
   /// Locates the robot by a line. `step`: its motion since the last line, in the frame of the robot
   /// at that line [Y03 section 4.1]. nullopt if the line does not match the route, or if it matches
-  /// at an unexpected place, which is
-  /// accepted once two successive lines agree on it; the pose is then predicted by odometry alone.
-  /// Throws ContractError on a wrong length.
+  /// at an unexpected place, which is accepted once two successive lines agree on it; the pose is
+  /// then predicted by odometry alone. Throws ContractError on a wrong length.
   std::optional<RouteFix> track(std::span<const float> line, const Pose2& step);
 
   /// Locates the robot by the line alone. Cost: some 10 microseconds for each position tried.
