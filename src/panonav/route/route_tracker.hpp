@@ -31,15 +31,14 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 /// continues like the original.
 class RouteTracker {
  public:
-  /// Learns from lines left out of a test route of every second line, and from lines of no place
-  /// (negatives and shuffled parts of them):
+  /// Learns from lines left out of the route, and from lines of no place (negatives and shuffled
+  /// ones):
   /// - the smallest correlation: above the 95 % quantile of lines of no place by a third of the
   ///   distance to the 5 % quantile of the lines;
   /// - the smallest detail correlation: that 1 % of lines of no place exceed, at the finest scale
   ///   at which most lines exceed it;
-  /// - the variance of errors beyond the noise of the lines, so that 95 % of the fits that start
-  ///   `surprise_m` beside the truth lie within the ellipse; with fewer than three such fits, that
-  ///   of positions between two lines.
+  /// - the variance of errors beyond the noise, so that 95 % of the fits that start `surprise_m`
+  ///   beside the truth lie within the ellipse; that of positions between two lines for few fits.
   ///
   /// Throws OptionError, and ContractError on a route of fewer than two lines. Cost: 80 searches.
   explicit RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options = {},
