@@ -141,7 +141,8 @@ ordered_json to_json(const std::optional<MemoryMap>& map) {
 }
 
 /// Prints whether the parts of the map are connected, and its unit.
-void print_map(const std::string& path, const MemoryMap& map, bool is_stored, Session& session) {
+void print_map(const MemoriseArguments& arguments, const MemoryMap& map, bool is_stored,
+               Session& session) {
   const std::size_t parts = map.part_sizes.size();
   if (!is_stored) {
     session.print(session.red("There is no map") + ": it needs " +
@@ -165,12 +166,14 @@ void print_map(const std::string& path, const MemoryMap& map, bool is_stored, Se
                                       std::to_string(ObservationModel::min_views) + ". "
                                 : "") +
                   "Parts are placed beside each other; distances between them have no meaning. To "
-                  "connect them, memorise a walk that leads through them, with an image every 20 "
-                  "to 50 cm.");
+                  "connect " +
+                  (arguments.floor.empty() ? "them" : "parts of one floor") +
+                  ", memorise a walk that leads through them, with an image every 20 to 50 cm.");
   }
   if (map.unit == LengthUnit::view_steps) {
     session.print("Positions are in view steps (" + std::string(map.view_step) +
-                  "). For metres: panonav scale " + path + " --distance VIEW VIEW LENGTH");
+                  "). For metres: panonav scale " + arguments.memory +
+                  " --distance VIEW VIEW LENGTH");
   }
 }
 
@@ -205,7 +208,7 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
         "horizon.");
   }
   if (counts.map) {
-    print_map(arguments.memory, *counts.map, has_positions_from_map(memory), session);
+    print_map(arguments, *counts.map, has_positions_from_map(memory), session);
   }
   print_views_without_position(memory, session);
   session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
