@@ -373,6 +373,25 @@ TEST_F(Track, WithoutOdometryMotionIsReadFromThePicturesAndItSaysSo) {
   EXPECT_TRUE(contains(bare.err, "motion is computed from the images"));
 }
 
+// Views nearer to each other than an image tells apart are one place.
+TEST_F(Track, AMemoryOfDenseViewsDoesNotMakeThePlaceAmbiguous) {
+  const auto folder = *folder_ / "dense";
+  std::vector<Pose2> poses;
+  for (int i = 0; i < 160; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 320.0;  // 1.2 cm apart
+    poses.push_back({1.0 + 0.6 * std::cos(angle), 1.0 + 0.6 * std::sin(angle),
+                     wrap_angle(angle + 0.5 * std::numbers::pi)});
+  }
+  write_run(folder, *world_, poses, {}, {.odometry = false});
+  const std::string dense = *folder_ / "dense.panonav";
+  run_well({"memorise", dense, folder});
+  std::size_t localised = 0;
+  for (const json& image : answers_of({"track", dense, folder, "--json"})) {
+    localised += image["state"] == "localised" ? 1 : 0;
+  }
+  EXPECT_GE(localised, 150U);
+}
+
 // The poses of a run are in another frame than a map of its images, also in metres.
 TEST_F(Track, PositionsOfAMapAreNotComparedWithThoseOfTheRun) {
   const std::string drive = *folder_ / "drive";

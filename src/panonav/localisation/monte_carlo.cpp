@@ -105,8 +105,9 @@ struct MonteCarloLocaliser::Implementation {
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
 
-  [[nodiscard]] PoseBins bins() const {
-    return {.cell_m = model.spacing_m, .headings = heading_bins};
+  /// Returns bins whose modes reach as far as views are similar: what one image fits is one place.
+  [[nodiscard]] PoseBins bins(int headings = heading_bins) const {
+    return {std::max(model.spacing_m, model.range_m / (mode_reach + 0.5)), headings};
   }
   [[nodiscard]] ParticleModes modes() const { return find_modes(particles, bins()); }
 
@@ -298,8 +299,7 @@ struct MonteCarloLocaliser::Implementation {
       estimate.state = LocalisationState::localised;
       return;
     }
-    const ParticleModes places = find_modes(particles, {.cell_m = model.spacing_m, .headings = 1});
-    std::vector<PoseMode> by_position = correct_modes(places.modes);
+    std::vector<PoseMode> by_position = correct_modes(find_modes(particles, bins(1)).modes);
     if (!is_certain(by_position)) return;
     estimate.state = LocalisationState::position_known;
     estimate.modes = std::move(by_position);

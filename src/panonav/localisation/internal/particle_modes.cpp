@@ -15,9 +15,6 @@ namespace panonav {
 
 namespace {
 
-/// Number of bins on each side of the heaviest one that belong to its mode.
-constexpr int mode_reach = 2;
-
 struct Bin {
   GridCell grid_cell;
   std::int32_t heading;

@@ -7,6 +7,9 @@
 
 namespace panonav {
 
+/// Number of bins on each side of the heaviest one that belong to its mode.
+inline constexpr int mode_reach = 2;
+
 /// The grid in which particles are counted and clustered.
 struct PoseBins {
   double cell_m = 0.25;  ///< side of a cell, > 0
