@@ -11,6 +11,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/internal/loop_closure_finder.hpp"
 #include "panonav/mapping/internal/visual_scale.hpp"
+#include "panonav/memory/floors.hpp"
 
 namespace panonav {
 
@@ -94,7 +95,11 @@ class Joiner {
     for (const Match& match : found.matches) {
       const auto other =
           std::ranges::lower_bound(map_.nodes, match.view, {}, &TopologicalMap::Node::view);
-      if (other == map_.nodes.end() || other->view != match.view) continue;
+      if (other == map_.nodes.end() || other->view != match.view ||
+          floor_of(memory_.info(match.view).name) !=
+              floor_of(memory_.info(map_.nodes[node].view).name)) {
+        continue;
+      }
       const auto closure =
           finder_.verify_closure(static_cast<std::size_t>(other - map_.nodes.begin()), node,
                                  OdometryView(memory_.signature(match.view)), here);

@@ -415,19 +415,17 @@ std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::strin
       (!has_positions_from_map(memory) && std::ranges::any_of(views.views(), has_pose))) {
     return std::nullopt;
   }
-  OrderedMap ordered = map_in_order(memory, views, odometry, {}, mapped);
-  const auto count_largest = [](const TopologicalMap& map) {
-    return std::ranges::max(count_nodes(map));
-  };
-  if (ordered.is_metric || are_in_order(views)) {
+  auto unordered = find_unordered_views(memory, views, odometry);
+  const bool has_walk = unordered.size() < views.size();
+  if (!has_walk) unordered.clear();
+  // Steps between images in no order would be wrong: beside a walk, each joins it by itself.
+  OrderedMap ordered = map_in_order(memory, views, odometry, unordered, mapped);
+  if (!unordered.empty() || ordered.is_metric || are_in_order(views)) {
     join_small_components(ordered.map, views, min_positioned_views - 1);
-    const auto unordered = find_unordered_views(memory, views, odometry);
-    if (!unordered.empty()) {
-      OrderedMap partly = map_in_order(memory, views, odometry, unordered, {});
-      join_small_components(partly.map, views, min_positioned_views - 1);
-      if (count_largest(partly.map) > count_largest(ordered.map)) ordered = std::move(partly);
-    }
   } else {
+    const auto count_largest = [](const TopologicalMap& map) {
+      return std::ranges::max(count_nodes(map));
+    };
     TopologicalMap arranged = to_topological_map(arrange(views, {}, {}, executor));
     if (count_largest(arranged) > count_largest(ordered.map)) {
       ordered.map = std::move(arranged);
