@@ -76,6 +76,8 @@ struct StepOutward {
 };
 /// Longest step, up to which the moves of directions are linear in it: chosen.
 constexpr double max_step_length = 0.4;
+/// Shortest step that the search tells from none: half of its last change of the length.
+constexpr double min_step_length = max_step_length / 128.0;
 
 /// Returns the line at the end after a step, in the world's frame.
 std::vector<float> move_line(std::span<const float> end, const StepOutward& step,
@@ -134,8 +136,9 @@ StepOutward find_step(std::span<const float> end, std::span<const float> coarse_
   return best;
 }
 
-/// Returns the highest correlation of the line with views near the step, by pattern search.
-double maximise_past_end(std::span<const float> end, std::span<const float> line, StepOutward step,
+/// Moves the step to the highest correlation of the line with views near it, by pattern search;
+/// returns that correlation.
+double maximise_past_end(std::span<const float> end, std::span<const float> line, StepOutward& step,
                          std::size_t columns) {
   double best = correlate_past_end(end, line, step, columns);
   // Half of the steps of `find_step`, and of its columns.
@@ -221,14 +224,17 @@ bool RouteLines::is_better_past_end(std::span<const float> line, const RouteFix&
   const auto line_at = [&](const Level& at, std::size_t i) {
     return std::span(at.values).subspan(i * size, size);
   };
-  const auto is_better = [&](std::size_t end, std::size_t before) {
+  const auto explain = [&](std::size_t end, std::size_t before) {
     const double outward_rad =
         std::atan2(poses_[end].y_m - poses_[before].y_m, poses_[end].x_m - poses_[before].x_m);
-    const auto step = find_step(line_at(levels_.front(), end), coarse, outward_rad);
-    return maximise_past_end(line_at(level, end), smooth, step, level.directions.size()) >
-           explained;
+    auto step = find_step(line_at(levels_.front(), end), coarse, outward_rad);
+    const double correlation =
+        maximise_past_end(line_at(level, end), smooth, step, level.directions.size());
+    return std::pair(correlation, step.length);
   };
-  return is_better(0, 1) || is_better(poses_.size() - 1, poses_.size() - 2);
+  const auto [past_end, length] =
+      std::max(explain(0, 1), explain(poses_.size() - 1, poses_.size() - 2));
+  return length >= min_step_length && past_end > explained;
 }
 
 }  // namespace panonav
