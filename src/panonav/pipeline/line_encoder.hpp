@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,6 +25,13 @@ struct RouteSource {
   /// Metres of a unit of the poses if things around are as far away as assumed; the poses were then
   /// computed from images alone and are in view steps. nullopt: poses are in metres.
   std::optional<double> assumed_unit_m = std::nullopt;
+  /// Returns the metres of a unit of the poses, for limits that need no precision. A view step is
+  /// taken as 2 cm at least, as in a video at a walking pace: lengths by images are far too small
+  /// where views hardly differ.
+  [[nodiscard]] double rough_unit_m() const noexcept {
+    constexpr double min_view_step_m = 0.02;
+    return assumed_unit_m ? std::max(min_view_step_m, *assumed_unit_m) : 1.0;
+  }
   /// True: lengths are those of the memory's map, so scaling the map scales the route. False: they
   /// are metres of a data set or of odometry.
   bool is_in_map_unit = false;

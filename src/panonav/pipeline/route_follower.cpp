@@ -9,7 +9,7 @@ namespace panonav {
 namespace {
 
 RouteFitOptions scale_fit(RouteFitOptions fit, const RouteSource& source) {
-  fit.metre = 1.0 / source.assumed_unit_m.value_or(1.0);
+  fit.metre = 1.0 / source.rough_unit_m();
   return fit;
 }
 

@@ -308,7 +308,7 @@ std::optional<Pose2> RouteRecorder::pose_of(const Observation& observation) cons
 }
 
 double RouteRecorder::interval() const {
-  return options_.every_m / source_.assumed_unit_m.value_or(1.0);
+  return options_.every_m / source_.rough_unit_m();
 }
 
 RouteRecorder::EncodedLine RouteRecorder::encode(const Observation& observation) const {
