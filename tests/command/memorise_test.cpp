@@ -113,6 +113,20 @@ TEST_F(Memorise, APictureOfAnotherSizeIsSkippedAndNamed) {
   }
 }
 
+TEST_F(Memorise, ASizeThatMostImagesHaveButNotTheKindIsSkipped) {
+  const auto mixed = folder_ / "mixed";
+  fs::create_directories(mixed);
+  for (std::size_t i = 0; i < 9; ++i) {
+    const bool is_sphere = i % 3 == 0;
+    write_picture(mixed / view_name(i), world_, {0.1 * static_cast<double>(i), 0.0, 0.0}, 64,
+                  is_sphere ? 32 : 12);
+  }
+  const auto said =
+      answer_of({"memorise", folder_ / "m.panonav", mixed, "--kind", "equirectangular", "--json"});
+  EXPECT_EQ(said["appended"], 3);
+  EXPECT_EQ(said["skipped"].size(), 6U);
+}
+
 TEST_F(Memorise, AResumedMemoryTakesNoOtherPictureUnderAKnownName) {
   run_well({"memorise", memory(), data()});
   // Same name, same pose, one other picture out of sixteen.

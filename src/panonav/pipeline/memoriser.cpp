@@ -126,7 +126,8 @@ void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
   if (waiting_.size() >= scale_views) make_file(executor);
 }
 
-// Makes the header; if the first images differ in size, uses only those of the most frequent size.
+// Makes the header; if the first images differ in size, uses only those of the most frequent size
+// that fits the source.
 MemoryHeader Memoriser::make_header_from_waiting(Executor& executor) const {
   const auto first = std::span(waiting_).first(std::min(scale_views, waiting_.size()));
   const auto header_of = [&](std::span<const Observation> some) {
@@ -144,9 +145,18 @@ MemoryHeader Memoriser::make_header_from_waiting(Executor& executor) const {
       }
     }
     if (by_size.size() < 2) throw;
-    return header_of(std::ranges::max_element(by_size, {}, [](const auto& one) {
-                       return one.second.size();
-                     })->second);
+    std::vector<std::span<const Observation>> of_one_size;
+    for (const auto& [size, observations] : by_size) of_one_size.emplace_back(observations);
+    std::ranges::stable_sort(of_one_size, std::greater{},
+                             [](std::span<const Observation> some) { return some.size(); });
+    for (const std::span<const Observation> some : of_one_size) {
+      try {
+        return header_of(some);
+      } catch (const Error&) {
+        continue;  // its images are named and left out
+      }
+    }
+    throw;
   }
 }
 
