@@ -173,6 +173,13 @@ void bind_recogniser(py::module_& m) {
           py::arg("observation"), py::arg("excluded_names") = std::vector<std::string>{},
           "Finds the place of an Observation, a Panorama, an array of pixels, a PIL image, or the "
           "path of an image. Views with names in `excluded_names` are ignored.")
+      .def_property_readonly(
+          "length_unit",
+          [](const SharedRecogniser& recogniser) {
+            return recogniser.read(
+                [](const PlaceRecogniser& r) { return to_string(r.length_unit()); });
+          },
+          "Unit of all positions, as `MemoryFile.length_unit`.")
       .def(
           "localise_all",
           [](const SharedRecogniser& recogniser, const py::object& recording,

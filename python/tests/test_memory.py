@@ -277,7 +277,9 @@ def test_a_tracker_reads_motion_from_images_without_odometry(office):
     one_by_one = [estimated(steps.observe(one)) for one in bare]
     assert one_by_one == [estimated(one) for one in run.track(bare)]
     still = panonav.Tracker(office / "office.panonav")
-    assert still.length_unit == "m"
+    assert still.length_unit == panonav.PlaceRecogniser(office / "office.panonav").length_unit == "m"
+    with pytest.raises(panonav.FileError, match="is open for reading only"):
+        panonav.MemoryFile(office / "office.panonav").forget([1])
     still.move_to((0, 0, 0))
     assert still.observe(bare[0])
     still.move_to((0, 0, 0))  # odometry, so the images tell no motion

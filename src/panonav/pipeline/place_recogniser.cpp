@@ -76,6 +76,7 @@ struct PlaceRecogniser::Implementation {
   /// Holds the memory.
   Implementation(const MemoryFile& file, const PlaceRecogniserOptions& options_)
       : options(options_),
+        unit(read_length_unit(file)),
         memory(file.load()),
         encoder(file.header(), options.source.value_or(file.header().source)) {
     check_options(options, file.header(), true);
@@ -87,6 +88,7 @@ struct PlaceRecogniser::Implementation {
   Implementation(std::unique_ptr<IndexedMemory> index_, const MemoryFile& file,
                  std::filesystem::path path_, const PlaceRecogniserOptions& options_)
       : options(options_),
+        unit(read_length_unit(file)),
         path(std::move(path_)),
         indexed(std::move(index_)),
         encoder(file.header(), options.source.value_or(file.header().source)) {
@@ -166,6 +168,7 @@ struct PlaceRecogniser::Implementation {
   }
 
   PlaceRecogniserOptions options;
+  LengthUnit unit;
   std::optional<VisualMemory> memory;  // empty: not held
   std::optional<ReferenceAreas> areas;
   std::filesystem::path path;              // where not held
@@ -195,6 +198,10 @@ PlaceRecogniser::PlaceRecogniser(std::unique_ptr<IndexedMemory> index,
 PlaceRecogniser::~PlaceRecogniser() = default;
 PlaceRecogniser::PlaceRecogniser(PlaceRecogniser&&) noexcept = default;
 PlaceRecogniser& PlaceRecogniser::operator=(PlaceRecogniser&&) noexcept = default;
+
+LengthUnit PlaceRecogniser::length_unit() const noexcept {
+  return implementation_->unit;
+}
 
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {

@@ -11,6 +11,7 @@
 #include "panonav/localisation/localiser_options.hpp"
 #include "panonav/localisation/place.hpp"
 #include "panonav/panorama/picture_source.hpp"
+#include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/observation.hpp"
 
 namespace panonav {
@@ -71,6 +72,9 @@ class PlaceRecogniser {
   [[nodiscard]] Place localise(const Observation& observation,
                                std::span<const std::string> excluded_names = {}) const;
 
+  /// Returns the unit of all positions when the memory was opened: names with `_m` are in metres
+  /// only if it is metres.
+  [[nodiscard]] LengthUnit length_unit() const noexcept;
   [[nodiscard]] bool is_memory_held() const noexcept;  ///< False: the server is searched.
   [[nodiscard]] std::size_t size() const;  ///< Returns the number of views that can be found.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Returns the encoder.

@@ -174,6 +174,10 @@ void Database::fail(int code) const {
     case SQLITE_LOCKED:
       throw FileError(name, "is being written by another program");
     case SQLITE_READONLY:
+      if (sqlite3_db_readonly(handle_.get(), "main") == 1) {
+        throw FileError(name, "is open for reading only; open it for writing to change it");
+      }
+      [[fallthrough]];
     case SQLITE_PERM:
     case SQLITE_AUTH:
       throw FileError(name, "cannot be written: no permission to write the file and its folder");
