@@ -132,6 +132,10 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   const PlaceRecogniser recogniser(arguments.memory, options);
   const auto answers = answer_all(recogniser, arguments, recording, session);
   const std::size_t known = write_table_and_count(arguments, answers, session);
+  if (known > 0 && has_positions_from_map(file)) {
+    session.note(
+        "positions are those in the map of the images; 'within' does not contain its errors");
+  }
   if (arguments.report) {
     write_localise_report(*arguments.report, file, recogniser, answers, [&](std::size_t i) {
       Observation observation = read_observation(recording.entries[i]);
