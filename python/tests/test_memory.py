@@ -279,7 +279,7 @@ def test_a_tracker_reads_motion_from_images_without_odometry(office):
     still = panonav.Tracker(office / "office.panonav")
     assert still.length_unit == panonav.PlaceRecogniser(office / "office.panonav").length_unit == "m"
     with pytest.raises(panonav.FileError, match="is open for reading only"):
-        panonav.MemoryFile(office / "office.panonav").forget([1])
+        panonav.MemoryFile(office / "office.panonav").remove([1])
     still.move_to((0, 0, 0))
     assert still.observe(bare[0])
     still.move_to((0, 0, 0))  # odometry, so the images tell no motion

@@ -149,6 +149,21 @@ void Database::fail_damaged(std::string_view what) const {
   throw FileError(path_.string(), "is damaged: " + std::string(what));
 }
 
+namespace {
+
+/// True if statements may not change the database, whatever the rights of its file are.
+bool is_open_for_reading(sqlite3* database) {
+  bool is_reading = sqlite3_db_readonly(database, "main") == 1;
+  const auto read = [](void* result, int, char** values, char**) {
+    if (values[0] != nullptr && values[0][0] == '1') *static_cast<bool*>(result) = true;
+    return 0;
+  };
+  sqlite3_exec(database, "PRAGMA query_only", read, &is_reading, nullptr);
+  return is_reading;
+}
+
+}  // namespace
+
 void Database::fail(int code) const {
   // The message must be copied before another call changes it.
   const std::string text =
@@ -174,7 +189,7 @@ void Database::fail(int code) const {
     case SQLITE_LOCKED:
       throw FileError(name, "is being written by another program");
     case SQLITE_READONLY:
-      if (sqlite3_db_readonly(handle_.get(), "main") == 1) {
+      if (is_open_for_reading(handle_.get())) {
         throw FileError(name, "is open for reading only; open it for writing to change it");
       }
       [[fallthrough]];
