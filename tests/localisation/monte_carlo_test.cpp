@@ -491,7 +491,12 @@ TEST(MonteCarlo, RefusesWhatMakesNoSense) {
   MonteCarloLocaliser filter = quick_filter(place.memory);
   EXPECT_THROW(filter.observe(pack(compute_signature(place.room.see({1.0, 1.0, 0.0}, 12)), 1.0F)),
                ContractError);
-  EXPECT_THROW(filter.move({std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0}), ContractError);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(filter.move({nan, 0.0, 0.0}), ContractError);
+  for (const double bad : {-0.1, nan, std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(filter.spread(bad, 0.1), ContractError);
+    EXPECT_THROW(filter.spread(0.1, bad), ContractError);
+  }
 }
 
 }  // namespace

@@ -440,6 +440,7 @@ void MonteCarloLocaliser::set_odometry_noise(const OdometryNoise& noise) {
   validate(noise);
   implementation_->odometry = noise;
 }
+
 void MonteCarloLocaliser::move(const Pose2& step) {
   require(is_finite(step), "step of the odometry", step.x_m, "numbers");
   auto& own = *implementation_;
@@ -450,14 +451,8 @@ void MonteCarloLocaliser::move(const Pose2& step) {
 
 void MonteCarloLocaliser::spread(double deviation_m, double heading_deviation_rad) {
   auto& own = *implementation_;
+  spread_particles(own.particles, deviation_m, heading_deviation_rad, own.random);
   own.travelled_m += deviation_m;
-  for (std::size_t i = 0; i < own.particles.size(); ++i) {
-    const Pose2 at = own.particles.pose(i);
-    const double x = own.random.normal(at.x_m, deviation_m);
-    const double y = own.random.normal(at.y_m, deviation_m);
-    const double heading = own.random.normal(at.heading_rad, heading_deviation_rad);
-    own.particles.set(i, {x, y, wrap_angle(heading)}, own.particles.weight[i]);
-  }
 }
 
 void MonteCarloLocaliser::update_views() {
@@ -490,9 +485,11 @@ MonteCarloEstimate MonteCarloLocaliser::estimate() const {
   implementation_->fill_estimate(estimate, implementation_->modes());
   return estimate;
 }
+
 const Particles& MonteCarloLocaliser::particles() const noexcept {
   return implementation_->particles;
 }
+
 const ObservationModel& MonteCarloLocaliser::model() const noexcept {
   return implementation_->model;
 }

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/kernels/motion.hpp"
 
@@ -59,6 +61,19 @@ void move_particles(Particles& particles, const StepSampler& sampler, Random& ra
     };
     move_block({part(particles.x_m), part(particles.y_m), part(particles.heading_rad)}, sampler,
                random);
+  }
+}
+
+void spread_particles(Particles& particles, double deviation_m, double heading_deviation_rad,
+                      Random& random) {
+  require(std::isfinite(deviation_m) && deviation_m >= 0.0, "deviation_m", deviation_m, ">= 0");
+  require(std::isfinite(heading_deviation_rad) && heading_deviation_rad >= 0.0,
+          "heading_deviation_rad", heading_deviation_rad, ">= 0");
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const double x = random.normal(particles.x_m[i], deviation_m);
+    const double y = random.normal(particles.y_m[i], deviation_m);
+    const double heading = random.normal(particles.heading_rad[i], heading_deviation_rad);
+    particles.set(i, {x, y, wrap_angle(heading)}, particles.weight[i]);
   }
 }
 

@@ -11,4 +11,9 @@ namespace panonav {
 /// generator: same bits on every machine. Cost: 10 ns a particle with AVX-512.
 void move_particles(Particles& particles, const StepSampler& sampler, Random& random);
 
+/// Moves each particle by normally distributed steps. Throws ContractError on a deviation that is
+/// negative or not finite.
+void spread_particles(Particles& particles, double deviation_m, double heading_deviation_rad,
+                      Random& random);
+
 }  // namespace panonav
