@@ -43,6 +43,9 @@ struct Particles {
   }
 };
 
+/// Returns the root mean square distance of the particles from their mean; 0 for none.
+[[nodiscard]] double position_spread_m(const Particles& particles);
+
 /// A cluster of particles.
 struct PoseMode {
   double weight = 0.0;                 ///< sum over the cluster's particles

@@ -30,15 +30,6 @@ constexpr std::size_t min_distinctness = 2;
 constexpr LoopClosureOptions closure_options{
     .max_residual = 0.15, .max_length = 0.6, .return_tolerance = 0.2};
 
-std::vector<std::size_t> count_nodes(const TopologicalMap& map) {
-  std::vector<std::size_t> counts;
-  for (const TopologicalMap::Node& node : map.nodes) {
-    counts.resize(std::max(counts.size(), node.component + 1), 0);
-    ++counts[node.component];
-  }
-  return counts;
-}
-
 /// Joins components by the closures between their views.
 class Joiner {
  public:
@@ -96,8 +87,7 @@ class Joiner {
       const auto other =
           std::ranges::lower_bound(map_.nodes, match.view, {}, &TopologicalMap::Node::view);
       if (other == map_.nodes.end() || other->view != match.view ||
-          floor_of(memory_.info(match.view).name) !=
-              floor_of(memory_.info(map_.nodes[node].view).name)) {
+          !are_on_one_floor(memory_, match.view, map_.nodes[node].view)) {
         continue;
       }
       const auto closure =

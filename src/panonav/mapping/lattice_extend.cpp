@@ -106,7 +106,7 @@ class Extender {
                                       {.excluded_views = excluded});
     for (const Match& match : found.matches) {
       if (match.dissimilarity > lattice_.curve.max_dissimilarity()) continue;
-      if (floor_of(memory_.info(match.view).name) != floor_of(memory_.info(view).name)) continue;
+      if (!are_on_one_floor(memory_, match.view, view)) continue;
       Lattice::Spring spring{.a = node_of_view_.at(match.view),
                              .b = node,
                              .dissimilarity = static_cast<double>(match.dissimilarity)};

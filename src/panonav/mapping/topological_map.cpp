@@ -54,4 +54,13 @@ std::size_t count_components(const TopologicalMap& map) {
   return components.size();
 }
 
+std::vector<std::size_t> count_nodes(const TopologicalMap& map) {
+  std::vector<std::size_t> counts;
+  for (const TopologicalMap::Node& node : map.nodes) {
+    counts.resize(std::max(counts.size(), node.component + 1), 0);
+    ++counts[node.component];
+  }
+  return counts;
+}
+
 }  // namespace panonav

@@ -43,4 +43,7 @@ void renumber_components(TopologicalMap& map);
 /// The number of connected components.
 [[nodiscard]] std::size_t count_components(const TopologicalMap& map);
 
+/// Returns the number of nodes of each component.
+[[nodiscard]] std::vector<std::size_t> count_nodes(const TopologicalMap& map);
+
 }  // namespace panonav

@@ -51,6 +51,10 @@ void require_floor(std::string_view floor) {
       "at most " + std::to_string(max_bytes) + " bytes without a slash and control characters");
 }
 
+bool are_on_one_floor(const VisualMemory& memory, ViewId a, ViewId b) {
+  return floor_of(memory.info(a).name) == floor_of(memory.info(b).name);
+}
+
 std::vector<std::string> list_floors(const VisualMemory& memory) {
   std::set<std::string, std::less<>> floors;
   for (const ViewId view : memory.views()) floors.emplace(floor_of(memory.info(view).name));

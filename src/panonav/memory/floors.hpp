@@ -15,6 +15,9 @@ namespace panonav {
 /// other views are on the floor without a name (empty).
 [[nodiscard]] std::string_view floor_of(std::string_view view_name) noexcept;
 
+/// True if two views of the memory are on one floor.
+[[nodiscard]] bool are_on_one_floor(const VisualMemory& memory, ViewId a, ViewId b);
+
 /// Returns the name of a view on this floor: `name` itself if `floor` is empty. Throws
 /// ContractError as `require_floor`.
 [[nodiscard]] std::string make_name_on_floor(std::string_view floor, std::string_view name);
@@ -49,6 +52,8 @@ class FloorPlane {
   [[nodiscard]] Point2 to_plane(const FloorPosition& position);
   /// Returns the position on its floor; its `floor` belongs to *this.
   [[nodiscard]] FloorPosition to_floor(Point2 in_plane) const;
+  /// False if all positions are on the floor without a name, and so the same in the plane.
+  [[nodiscard]] bool has_named_floor() const noexcept { return floors_.size() > 1; }
 
  private:
   std::vector<std::string> floors_{""};

@@ -85,15 +85,6 @@ struct Box {
   [[nodiscard]] double height() const { return max_y_m - min_y_m; }
 };
 
-std::vector<std::size_t> count_nodes(const TopologicalMap& map) {
-  std::vector<std::size_t> counts;
-  for (const TopologicalMap::Node& node : map.nodes) {
-    counts.resize(std::max(counts.size(), node.component + 1), 0);
-    ++counts[node.component];
-  }
-  return counts;
-}
-
 /// Returns the offset of each component (`place_components_side_by_side`), given their boxes.
 std::vector<Point2> compute_offsets(const std::vector<Box>& boxes,
                                     const std::vector<std::size_t>& order, double gap) {
@@ -151,6 +142,7 @@ std::vector<ViewId> find_unordered_views(const MemoryFile& file, const VisualMem
     const auto next_start = std::ranges::upper_bound(starts, *begin);
     const auto end =
         next_start == starts.end() ? ids.end() : std::lower_bound(begin, ids.end(), *next_start);
+    if (begin == ids.begin() && end == ids.end()) break;  // there is no other path
     VisualMemory path(views.shape(), views.full_scale(), views.elevations());
     bool has_odometry = false;
     for (auto view = begin; view != end; ++view) {

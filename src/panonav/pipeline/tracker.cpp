@@ -1,7 +1,6 @@
 #include "panonav/pipeline/tracker.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -43,20 +42,6 @@ void require_positions(const MemoryFile& file, const VisualMemory& memory) {
 // stored models were learnt.
 bool can_use_stored_models(const TrackerOptions& options) {
   return options.filter.seed == LearningOptions{}.seed;
-}
-
-// Returns the root mean square distance of the particles, whose weights sum to 1, from their mean.
-double compute_spread_m(const Particles& particles) {
-  Point2 mean;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    mean.x_m += particles.weight[i] * particles.x_m[i];
-    mean.y_m += particles.weight[i] * particles.y_m[i];
-  }
-  double sum = 0.0;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    sum += particles.weight[i] * std::pow(distance(particles.position(i), mean), 2.0);
-  }
-  return std::sqrt(sum);
 }
 
 MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& memory,
@@ -163,6 +148,7 @@ struct Tracker::Implementation {
   /// Converts the poses to the frames of their floors, and the spread to that on the floor of the
   /// heaviest mode.
   [[nodiscard]] MonteCarloEstimate to_floors(MonteCarloEstimate estimate) {
+    if (!plane.has_named_floor()) return estimate;
     const auto convert = [&](auto& pose) {
       const Point2 point = plane.to_floor({pose.x_m, pose.y_m}).point;
       pose.x_m = point.x_m;
@@ -177,13 +163,14 @@ struct Tracker::Implementation {
     if (estimate.position) convert(*estimate.position);
     const Particles on_floor = particles();
     if (on_floor.size() < localiser.particles().size() && !on_floor.empty()) {
-      estimate.spread_m = compute_spread_m(on_floor);
+      estimate.spread_m = position_spread_m(on_floor);
     }
     return estimate;
   }
   /// Returns the particles on the floor, in its frame.
   [[nodiscard]] Particles particles() const {
     const Particles& all = localiser.particles();
+    if (!plane.has_named_floor()) return all;
     Particles kept;
     double sum = 0.0;
     for (std::size_t i = 0; i < all.size(); ++i) {

@@ -30,7 +30,4 @@ struct ParticleModes {
 [[nodiscard]] ParticleModes find_modes(const Particles& particles, const PoseBins& bins,
                                        double min_weight = 0.01);
 
-/// Root mean square distance of the particles from their mean; 0 for none.
-[[nodiscard]] double position_spread_m(const Particles& particles);
-
 }  // namespace panonav

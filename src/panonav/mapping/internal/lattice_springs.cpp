@@ -65,8 +65,7 @@ std::vector<NodePair> SpringViews::find_most_similar_pairs(const LatticeOptions&
       const auto answer = memory_->search(packed_[i], {options.neighbours, components_},
                                           {.excluded_views = views.subspan(i, 1)});
       for (const Match& match : answer.matches) {
-        if (floor_of(memory_->info(match.view).name) != floor_of(memory_->info(views[i]).name))
-          continue;
+        if (!are_on_one_floor(*memory_, match.view, views[i])) continue;
         const auto j =
             static_cast<std::size_t>(std::ranges::lower_bound(views, match.view) - views.begin());
         found[i].push_back(std::minmax(i, j));

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <string_view>
 
 #include "panonav/core/error.hpp"
 #include "panonav/memory/floors.hpp"
@@ -126,12 +125,11 @@ std::optional<LoopClosure> LoopClosureFinder::find_best_closure(
   const auto found = memory_->search(memory_->packed(nodes[here].view),
                                      {.top = options_.candidates * views_per_candidate},
                                      {.excluded_views = excluded});
-  const std::string_view floor = floor_of(memory_->info(nodes[here].view).name);
   std::vector<std::size_t> compared;
   std::vector<LoopClosure> closures;
   for (const Match& match : found.matches) {
     const auto candidate = find_node(nodes, match.view);
-    if (!candidate || floor_of(memory_->info(match.view).name) != floor) continue;
+    if (!candidate || !are_on_one_floor(*memory_, match.view, nodes[here].view)) continue;
     // Only the first, most similar one of neighbours along the path is compared.
     const bool known = std::ranges::any_of(compared, [&](std::size_t i) {
       return std::abs(nodes[i].path_m - nodes[*candidate].path_m) <
