@@ -221,13 +221,19 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
   append(unknown, path_starts);
 }
 
+bool Memoriser::is_on_path_of_last_view(const std::string& name) const {
+  const std::vector<ViewId> stored = file_->views();
+  if (stored.empty()) return false;
+  const std::array last{stored.back()};
+  return get_path_name(file_->load(last).info(last.front()).name) == get_path_name(name);
+}
+
 // Stores new views and which of them begin a path. An image that is the only one of its input
 // continues the path of the memory, so its start is stored only with the next image.
 void Memoriser::append(std::vector<NewView>& views, std::vector<std::size_t>& path_starts) {
   if (views.empty()) return;
-  const std::vector<std::string> stored = file_->names();
-  const bool is_alone = counts_.appended + views.size() == 1 && !has_recalled_ && !stored.empty() &&
-                        get_path_name(stored.back()) == get_path_name(views.front().info.name);
+  const bool is_alone = counts_.appended + views.size() == 1 && !has_recalled_ &&
+                        is_on_path_of_last_view(views.front().info.name);
   file_->change([&] {
     const std::vector<ViewId> ids = file_->append(views);
     std::vector<ViewId> starts;

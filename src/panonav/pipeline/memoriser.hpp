@@ -118,6 +118,7 @@ class Memoriser {
                          ViewId view);
   void append(std::vector<NewView>& views, std::vector<std::size_t>& path_starts);
   [[nodiscard]] bool does_begin_path(const std::string& name, bool is_first_of_batch) const;
+  [[nodiscard]] bool is_on_path_of_last_view(const std::string& name) const;
 
   std::filesystem::path path_;
   MemoriserOptions options_;
