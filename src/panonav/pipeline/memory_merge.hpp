@@ -30,10 +30,10 @@ struct MergedMemory {
 /// Merges the memories of two sessions or robots in one environment: finds common places by
 /// appearance (`align_sessions`) and transforms the second into the frame of the first's poses
 /// (`join_sessions`). Moves only their largest connected components, on the floor that both have.
-/// Without common places on it, the second loses its positions there.
+/// Without common places, the second loses its positions there.
 ///
 /// A view with the same name and picture in both is stored once, as in the first. Other names of
-/// the second that the first uses become "STEM/NAME".
+/// the second that the first uses become "STEM/NAME". Writes all of `memory` or nothing.
 ///
 /// Throws FileError on unreadable files, if `memory` exists, if several floors are in both, and on
 /// positions without headings; ContractError if shape, preprocessing or elevations differ;
