@@ -103,7 +103,7 @@ TEST(RouteLimits, RefuseOtherWorldsAndKeepTheirOwn) {
 // sight cross the route.
 TEST(RouteLimits, RefuseImagesFromPastTheEndsOfShortRoutes) {
   constexpr double length_m = 1.5;
-  int asked = 0;
+  int tested = 0;
   int wrong = 0;
   int refused = 0;
   int within = 0;
@@ -121,7 +121,7 @@ TEST(RouteLimits, RefuseImagesFromPastTheEndsOfShortRoutes) {
         for (const double past_m : {-0.05 * i, length_m + 0.05 * i}) {
           const Pose2 robot{past_m - 0.75, y_m, 0.4};
           const auto fix = tracker.search(room.line(robot));
-          ++asked;
+          ++tested;
           if (!fix || distance(fix->pose.position(), robot.position()) < 0.05) continue;
           ++(tracker.lines().is_better_past_end(room.line(robot), *fix) ? refused : wrong);
         }
@@ -133,16 +133,16 @@ TEST(RouteLimits, RefuseImagesFromPastTheEndsOfShortRoutes) {
       }
     }
   }
-  std::printf("%d of %d past the ends wrong, %d refused; %d of %d found within\n", wrong, asked,
+  std::printf("%d of %d past the ends wrong, %d refused; %d of %d found within\n", wrong, tested,
               refused, found, within);
   EXPECT_GT(refused, 0);
-  EXPECT_LE(wrong, asked / 200);
+  EXPECT_LE(wrong, tested / 200);
   EXPECT_GE(found, within * 95 / 100);
 }
 
 // A route with so few lines that they do not predict those between them.
 TEST(RouteLimits, RefuseOtherWorldsWhereLinesAreFarApart) {
-  int asked = 0;
+  int tested = 0;
   int foreign = 0;
   for (std::uint64_t world = 0; world < 6; ++world) {
     const ToyWorld room = pillared_room(900 + world);
@@ -154,13 +154,13 @@ TEST(RouteLimits, RefuseOtherWorldsWhereLinesAreFarApart) {
     const RouteTracker tracker(route);
     for (std::uint64_t other = 0; other < 30; ++other) {
       const ToyWorld elsewhere = pillared_room(1000 + other);
-      ++asked;
+      ++tested;
       foreign +=
           tracker.search(elsewhere.line({0.05 * static_cast<double>(other), 0.1, 0.3})) ? 1 : 0;
     }
   }
-  std::printf("%d of %d foreign lines found\n", foreign, asked);
-  EXPECT_LE(foreign, asked / 50);
+  std::printf("%d of %d foreign lines found\n", foreign, tested);
+  EXPECT_LE(foreign, tested / 50);
 }
 
 // At the ends of a short, straight route few lines of sight cross it. The robot is then found where
