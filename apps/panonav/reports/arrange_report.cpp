@@ -40,17 +40,17 @@ Springs choose_springs(const Lattice& lattice) {
   return shown;
 }
 
-/// Moves, rotates and scales each group to the final positions of its views. Views of groups that
+/// Moves, rotates and scales each part to the final positions of its views. Views of parts that
 /// are too small for this get nullopt.
 std::vector<std::optional<Point2>> align_to_end(const std::vector<Pose2>& poses,
                                                 const std::vector<std::size_t>& components,
                                                 const std::vector<std::optional<Point2>>& end) {
-  std::map<std::size_t, std::vector<std::size_t>> groups;
+  std::map<std::size_t, std::vector<std::size_t>> parts;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (end[i]) groups[components[i]].push_back(i);
+    if (end[i]) parts[components[i]].push_back(i);
   }
   std::vector<std::optional<Point2>> places(poses.size());
-  for (const auto& [unused, views] : groups) {
+  for (const auto& [unused, views] : parts) {
     std::vector<Point2> from;
     std::vector<Point2> to;
     for (const std::size_t view : views) {
@@ -93,7 +93,7 @@ viewer::MapAnimation LatticeSteps::make_animation(const Lattice& lattice,
   const std::string of_all = " of " + std::to_string(count_);
   const auto add = [&](const std::string& title, const std::vector<std::optional<Point2>>& places,
                        const std::vector<std::size_t>& components) {
-    // Finds the largest group of the drawn views.
+    // Finds the largest part of the drawn views.
     std::map<std::size_t, std::size_t> sizes;
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (places[i]) ++sizes[components[i]];
@@ -140,7 +140,7 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
   const auto& components = lattice.components;
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(components.front().views) + " of " + std::to_string(lattice.nodes.size()),
-       "views in the largest connected group"}};
+       "views in the largest part"}};
   const auto comparison = compare_with_ground_truth(lattice, memory);
   if (comparison) {
     figures.emplace_back(format_fixed(comparison->truth_from_map.rms_m, 2) + " m",
@@ -157,8 +157,8 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
   page.add_figures(figures);
   page.begin_section("Step by step");
   page.add_text(
-      "Views that certainly belong together form groups. Two groups are joined if several pairs of "
-      "views agree on the relative position of the groups. Each group is drawn at its final "
+      "Views that certainly belong together form parts. Two parts are joined if several pairs of "
+      "views agree on the relative position of the parts. Each part is drawn at its final "
       "position, with its shape at that step.");
   page.add_plots(
       {{steps.make_animation(lattice, memory),
@@ -173,15 +173,15 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
       plots.push_back({std::move(plot), ""});
     page.add_plots(plots);
   }
-  page.begin_section("Groups");
+  page.begin_section("Parts");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min<std::size_t>(20, components.size()); ++i) {
     rows.push_back({std::to_string(i + 1), std::to_string(components[i].views),
-                    components[i].handedness_known ? "yes" : "no: the group may be mirrored"});
+                    components[i].handedness_known ? "yes" : "no: the part may be mirrored"});
   }
-  page.add_table({"group", "views", "left and right known"}, rows);
+  page.add_table({"part", "views", "left and right known"}, rows);
   if (rows.size() < components.size()) {
-    page.add_text("The largest 20 of " + std::to_string(components.size()) + " groups.");
+    page.add_text("The largest 20 of " + std::to_string(components.size()) + " parts.");
   }
   page.write(folder, "index.html", "panonav arrange");
 }
