@@ -32,29 +32,52 @@ std::vector<Pose2> straight_poses(std::size_t nodes) {
 TEST(PathVariance, HeadingErrorsMoveTheEndByTheirDistance) {
   const auto edges = straight_steps(4);
   const std::vector<double> weights(edges.size(), 1.0);
-  const auto variances = compute_path_variances(edges, weights, straight_poses(4), 3, 4.0);
-  EXPECT_EQ(variances[3].position_m2, 0.0);
+  const auto poses = straight_poses(4);
+  PathVariances variances(edges, weights, poses, 3, 4.0);
+  EXPECT_EQ(variances.in_frame_of(3).position_m2, 0.0);
   const double turn2 = turn_deviation_rad * turn_deviation_rad;
   // Errors of the turns at nodes 1 and 2, seen from node 0, move node 3 by 2 m and 1 m times them.
   const double expected = 3.0 * step_deviation_m * step_deviation_m + (9.0 + 4.0 + 1.0) * turn2;
-  EXPECT_NEAR(variances[0].position_m2, 4.0 * expected, 1e-12);
-  EXPECT_NEAR(variances[0].heading_rad2, 4.0 * 3.0 * turn2, 1e-12);
+  EXPECT_NEAR(variances.in_frame_of(0).position_m2, 4.0 * expected, 1e-12);
+  EXPECT_NEAR(variances.in_frame_of(0).heading_rad2, 4.0 * 3.0 * turn2, 1e-12);
 }
 
 TEST(PathVariance, AClosureShortensThePathAndAnIslandHasNone) {
   auto edges = straight_steps(30);
   std::vector<double> weights(edges.size(), 1.0);
   const auto poses = straight_poses(31);
-  const auto open = compute_path_variances(edges, weights, poses, 29, 1.0);
+  PathVariances open(edges, weights, poses, 29, 1.0);
+  const double open_m2 = open.in_frame_of(0).position_m2;
+  const double near_m2 = open.in_frame_of(28).position_m2;
   edges.push_back({0, 28, {28.0, 0.0, 0.0}, 0.05, 0.001, true});
   weights.push_back(1.0);
-  const auto closed = compute_path_variances(edges, weights, poses, 29, 1.0);
-  EXPECT_LT(closed[0].position_m2, 0.1 * open[0].position_m2);
-  EXPECT_EQ(closed[28].position_m2, open[28].position_m2);
-  EXPECT_TRUE(std::isinf(closed[30].position_m2));
+  PathVariances closed(edges, weights, poses, 29, 1.0);
+  EXPECT_LT(closed.in_frame_of(0).position_m2, 0.1 * open_m2);
+  EXPECT_EQ(closed.in_frame_of(28).position_m2, near_m2);
+  EXPECT_TRUE(std::isinf(closed.in_frame_of(30).position_m2));
   weights.back() = 0.0;  // one that the map refutes does not count
-  EXPECT_EQ(compute_path_variances(edges, weights, poses, 29, 1.0)[0].position_m2,
-            open[0].position_m2);
+  EXPECT_EQ(PathVariances(edges, weights, poses, 29, 1.0).in_frame_of(0).position_m2, open_m2);
+}
+
+TEST(PathVariance, TheOrderOfQuestionsDoesNotMatter) {
+  Random random(3);
+  auto edges = straight_steps(200);
+  auto poses = straight_poses(200);
+  for (std::size_t i = 0; i + 40 < 200; i += 7) {
+    edges.push_back({i, i + 40, {40.0, 0.0, 0.0}, random.uniform(0.01, 0.5), 0.01, true});
+  }
+  const std::vector<double> weights(edges.size(), 0.5);
+  PathVariances near_first(edges, weights, poses, 199, 1.0);
+  std::vector<PathVariance> found;
+  for (std::size_t i = 200; i-- > 0;) found.push_back(near_first.in_frame_of(i));
+  PathVariances far_first(edges, weights, poses, 199, 1.0);
+  for (std::size_t i = 0; i < 200; ++i) {
+    const PathVariance variance = far_first.in_frame_of(i);
+    EXPECT_EQ(variance.position_m2, found[199 - i].position_m2) << i;
+    EXPECT_EQ(variance.heading_rad2, found[199 - i].heading_rad2) << i;
+    EXPECT_EQ(PathVariances(edges, weights, poses, 199, 1.0).in_frame_of(i).position_m2,
+              variance.position_m2);
+  }
 }
 
 /// Steps whose errors have `factor` times the variances that they state, with 40 exact closures, of

@@ -218,13 +218,12 @@ class TopologicalMapper::Implementation {
 
   void close_loops(TopologicalMapper::Update& update) {
     const double scale_m = this->scale_m();
-    std::vector<PathVariance> variances;
+    std::optional<PathVariances> variances;
     const auto is_possible = [&](const LoopClosure& closure) {
       if (nodes_[closure.earlier].component != nodes_[closure.later].component) return true;
-      if (variances.empty()) {
-        variances = compute_path_variances(edges_, weights_, poses_, size() - 1, step_factor());
-      }
-      return agrees_with_path(make_closure_edge(closure, scale_m), variances[closure.earlier]);
+      if (!variances) variances.emplace(edges_, weights_, poses_, size() - 1, step_factor());
+      return agrees_with_path(make_closure_edge(closure, scale_m),
+                              variances->in_frame_of(closure.earlier));
     };
     update.closures = finder_.find(nodes_, poses_, *odometry_.last(), scale_m, is_possible);
     for (const LoopClosure& closure : update.closures) {

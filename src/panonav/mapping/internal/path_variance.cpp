@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <queue>
-#include <utility>
+#include <numeric>
 
 #include "panonav/geometry/angles.hpp"
 
@@ -14,17 +12,6 @@ namespace {
 
 double squared(double value) {
   return value * value;
-}
-
-/// The edges of each node, as numbers.
-std::vector<std::vector<std::size_t>> list_edges_of_nodes(std::span<const PoseEdge> edges,
-                                                          std::size_t nodes) {
-  std::vector<std::vector<std::size_t>> of_nodes(nodes);
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    of_nodes[edges[i].a].push_back(i);
-    of_nodes[edges[i].b].push_back(i);
-  }
-  return of_nodes;
 }
 
 /// The steps by which each node was reached; none for the first of a component.
@@ -112,34 +99,55 @@ std::optional<double> learn_step_factor(std::span<const PoseEdge> edges, std::si
   return std::sqrt(low * high);
 }
 
-std::vector<PathVariance> compute_path_variances(std::span<const PoseEdge> edges,
-                                                 std::span<const double> weights,
-                                                 std::span<const Pose2> poses, std::size_t node,
-                                                 double step_factor) {
-  const auto edges_of = list_edges_of_nodes(edges, poses.size());
-  std::vector<PathVariance> variances(poses.size());
-  using Reached = std::pair<double, std::size_t>;  // variance of the position, node
-  std::priority_queue<Reached, std::vector<Reached>, std::greater<>> next;
-  variances[node] = {0.0, 0.0};
-  next.emplace(0.0, node);
-  while (!next.empty()) {
-    const auto [reached_m2, here] = next.top();
-    next.pop();
-    if (reached_m2 > variances[here].position_m2) continue;
-    for (const std::size_t i : edges_of[here]) {
-      const PoseEdge& edge = edges[i];
-      const double factor = edge.doubtful ? 1.0 / std::max(weights[i], 1e-6) : step_factor;
-      const std::size_t there = edge.a == here ? edge.b : edge.a;
-      const double heading_rad2 = factor * squared(edge.heading_deviation_rad);
-      const double arm_m = distance(poses[there].position(), poses[node].position());
-      const double position_m2 =
-          reached_m2 + factor * squared(edge.position_deviation_m) + heading_rad2 * squared(arm_m);
-      if (position_m2 >= variances[there].position_m2) continue;
-      variances[there] = {position_m2, variances[here].heading_rad2 + heading_rad2};
-      next.emplace(position_m2, there);
-    }
+PathVariances::PathVariances(std::span<const PoseEdge> edges, std::span<const double> weights,
+                             std::span<const Pose2> poses, std::size_t node, double step_factor)
+    : edges_(edges),
+      weights_(weights),
+      poses_(poses),
+      node_(node),
+      step_factor_(step_factor),
+      edges_of_nodes_(2 * edges.size()),
+      first_edge_(poses.size() + 1),
+      variances_(poses.size()) {
+  for (const PoseEdge& edge : edges) {
+    ++first_edge_[edge.a];
+    ++first_edge_[edge.b];
   }
-  return variances;
+  // Ends of the parts of nodes, which become their begins as the parts are filled from behind.
+  std::partial_sum(first_edge_.begin(), first_edge_.end(), first_edge_.begin());
+  for (std::size_t i = edges.size(); i-- > 0;) {
+    edges_of_nodes_[--first_edge_[edges[i].b]] = i;
+    edges_of_nodes_[--first_edge_[edges[i].a]] = i;
+  }
+  variances_[node] = {0.0, 0.0};
+  next_.emplace(0.0, node);
+}
+
+PathVariance PathVariances::in_frame_of(std::size_t other) {
+  // What lies nearer than all nodes that wait does not change any more.
+  while (!next_.empty() && next_.top().first < variances_[other].position_m2) {
+    const auto [reached_m2, here] = next_.top();
+    next_.pop();
+    if (reached_m2 == variances_[here].position_m2) reach_neighbours(here);
+  }
+  return variances_[other];
+}
+
+void PathVariances::reach_neighbours(std::size_t here) {
+  for (std::size_t at = first_edge_[here]; at < first_edge_[here + 1]; ++at) {
+    const std::size_t i = edges_of_nodes_[at];
+    const PoseEdge& edge = edges_[i];
+    const double factor = edge.doubtful ? 1.0 / std::max(weights_[i], 1e-6) : step_factor_;
+    const std::size_t there = edge.a == here ? edge.b : edge.a;
+    const double heading_rad2 = factor * squared(edge.heading_deviation_rad);
+    const double arm_m = distance(poses_[there].position(), poses_[node_].position());
+    const double position_m2 = variances_[here].position_m2 +
+                               factor * squared(edge.position_deviation_m) +
+                               heading_rad2 * squared(arm_m);
+    if (position_m2 >= variances_[there].position_m2) continue;
+    variances_[there] = {position_m2, variances_[here].heading_rad2 + heading_rad2};
+    next_.emplace(position_m2, there);
+  }
 }
 
 }  // namespace panonav
