@@ -124,7 +124,7 @@ PathVariances::PathVariances(std::span<const PoseEdge> edges, std::span<const do
 }
 
 PathVariance PathVariances::in_frame_of(std::size_t other) {
-  // What lies nearer than all nodes that wait does not change any more.
+  // Nodes nearer than all that wait have their final variance.
   while (!next_.empty() && next_.top().first < variances_[other].position_m2) {
     const auto [reached_m2, here] = next_.top();
     next_.pop();
