@@ -339,5 +339,28 @@ TEST_F(CameraVerbs, UnwrapRefusesBadInput) {
   EXPECT_FALSE(fs::exists(panorama)) << "half an image";
 }
 
+TEST_F(CameraVerbs, MemoriseSaysWhereColumnsRunOtherwiseThanStated) {
+  const std::string run = out_ / "run";
+  run_well({"simulate", "office", run, "--path", "walk", "--poses", "60", "--spacing-m", "0.2",
+            "--heading", "path", "--kind", "panorama", "--rows", "20", "--columns", "128"});
+  const auto right = answer_of({"memorise", out_ / "right.panonav", run, "--json"});
+  EXPECT_TRUE(right["orientation_fault"].is_null()) << right;
+  EXPECT_FALSE(contains(run_panonav({"memorise", out_ / "again.panonav", run}).out, "orientation"));
+
+  write_file(fs::path(run) / "dataset.toml",
+             std::string_view("[images]\nkind = \"panorama\"\ncolumns = \"counter-clockwise\"\n"
+                              "forward_column = 0.25\nelevation_deg = [-30, 40]\n"
+                              "[poses]\nfile = \"poses.csv\"\n"));
+  const auto wrong = answer_of({"memorise", out_ / "wrong.panonav", run, "--json"});
+  const json& fault = wrong["orientation_fault"];
+  ASSERT_TRUE(fault.is_object());
+  EXPECT_EQ(fault["columns_run_opposite"], true);
+  EXPECT_GT(fault["opposite_turns"], 10);
+  EXPECT_NEAR(fault["forward_turn_deg"].get<double>(), 90.0, 10.0);
+  const auto said = run_panonav({"memorise", out_ / "wrong2.panonav", run}).out;
+  EXPECT_TRUE(contains(said, "The columns of the images do not run counter-clockwise")) << said;
+  EXPECT_TRUE(contains(said, "columns = \"clockwise\"")) << said;
+}
+
 }  // namespace
 }  // namespace panonav::testing

@@ -14,6 +14,7 @@
 #include "panonav/storage/memory_address.hpp"
 #include "runs/live_run.hpp"
 #include "runs/memorising.hpp"
+#include "runs/orientation_note.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {
@@ -177,9 +178,13 @@ void print_map(const MemoriseArguments& arguments, const MemoryMap& map, bool is
   }
 }
 
+/// `recording`: its poses show the orientation of the images; null for a live source.
 void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
                   const Memoriser::Counts& counts, std::size_t known_before,
-                  const std::vector<Skipped>& skipped, Session& session) {
+                  const std::vector<Skipped>& skipped, const Dataset* recording, Session& session) {
+  const OrientationEvidence orientation =
+      recording ? collect_orientation_evidence(*recording, memory) : OrientationEvidence{};
+  const std::optional<OrientationFault> fault = orientation.find_fault();
   const std::size_t appended = counts.appended;
   const auto info = memory.info();
   if (session.json()) {
@@ -187,14 +192,16 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
     for (const Skipped& one : skipped) {
       skipped_json.push_back({{"file", one.file}, {"why", one.why}});
     }
-    session.print(json_line(ordered_json{{"memory", arguments.memory},
-                                         {"appended", appended},
-                                         {"known_before", known_before},
-                                         {"skipped", std::move(skipped_json)},
-                                         {"views", info.views},
-                                         {"views_with_position", info.views_with_position},
-                                         {"map", to_json(counts.map)},
-                                         {"file_bytes", info.file_bytes}}));
+    session.print(
+        json_line(ordered_json{{"memory", arguments.memory},
+                               {"appended", appended},
+                               {"known_before", known_before},
+                               {"skipped", std::move(skipped_json)},
+                               {"views", info.views},
+                               {"views_with_position", info.views_with_position},
+                               {"map", to_json(counts.map)},
+                               {"orientation_fault", orientation_json(fault, orientation)},
+                               {"file_bytes", info.file_bytes}}));
     return;
   }
   session.print(
@@ -202,6 +209,11 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
       (known_before > 0 ? ", " + std::to_string(known_before) + " already in the memory" : "") +
       (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " skipped") + "; " +
       arguments.memory + " holds " + std::to_string(info.views));
+  if (fault) {
+    session.print(
+        session.red("The stated orientation of the images is wrong") + ". " +
+        describe_orientation(*fault, orientation, recording->source, arguments.inputs.front()));
+  }
   if (!memory.header().elevations) {
     session.print(
         "The elevations of the images are not known; every row is treated as a row at the "
@@ -231,7 +243,8 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
   const LiveCounts& counts = loop.finish();
   if (counts.pictures == 0) throw FileError(arguments.inputs.front(), "provided no image");
   const auto stored = memoriser.finish(session.executor());
-  print_result(arguments, *memoriser.file(), stored, stored.known_before, skipped, session);
+  print_result(arguments, *memoriser.file(), stored, stored.known_before, skipped, nullptr,
+               session);
   if (const std::string events = describe_events(counts, 0); !events.empty()) {
     session.note(format_count(counts.pictures, "image") + events);
   }
@@ -292,7 +305,7 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
   Progress mapping(session, "mapping", known_before + missing.entries.size());
   const auto counts = memoriser.finish(session.executor(), [&] { mapping.advance(); });
   mapping.clear();
-  print_result(arguments, *memoriser.file(), counts, known_before, skipped, session);
+  print_result(arguments, *memoriser.file(), counts, known_before, skipped, &recording, session);
   return ExitCode::done;
 }
 
