@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -41,12 +42,55 @@ TEST(MatchColumns, AgreesWithItsDefinitionOnEveryInstructionSet) {
     }
     for (const Instructions set : available_instructions()) {
       std::vector<std::uint16_t> costs(128);
-      match_columns(query, reference, costs, set);
+      EXPECT_EQ(match_columns(query, reference, costs, set),
+                std::ranges::min_element(expected) - expected.begin())
+          << name(set);
       EXPECT_EQ(costs, expected) << name(set);
       ++checked;
     }
   }
   EXPECT_GE(checked, 20);
+}
+
+TEST(ColumnSumsNearTurn, AgreeWithTheirDefinitionOnEveryInstructionSet) {
+  Random random(2);
+  int checked = 0;
+  for (const int turn : {0, 1, 2, 63, 126, 127}) {
+    auto query = random_bytes(2048, random);
+    auto reference = random_bytes(2048, random);
+    if (turn == 0) {  // the largest numbers there are
+      query.assign(2048, 0);
+      reference.assign(2048, 255);
+    }
+    std::vector<std::uint16_t> expected(32, 65535);
+    for (std::size_t c = 0; c < 32; ++c) {
+      for (int s = turn + 127; s <= turn + 129; ++s) {
+        int l1 = 0;
+        for (std::size_t b = 0; b < 16; ++b) {
+          const std::size_t at = (4 * c + static_cast<std::size_t>(s)) % 128;
+          l1 += std::abs(query[b * 128 + 4 * c] - reference[b * 128 + at]);
+        }
+        expected[c] = std::min(expected[c], static_cast<std::uint16_t>(l1));
+      }
+    }
+    for (const Instructions set : available_instructions()) {
+      std::vector<std::uint16_t> sums(32);
+      column_sums_near_turn(query, reference, turn, sums, set);
+      EXPECT_EQ(sums, expected) << name(set) << ", turn " << turn;
+      ++checked;
+    }
+  }
+  EXPECT_GE(checked, 6);
+}
+
+TEST(ColumnSumsNearTurn, RefusesOtherSizesAndTurns) {
+  const std::vector<std::uint8_t> bytes(2048), fewer(2047);
+  std::vector<std::uint16_t> sums(32), fewer_sums(31);
+  const Instructions set = Instructions::scalar;
+  EXPECT_THROW(column_sums_near_turn(fewer, bytes, 0, sums, set), ContractError);
+  EXPECT_THROW(column_sums_near_turn(bytes, fewer, 0, sums, set), ContractError);
+  EXPECT_THROW(column_sums_near_turn(bytes, bytes, 0, fewer_sums, set), ContractError);
+  EXPECT_THROW(column_sums_near_turn(bytes, bytes, 128, sums, set), ContractError);
 }
 
 TEST(MatchColumns, RefusesOtherSizes) {

@@ -88,6 +88,31 @@ inline constexpr int matched_query_columns = 32;
 inline constexpr int matched_reference_columns = 128;
 inline constexpr int matched_bands = 16;  ///< Bytes of a column: bands of elevation.
 
+/// Floats from one component of `BandWaves` to the next: azimuths of a quarter turn, both ends
+/// included, padded to whole vectors.
+inline constexpr int profile_wave_stride = 48;
+/// Floats from one row of a reconstructed view to the next: 128 columns, and one that repeats the
+/// first, padded to whole vectors.
+inline constexpr int profile_view_stride = 144;
+
+/// Fourier components of the bands of a view, and the waves that they are the amplitudes of.
+struct BandWaves {
+  const float *real,     ///< of each component 16 values, one for each band
+      *imaginary;        ///< the same
+  const float *cosines,  ///< of each component `profile_wave_stride` values; first 33 used
+      *sines;            ///< the same
+  int components,        ///< number of them
+      bands;             ///< at most 16
+};
+
+/// Contrast by which `quantise_columns` divides: the root mean square of a column's values plus
+/// `mean_share` times that of all columns, or the latter alone.
+struct ColumnContrast {
+  bool is_of_each_column;  ///< false: all columns are divided by the contrast of all
+  float mean_share,        ///< >= 0; keeps the noise of columns without contrast from growing
+      steps;               ///< bytes for a deviation of one contrast
+};
+
 /// Largest number of descriptors (of 256 bits) per view in `nearest_descriptors`.
 inline constexpr int max_descriptors = 256;
 

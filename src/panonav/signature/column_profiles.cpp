@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
+#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/kernels/column_match.hpp"
+#include "panonav/kernels/column_profiles.hpp"
 
 namespace panonav {
 
@@ -27,31 +28,34 @@ constexpr float mean_contrast_share = 0.2F;
 // Smallest number of bands for which columns are compared by shape, without their means.
 constexpr int min_bands_for_shape = 4;
 
-// The reconstructed view, band by band; loops are vectorised over the columns of a band.
-using BandView = std::array<std::array<float, columns>, bands>;
-
 // Finer components than this would need more columns.
 constexpr int max_components = columns / 2;
 
-// Number of columns of a quarter turn, both ends included; the others follow by symmetry. The
-// padded number is a multiple of 4, for whole vectors.
+// Number of columns of a quarter turn, both ends included; the others follow by symmetry.
 constexpr std::size_t quarter_columns = columns / 4 + 1;
-constexpr std::size_t padded_quarter_columns = (quarter_columns + 3) / 4 * 4;
-using QuarterTurn = std::array<float, padded_quarter_columns>;
+static_assert(quarter_columns <= kernels::profile_wave_stride);
+
+/// One value for each component and each azimuth of a quarter turn.
+using QuarterTurns = std::array<float, std::size_t{max_components} * kernels::profile_wave_stride>;
+/// One value for each component and band.
+using BandComponents = std::array<float, std::size_t{max_components} * bands>;
+/// The reconstructed view, band by band.
+using BandView = std::array<float, std::size_t{bands} * kernels::profile_view_stride>;
 
 struct Waves {
-  std::array<QuarterTurn, max_components> cosines, sines;
+  QuarterTurns cosines{}, sines{};
 };
 
 const Waves& cosine_and_sine_table() {
   static const Waves made = [] {
-    Waves waves{};
+    Waves waves;
     for (std::size_t k = 0; k < max_components; ++k) {
       for (std::size_t c = 0; c < quarter_columns; ++c) {
         const double angle =
             2.0 * std::numbers::pi * static_cast<double>(k * c % columns) / columns;
-        waves.cosines[k][c] = static_cast<float>(std::cos(angle));
-        waves.sines[k][c] = static_cast<float>(std::sin(angle));
+        const std::size_t at = k * kernels::profile_wave_stride + c;
+        waves.cosines[at] = static_cast<float>(std::cos(angle));
+        waves.sines[at] = static_cast<float>(std::sin(angle));
       }
     }
     return waves;
@@ -59,87 +63,94 @@ const Waves& cosine_and_sine_table() {
   return made;
 }
 
-// Reconstructs the view from the allowed rows, averaged in bands of nearly equal numbers of rows.
-// Returns the number of bands.
-int reconstruct_bands(const PackedSignature& signature, int components,
-                      std::span<const std::uint8_t> allowed_rows, BandView& view) {
-  const auto rows = static_cast<std::size_t>(signature.shape.rows);
-  std::vector<std::size_t> used_rows;
-  for (std::size_t y = 0; y < rows; ++y) {
-    if (allowed_rows.empty() || allowed_rows[y] != 0) used_rows.push_back(y);
-  }
-  const std::size_t used = std::min<std::size_t>(bands, used_rows.size());
-  static const std::array<float, 256> cosines = [] {
-    std::array<float, 256> table{};
-    for (std::size_t i = 0; i < table.size(); ++i) {
-      table[i] = static_cast<float>(std::cos(std::numbers::pi * static_cast<double>(i) / 128.0));
-    }
+/// The cosine and the sine of a phase.
+struct Direction {
+  float cosine, sine;
+};
+
+/// Directions of the 256 packed phases.
+const std::array<Direction, 256>& phase_table() {
+  static const std::array<Direction, 256> made = [] {
+    const auto cosine = [](std::size_t phase) {
+      return static_cast<float>(std::cos(std::numbers::pi * static_cast<double>(phase) / 128.0));
+    };
+    std::array<Direction, 256> table{};
+    for (std::size_t i = 0; i < table.size(); ++i) table[i] = {cosine(i), cosine((i + 192) % 256)};
     return table;
   }();
-  for (std::size_t band = 0; band < used; ++band) {
-    // Sums over even and over odd components.
-    std::array<QuarterTurn, 2> cosine_sums{};
-    std::array<QuarterTurn, 2> sine_sums{};
-    const std::size_t first = band * used_rows.size() / used;
-    const std::size_t end = (band + 1) * used_rows.size() / used;
-    for (int k = 0; k < components; ++k) {
-      float real = 0.0F;
-      float imaginary = 0.0F;
-      for (std::size_t i = first; i < end; ++i) {
-        const std::size_t at = static_cast<std::size_t>(k) * rows + used_rows[i];
-        const auto magnitude = static_cast<float>(signature.magnitudes[at]);
-        real += magnitude * cosines[signature.phases[at]];
-        imaginary += magnitude * cosines[static_cast<std::uint8_t>(signature.phases[at] - 64)];
-      }
-      // I(phi) = a_0 / 2 + sum_k a_k cos(k phi) + b_k sin(k phi) [S06 eq. 10].
-      const float scale = (k == 0 ? 0.5F : 1.0F) / static_cast<float>(end - first);
-      real *= scale;
-      imaginary *= scale;
-      const auto& cosine = cosine_and_sine_table().cosines[k];
-      const auto& sine = cosine_and_sine_table().sines[k];
-      auto& cosine_sum = cosine_sums[k % 2];
-      auto& sine_sum = sine_sums[k % 2];
-      for (std::size_t c = 0; c < padded_quarter_columns; ++c) {
-        cosine_sum[c] += real * cosine[c];
-        sine_sum[c] += imaginary * sine[c];
-      }
-    }
-    // cos k(pi +- x) = +-cos kx and sin k(pi +- x) = +-sin kx, the sign also being that of (-1)^k.
-    auto& values = view[band];
-    for (std::size_t c = 0; c < quarter_columns; ++c) {
-      const float cosines_ahead = cosine_sums[0][c] + cosine_sums[1][c];
-      const float cosines_behind = cosine_sums[0][c] - cosine_sums[1][c];
-      const float sines_ahead = sine_sums[0][c] + sine_sums[1][c];
-      const float sines_behind = sine_sums[0][c] - sine_sums[1][c];
-      values[c] = cosines_ahead - sines_ahead;
-      values[(columns - c) % columns] = cosines_ahead + sines_ahead;
-      values[columns / 2 - c] = cosines_behind + sines_behind;
-      values[columns / 2 + c] = cosines_behind - sines_behind;
-    }
-  }
-  return static_cast<int>(used);
+  return made;
 }
 
-void subtract_column_means(BandView& view, std::size_t used) {
-  std::array<float, columns> means{};
-  for (std::size_t b = 0; b < used; ++b) {
-    for (std::size_t c = 0; c < columns; ++c) means[c] += view[b][c];
+/// Components of the bands of a signature: means over bands of nearly equal numbers of rows.
+class Bands {
+ public:
+  Bands(const PackedSignature& signature, int components,
+        std::span<const std::uint8_t> allowed_rows)
+      : components_(components) {
+    const auto rows = static_cast<std::size_t>(signature.shape.rows);
+    std::vector<std::size_t> used_rows;
+    if (!allowed_rows.empty()) {
+      for (std::size_t y = 0; y < rows; ++y) {
+        if (allowed_rows[y] != 0) used_rows.push_back(y);
+      }
+    }
+    const std::size_t count = allowed_rows.empty() ? rows : used_rows.size();
+    const auto row = [&](std::size_t i) { return allowed_rows.empty() ? i : used_rows[i]; };
+    const auto& directions = phase_table();
+    const std::size_t used = std::min<std::size_t>(bands, count);
+    used_ = static_cast<int>(used);
+    if (used < bands) {
+      real_.fill(0.0F);
+      imaginary_.fill(0.0F);
+    }
+    for (std::size_t band = 0; band < used; ++band) {
+      const std::size_t first = band * count / used;
+      const std::size_t end = (band + 1) * count / used;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(components); ++k) {
+        float real = 0.0F;
+        float imaginary = 0.0F;
+        for (std::size_t i = first; i < end; ++i) {
+          const std::size_t at = k * rows + row(i);
+          const auto magnitude = static_cast<float>(signature.magnitudes[at]);
+          const Direction direction = directions[signature.phases[at]];
+          real += magnitude * direction.cosine;
+          imaginary += magnitude * direction.sine;
+        }
+        // I(phi) = a_0 / 2 + sum_k a_k cos(k phi) + b_k sin(k phi) [S06 eq. 10].
+        const float scale = (k == 0 ? 0.5F : 1.0F) / static_cast<float>(end - first);
+        real_[k * bands + band] = real * scale;
+        imaginary_[k * bands + band] = imaginary * scale;
+      }
+    }
   }
-  for (float& mean : means) mean /= static_cast<float>(used);
-  for (std::size_t b = 0; b < used; ++b) {
-    for (std::size_t c = 0; c < columns; ++c) view[b][c] -= means[c];
+
+  /// Number of bands.
+  [[nodiscard]] int used() const noexcept { return used_; }
+  [[nodiscard]] kernels::BandWaves waves() const noexcept {
+    const Waves& table = cosine_and_sine_table();
+    return {real_.data(),       imaginary_.data(), table.cosines.data(),
+            table.sines.data(), components_,       used_};
   }
-}
+
+ private:
+  int components_;
+  int used_ = 0;
+  BandComponents real_, imaginary_;  // 0 of bands that are not used
+};
 
 // Subtracts the mean of the whole view: views with fewer than `min_bands_for_shape` bands are
 // compared by brightness.
-void subtract_view_mean(BandView& view, std::size_t used) {
+void subtract_view_mean(BandView& view, int used) {
+  const auto row = [&](int band) {
+    return std::span(view).subspan(static_cast<std::size_t>(band) * kernels::profile_view_stride,
+                                   columns);
+  };
   float mean = 0.0F;
-  for (std::size_t b = 0; b < used; ++b) {
-    for (const float value : view[b]) mean += value / static_cast<float>(used * columns);
+  for (int b = 0; b < used; ++b) {
+    for (const float value : row(b)) mean += value / static_cast<float>(used * columns);
   }
-  for (std::size_t b = 0; b < used; ++b) {
-    for (float& value : view[b]) value -= mean;
+  for (int b = 0; b < used; ++b) {
+    for (float& value : row(b)) value -= mean;
   }
 }
 
@@ -154,12 +165,12 @@ void require_same_bands(const ColumnProfiles& query, const ColumnProfiles& refer
 
 using Costs = std::array<std::uint16_t, columns>;
 
-Costs compute_rotation_costs(const ColumnProfiles& query, const ColumnProfiles& reference) {
+/// Returns the rotation of the smallest cost.
+int compute_rotation_costs(const ColumnProfiles& query, const ColumnProfiles& reference,
+                           Costs& costs) {
   require_same_bands(query, reference);
-  Costs costs{};
-  kernels::match_columns(query.compared_values(), reference.values(), costs,
-                         kernels::chosen_instructions());
-  return costs;
+  return kernels::match_columns(query.compared_values(), reference.values(), costs,
+                                kernels::chosen_instructions());
 }
 
 ColumnMatch make_column_match(const ColumnProfiles& query, const Costs& costs, std::size_t turn) {
@@ -174,9 +185,7 @@ ColumnMatch make_column_match(const ColumnProfiles& query, const Costs& costs, s
 }  // namespace
 
 ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
-                               std::span<const std::uint8_t> allowed_rows)
-    : values_(static_cast<std::size_t>(columns * bands), mean_byte),
-      compared_values_(static_cast<std::size_t>(query_columns * bands), mean_byte) {
+                               std::span<const std::uint8_t> allowed_rows) {
   require(components >= 0 && components <= signature.shape.components, "components", components,
           "0 (all) or 1 .. " + to_text(signature.shape.components));
   require(
@@ -185,37 +194,22 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
   if (components == 0) components = signature.shape.components;
   components = std::min(components, max_components);
 
+  values_.fill(mean_byte);
+  compared_values_.fill(mean_byte);
+  const kernels::Instructions instructions = kernels::chosen_instructions();
+  const Bands components_of_bands(signature, components, allowed_rows);
+  used_bands_ = components_of_bands.used();
   BandView view;
-  used_bands_ = reconstruct_bands(signature, components, allowed_rows, view);
-  const auto used = static_cast<std::size_t>(used_bands_);
+  kernels::reconstruct_bands(components_of_bands.waves(), view, instructions);
   const bool has_shape = used_bands_ >= min_bands_for_shape;
   if (has_shape) {
-    subtract_column_means(view, used);
+    kernels::subtract_column_means(view, used_bands_, instructions);
   } else {
-    subtract_view_mean(view, used);
+    subtract_view_mean(view, used_bands_);
   }
-  std::array<float, columns> contrasts{};
-  float mean_contrast = 0.0F;
-  for (std::size_t b = 0; b < used; ++b) {
-    for (std::size_t c = 0; c < columns; ++c) contrasts[c] += view[b][c] * view[b][c];
-  }
-  for (float& contrast : contrasts) {
-    contrast /= static_cast<float>(used);
-    mean_contrast += contrast / columns;
-  }
-  mean_contrast = std::sqrt(mean_contrast);
-  if (!(mean_contrast > 0.0F)) return;  // nothing to see
-  for (float& contrast : contrasts) {
-    contrast =
-        has_shape ? std::sqrt(contrast) + mean_contrast_share * mean_contrast : mean_contrast;
-  }
-  for (std::size_t b = 0; b < used; ++b) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      const float value =
-          std::clamp(bytes_per_contrast * view[b][c] / contrasts[c], -127.0F, 127.0F);
-      values_[b * columns + c] =
-          static_cast<std::uint8_t>(static_cast<int>(value + (mean_byte + 0.5F)));
-    }
+  const kernels::ColumnContrast contrast{has_shape, mean_contrast_share, bytes_per_contrast};
+  if (!kernels::quantise_columns(view, used_bands_, contrast, values_, instructions)) return;
+  for (std::size_t b = 0; b < static_cast<std::size_t>(used_bands_); ++b) {
     for (std::size_t c = 0; c < query_columns; ++c) {
       compared_values_[c * bands + b] = values_[b * columns + c * (columns / query_columns)];
     }
@@ -223,24 +217,20 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
 }
 
 ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& reference) {
-  const auto costs = compute_rotation_costs(query, reference);
-  const auto best = std::ranges::min_element(costs) - costs.begin();
+  Costs costs;
+  const int best = compute_rotation_costs(query, reference, costs);
   return make_column_match(query, costs, static_cast<std::size_t>(best));
 }
 
 std::array<ColumnMatch, 2> find_two_best_column_matches(const ColumnProfiles& query,
                                                         const ColumnProfiles& reference) {
   constexpr std::size_t min_separation = (columns + 5) / 6;
-  const auto costs = compute_rotation_costs(query, reference);
-  // Packs each cost with its rotation in the low bits, so that one minimum gives both (and the
-  // smallest rotation of equal costs).
-  std::uint32_t min_cost = ~0U;
-  for (std::uint32_t turn = 0; turn < columns; ++turn) {
-    min_cost = std::min(min_cost, static_cast<std::uint32_t>(costs[turn]) * columns + turn);
-  }
-  const std::size_t best = min_cost % columns;
+  Costs costs;
+  const auto best = static_cast<std::size_t>(compute_rotation_costs(query, reference, costs));
   std::array<std::uint16_t, 2 * columns> twice;
   std::ranges::copy(costs, std::ranges::copy(costs, twice.begin()).out);
+  // Packs each cost with its rotation in the low bits, so that one minimum gives both (and the
+  // smallest rotation of equal costs).
   std::uint32_t min_other_cost = ~0U;
   for (std::uint32_t turn = min_separation; turn <= columns - min_separation; ++turn) {
     min_other_cost =
@@ -255,25 +245,12 @@ std::array<double, ColumnProfiles::compared_columns> column_distances_at_heading
   require_same_bands(query, reference);
   const auto nearest =
       static_cast<int>(std::lround(wrap_angle(heading_rad) * columns / (2.0 * std::numbers::pi)));
-  std::array<int, query_columns> min_sums{};
-  for (int turn = nearest - 1; turn <= nearest + 1; ++turn) {
-    const auto shift = static_cast<std::size_t>((turn + 2 * columns) % columns);
-    std::array<int, query_columns> sums{};
-    for (std::size_t b = 0; b < bands; ++b) {
-      const std::uint8_t* const query_band = query.values().data() + b * columns;
-      const std::uint8_t* const reference_band = reference.values().data() + b * columns;
-      for (std::size_t c = 0; c < query_columns; ++c) {
-        const std::size_t at = c * (columns / query_columns);
-        sums[c] += std::abs(query_band[at] - reference_band[(at + shift) % columns]);
-      }
-    }
-    for (std::size_t c = 0; c < query_columns; ++c) {
-      min_sums[c] = turn == nearest - 1 ? sums[c] : std::min(min_sums[c], sums[c]);
-    }
-  }
+  std::array<std::uint16_t, query_columns> sums;
+  kernels::column_sums_near_turn(query.values(), reference.values(), (nearest + columns) % columns,
+                                 sums, kernels::chosen_instructions());
   std::array<double, query_columns> distances{};
   const double scale = static_cast<double>(bytes_per_contrast) * std::max(1, query.used_bands());
-  for (std::size_t c = 0; c < query_columns; ++c) distances[c] = min_sums[c] / scale;
+  for (std::size_t c = 0; c < query_columns; ++c) distances[c] = sums[c] / scale;
   return distances;
 }
 

@@ -9,7 +9,17 @@ namespace panonav::kernels {
 
 template <Instructions set>
 struct ColumnMatchBody {
-  static void match_columns(const uint8_t* query, const uint8_t* reference, uint16_t* costs);
+  static int match_columns(const uint8_t* query, const uint8_t* reference, uint16_t* costs);
+  static void column_sums_near_turn(const uint8_t* query, const uint8_t* reference, int turn,
+                                    uint16_t* sums);
+};
+
+template <Instructions set>
+struct ColumnProfilesBody {
+  static void reconstruct_bands(const BandWaves& waves, float* view);
+  static void subtract_column_means(float* view, int bands);
+  static bool quantise_columns(const float* view, int bands, const ColumnContrast& contrast,
+                               uint8_t* values);
 };
 
 /// The functions of DistanceKernels.

@@ -89,8 +89,7 @@ void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* cost
     }
   }
 }
-#endif
-
+#else
 // Loops without branches, which the compiler vectorises.
 void match_by_loops(const uint8_t* __restrict query, const uint8_t* __restrict reference,
                     uint16_t* __restrict costs) {
@@ -122,16 +121,67 @@ void match_by_loops(const uint8_t* __restrict query, const uint8_t* __restrict r
     costs[s] = static_cast<uint16_t>(totals[s] + totals[s + columns]);
   }
 }
+#endif
+
+// Packs each cost with its rotation in the low bits, so that one minimum gives both.
+int find_smallest(const uint16_t* costs) {
+  int smallest = INT32_MAX;
+  for (int turn = 0; turn < matched_reference_columns; ++turn) {
+    const int packed = costs[turn] * matched_reference_columns + turn;
+    smallest = packed < smallest ? packed : smallest;
+  }
+  return smallest % matched_reference_columns;
+}
 
 }  // namespace
 
 template <Instructions set>
-void ColumnMatchBody<set>::match_columns(const uint8_t* query, const uint8_t* reference,
-                                         uint16_t* costs) {
+int ColumnMatchBody<set>::match_columns(const uint8_t* query, const uint8_t* reference,
+                                        uint16_t* costs) {
 #ifdef __AVX2__
-  if constexpr (set != Instructions::scalar) return match_by_sad<set>(query, reference, costs);
-#endif
+  match_by_sad<set>(query, reference, costs);
+#else
   match_by_loops(query, reference, costs);
+#endif
+  return find_smallest(costs);
+}
+
+template <Instructions set>
+void ColumnMatchBody<set>::column_sums_near_turn(const uint8_t* __restrict query,
+                                                 const uint8_t* __restrict reference, int turn,
+                                                 uint16_t* __restrict sums) {
+  constexpr int columns = matched_reference_columns;
+  constexpr int step = columns / matched_query_columns;
+  // The bands twice, so that no index has to wrap.
+  uint8_t twice[matched_bands][2 * columns];
+  for (int b = 0; b < matched_bands; ++b) {
+    __builtin_memcpy(twice[b], reference + b * columns, columns);
+    __builtin_memcpy(twice[b] + columns, reference + b * columns, columns);
+  }
+  const int first = (turn + columns - 1) % columns;
+  uint16_t totals[columns] = {};  // of query column c at the rotations first + 0 .. 3: 4 c + 0 .. 3
+  for (int b = 0; b < matched_bands; ++b) {
+    uint32_t repeated[matched_query_columns];  // the value of a query column, for four rotations
+    __builtin_memcpy(repeated, query + b * columns, sizeof repeated);
+    for (uint32_t& four : repeated) {
+      four &= 255U;  // little endian: the first of four columns
+      four |= four << 8U;
+      four |= four << 16U;
+    }
+    uint8_t values[columns];
+    __builtin_memcpy(values, repeated, sizeof values);
+    const uint8_t* const turned = twice[b] + first;
+    for (int d = 0; d < columns; ++d) {
+      const uint8_t larger = turned[d] > values[d] ? turned[d] : values[d];
+      const uint8_t smaller = turned[d] > values[d] ? values[d] : turned[d];
+      totals[d] = static_cast<uint16_t>(totals[d] + static_cast<uint8_t>(larger - smaller));
+    }
+  }
+  for (int c = 0; c < matched_query_columns; ++c) {
+    const uint16_t* const at = totals + step * c;
+    const uint16_t smaller = at[0] < at[1] ? at[0] : at[1];
+    sums[c] = smaller < at[2] ? smaller : at[2];
+  }
 }
 
 template struct ColumnMatchBody<Instructions::PANONAV_TARGET>;

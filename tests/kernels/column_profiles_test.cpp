@@ -1,0 +1,146 @@
+#include "panonav/kernels/column_profiles.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+
+namespace panonav::kernels {
+namespace {
+
+constexpr std::size_t columns = matched_reference_columns;
+constexpr std::size_t view_size = std::size_t{profile_view_stride} * matched_bands;
+
+/// Random components of some bands, and the waves of 64 components.
+struct Components {
+  std::vector<float> real, imaginary, cosines, sines;
+
+  explicit Components(Random& random)
+      : real(64 * matched_bands),
+        imaginary(64 * matched_bands),
+        cosines(64 * profile_wave_stride),
+        sines(64 * profile_wave_stride) {
+    for (auto* part : {&real, &imaginary}) {
+      for (float& value : *part) value = static_cast<float>(random.normal(0.0, 20.0));
+    }
+    for (std::size_t k = 0; k < 64; ++k) {
+      for (std::size_t c = 0; c <= columns / 4; ++c) {
+        const double angle = 2.0 * std::numbers::pi * static_cast<double>(k * c) / columns;
+        cosines[k * profile_wave_stride + c] = static_cast<float>(std::cos(angle));
+        sines[k * profile_wave_stride + c] = static_cast<float>(std::sin(angle));
+      }
+    }
+  }
+  [[nodiscard]] BandWaves waves(int components, int bands) const {
+    return {real.data(), imaginary.data(), cosines.data(), sines.data(), components, bands};
+  }
+};
+
+float value_at(const std::vector<float>& view, std::size_t band, std::size_t column) {
+  return view[band * profile_view_stride + column];
+}
+
+TEST(ColumnProfilesKernel, ReconstructsTheSumOfWavesOnEveryInstructionSet) {
+  Random random(1);
+  const Components given(random);
+  int checked = 0;
+  for (const auto& [components, bands] : {std::pair{15, 16}, {1, 16}, {64, 16}, {8, 5}, {15, 1}}) {
+    std::vector<float> plain(view_size);
+    reconstruct_bands(given.waves(components, bands), plain, Instructions::scalar);
+    for (const Instructions set : available_instructions()) {
+      std::vector<float> view(view_size);
+      reconstruct_bands(given.waves(components, bands), view, set);
+      for (std::size_t b = 0; b < static_cast<std::size_t>(bands); ++b) {
+        for (std::size_t c = 0; c < columns; ++c) {
+          EXPECT_EQ(value_at(view, b, c), value_at(plain, b, c)) << name(set);
+          double expected = 0.0;
+          for (std::size_t k = 0; k < static_cast<std::size_t>(components); ++k) {
+            const double angle = 2.0 * std::numbers::pi * static_cast<double>(k * c) / columns;
+            expected +=
+                static_cast<double>(given.real[k * matched_bands + b]) * std::cos(angle) -
+                static_cast<double>(given.imaginary[k * matched_bands + b]) * std::sin(angle);
+          }
+          ASSERT_NEAR(static_cast<double>(value_at(view, b, c)), expected, 1e-3) << name(set);
+          ++checked;
+        }
+      }
+    }
+  }
+  EXPECT_GE(checked, 1000);
+}
+
+TEST(ColumnProfilesKernel, DividesColumnsByTheirContrastOnEveryInstructionSet) {
+  Random random(2);
+  int checked = 0;
+  for (const bool is_of_each_column : {true, false}) {
+    std::vector<float> view(view_size);
+    for (float& value : view) value = static_cast<float>(random.normal(5.0, 3.0));
+    const int bands = is_of_each_column ? 16 : 2;
+    const ColumnContrast contrast{is_of_each_column, 0.2F, 40.0F};
+    std::vector<std::uint8_t> plain(2048, 7);
+    std::vector<float> without_means = view;
+    subtract_column_means(without_means, bands, Instructions::scalar);
+    ASSERT_TRUE(quantise_columns(without_means, bands, contrast, plain, Instructions::scalar));
+    double square = 0.0;
+    std::vector<double> square_of_column(columns);
+    for (std::size_t c = 0; c < columns; ++c) {
+      double mean = 0.0;
+      for (std::size_t b = 0; b < static_cast<std::size_t>(bands); ++b) {
+        const auto value = static_cast<double>(value_at(without_means, b, c));
+        mean += value;
+        square_of_column[c] += value * value / bands;
+      }
+      EXPECT_NEAR(mean, 0.0, 1e-4);
+      square += square_of_column[c] / columns;
+    }
+    for (const Instructions set : available_instructions()) {
+      std::vector<float> same = view;
+      std::vector<std::uint8_t> values(2048, 7);
+      subtract_column_means(same, bands, set);
+      EXPECT_EQ(same, without_means) << name(set);
+      ASSERT_TRUE(quantise_columns(same, bands, contrast, values, set));
+      EXPECT_EQ(values, plain) << name(set);
+      for (std::size_t b = 0; b < static_cast<std::size_t>(bands); ++b) {
+        for (std::size_t c = 0; c < columns; ++c) {
+          const double divisor = is_of_each_column
+                                     ? std::sqrt(square_of_column[c]) + 0.2 * std::sqrt(square)
+                                     : std::sqrt(square);
+          const double steps = 40.0 * static_cast<double>(value_at(same, b, c)) / divisor;
+          EXPECT_NEAR(values[b * columns + c], 128.0 + std::clamp(steps, -127.0, 127.0), 0.501);
+          ++checked;
+        }
+      }
+    }
+    EXPECT_EQ(plain.back(), is_of_each_column ? plain.back() : 7);  // bands that are not used
+  }
+  EXPECT_GE(checked, 1000);
+}
+
+TEST(ColumnProfilesKernel, ReportsAViewWithoutContrast) {
+  for (const Instructions set : available_instructions()) {
+    const std::vector<float> flat(view_size);
+    std::vector<std::uint8_t> values(2048, 7);
+    EXPECT_FALSE(quantise_columns(flat, 16, {true, 0.2F, 40.0F}, values, set));
+    EXPECT_EQ(values, std::vector<std::uint8_t>(2048, 7));
+  }
+}
+
+TEST(ColumnProfilesKernel, RefusesOtherSizes) {
+  Random random(3);
+  const Components given(random);
+  std::vector<float> view(view_size), shorter(view_size - 1);
+  std::vector<std::uint8_t> values(2048), fewer(2047);
+  const Instructions set = Instructions::scalar;
+  EXPECT_THROW(reconstruct_bands(given.waves(15, 16), shorter, set), ContractError);
+  EXPECT_THROW(reconstruct_bands(given.waves(15, 17), view, set), ContractError);
+  EXPECT_THROW(subtract_column_means(shorter, 16, set), ContractError);
+  EXPECT_THROW((void)quantise_columns(view, 16, {}, fewer, set), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::kernels
