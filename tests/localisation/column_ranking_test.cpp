@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/localisation/internal/profile_cache.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/skips.hpp"
@@ -24,29 +27,104 @@ Panorama with_somebody_in_view(Panorama view, Random& random) {
   return view;
 }
 
-TEST(ColumnRanking, IsInOrderAndTheSameWhetherProfilesAreKept) {
-  const RememberedRoom place(61, {}, 0.4);
-  const ColumnRanking kept(place.memory);
-  const ColumnRanking made_anew(place.memory, 0, 1);
+std::vector<PackedSignature> random_queries(const RememberedRoom& place, int count) {
   Random random(1);
-  for (int i = 0; i < 10; ++i) {
-    const PackedSignature query =
+  std::vector<PackedSignature> queries;
+  for (int i = 0; i < count; ++i) {
+    queries.push_back(
         pack(compute_signature(place.room.see(place.room.between(place.grid, 0.4, random))),
-             place.memory.full_scale());
-    const SearchResult found = place.memory.search(query, {.top = 20});
-    const auto ranked = kept.rank(query, found.matches);
-    const auto again = made_anew.rank(query, found.matches);
-    ASSERT_EQ(ranked.size(), found.matches.size());
-    for (std::size_t k = 0; k < ranked.size(); ++k) {
-      EXPECT_EQ(ranked[k].match, again[k].match);
-      EXPECT_EQ(ranked[k].columns.difference, again[k].columns.difference);
-      EXPECT_TRUE(std::ranges::find(found.matches, ranked[k].match) != found.matches.end());
-      if (k > 0) {
-        EXPECT_GE(ranked[k].score(), ranked[k - 1].score());
+             place.memory.full_scale()));
+  }
+  return queries;
+}
+
+void expect_same(const std::vector<RankedMatch>& a, const std::vector<RankedMatch>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_EQ(a[k].match, b[k].match);
+    EXPECT_EQ(a[k].columns.difference, b[k].columns.difference);
+    EXPECT_EQ(a[k].columns.heading_rad, b[k].columns.heading_rad);
+  }
+}
+
+TEST(ColumnRanking, IsInOrderAndTheSameForEveryNumberOfCachedProfiles) {
+  const RememberedRoom place(61, {}, 0.4);
+  ASSERT_GT(place.memory.size(), 60);
+  const ColumnRanking uncached(place.memory, 0, 0);
+  for (const std::size_t max_cached : {std::size_t{1}, std::size_t{7}, std::size_t{1000}}) {
+    const ColumnRanking ranking(place.memory, 0, max_cached);
+    for (const PackedSignature& query : random_queries(place, 10)) {
+      const SearchResult found = place.memory.search(query, {.top = 20});
+      const auto ranked = ranking.rank(query, found.matches);
+      expect_same(ranked, uncached.rank(query, found.matches));
+      EXPECT_LE(ranking.cached_profiles(), max_cached);
+      EXPECT_GE(ranking.cached_profiles(), std::min<std::size_t>(max_cached, 20));
+      ASSERT_EQ(ranked.size(), found.matches.size());
+      for (std::size_t k = 0; k < ranked.size(); ++k) {
+        EXPECT_TRUE(std::ranges::find(found.matches, ranked[k].match) != found.matches.end());
+        if (k > 0) {
+          EXPECT_GE(ranked[k].score(), ranked[k - 1].score());
+        }
       }
     }
   }
+  EXPECT_EQ(uncached.cached_profiles(), 0);
   EXPECT_THROW((void)ColumnRanking(place.memory, 16), ContractError);
+}
+
+TEST(ColumnRanking, IsTheSameFromSeveralThreads) {
+  const RememberedRoom place(61, {}, 0.4);
+  const auto queries = random_queries(place, 24);
+  const auto rank_all = [&](const ColumnRanking& ranking, int threads) {
+    std::vector<std::vector<RankedMatch>> ranked(queries.size());
+    Executor executor(threads);
+    executor.for_each_chunk(queries.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+      ranked[i] = ranking.rank(queries[i], place.memory.search(queries[i], {.top = 30}).matches);
+    });
+    return ranked;
+  };
+  const ColumnRanking alone(place.memory);
+  const ColumnRanking shared(place.memory, 0, 5);
+  const auto expected = rank_all(alone, 1);
+  const auto found = rank_all(shared, 4);
+  for (std::size_t i = 0; i < queries.size(); ++i) expect_same(found[i], expected[i]);
+  EXPECT_EQ(shared.cached_profiles(), 5);
+}
+
+TEST(ColumnRanking, LocalisesEquallyWithFewCachedProfiles) {
+  const RememberedRoom place(61, {}, 0.4);
+  const Localiser localiser(place.memory);
+  const auto queries = random_queries(place, 10);
+  std::vector<Place> first;
+  for (const PackedSignature& query : queries) first.push_back(localiser.localise(query));
+  for (std::size_t i = 0; i < queries.size(); ++i) {  // with cached profiles
+    const Place again = localiser.localise(queries[i]);
+    EXPECT_EQ(again.known_probability, first[i].known_probability);
+    ASSERT_EQ(again.matches.size(), first[i].matches.size());
+    EXPECT_EQ(again.matches[0].view, first[i].matches[0].view);
+    ASSERT_TRUE(again.position && first[i].position);
+    EXPECT_EQ(again.position->x_m, first[i].position->x_m);
+  }
+}
+
+TEST(ProfileCache, DropsTheProfilesThatWereNotRequestedForTheLongestTime) {
+  const RememberedRoom place(61, {}, 0.4);
+  const auto make = [&](std::size_t i) {
+    return std::make_shared<const ColumnProfiles>(place.memory.packed(place.memory.views()[i]));
+  };
+  ProfileCache cache(3);
+  for (std::uint32_t i = 0; i < 3; ++i) cache.insert({i}, make(i));
+  const auto first = cache.find({0});
+  ASSERT_TRUE(first);
+  cache.insert({3}, make(3));
+  EXPECT_FALSE(cache.find({1})) << "requested before all others";
+  EXPECT_EQ(cache.find({0}), first);
+  ASSERT_TRUE(cache.find({3}));
+  EXPECT_EQ(*cache.find({3}), *make(3));
+  EXPECT_EQ(cache.size(), 3);
+  cache.insert({3}, make(1));  // already cached
+  EXPECT_EQ(*cache.find({3}), *make(3));
+  EXPECT_EQ(cache.size(), 3);
 }
 
 TEST(ColumnRanking, FindsThePlaceWhereSomebodyStandsInView) {

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/skips.hpp"
 
@@ -42,6 +45,64 @@ void compare_every_nth_site(ViewLikelihood& likelihood, std::uint32_t step) {
   likelihood.compare(sites);
 }
 
+/// Views at given positions, of which nothing else is known.
+class PositionsOnly final : public ComparedViews {
+ public:
+  explicit PositionsOnly(std::vector<Point2> positions) : positions_(std::move(positions)) {}
+  [[nodiscard]] SignatureShape shape() const override { return {1, 1}; }
+  [[nodiscard]] int components() const override { return 0; }
+  [[nodiscard]] std::vector<PosedView> posed_views() override {
+    std::vector<PosedView> views;
+    for (const Point2 p : positions_)
+      views.push_back({ViewId{static_cast<std::uint32_t>(views.size())}, {p.x_m, p.y_m, 0.0}});
+    return views;
+  }
+  [[nodiscard]] std::vector<Match> search(const PackedSignature&, int) override { return {}; }
+  void load(std::span<const ViewId>, const ProfileCallback&) override {}
+
+ private:
+  std::vector<Point2> positions_;
+};
+
+TEST(ViewLikelihood, ListsTheNearestSitesOfEachCell) {
+  Random random(8);
+  int listed = 0;
+  int full = 0;
+  for (const double range_m : {0.1, 0.7, 5.0}) {
+    for (const bool is_line : {false, true}) {
+      std::vector<Point2> positions;
+      for (int i = 0; i < 300; ++i) {
+        positions.push_back({is_line ? 0.1 : random.uniform(-3.0, 3.0), random.uniform(-4.0, 4.0)});
+      }
+      ObservationModel model;
+      model.spacing_m = 0.25;
+      model.range_m = range_m;
+      const ViewLikelihood likelihood(std::make_unique<PositionsOnly>(positions), model, true);
+      const double reach_m = std::max(0.5, std::min(range_m, 1.0)) + 0.5 * model.spacing_m;
+      for (int i = 0; i < 200; ++i) {
+        const Point2 at{random.uniform(-5.0, 5.0), random.uniform(-6.0, 6.0)};
+        const Point2 centre{(std::floor(at.x_m / 0.25) + 0.5) * 0.25,
+                            (std::floor(at.y_m / 0.25) + 0.5) * 0.25};
+        std::vector<std::pair<float, std::uint32_t>> near;
+        for (std::uint32_t s = 0; s < positions.size(); ++s) {
+          const double apart_m = distance(centre, positions[s]);
+          if (apart_m <= reach_m) near.emplace_back(static_cast<float>(apart_m), s);
+        }
+        std::ranges::sort(near);
+        if (near.size() > 12) near.resize(12);
+        std::vector<std::uint32_t> expected;
+        for (const auto& [apart_m, site] : near) expected.push_back(site);
+        const auto found = likelihood.sites_near(at);
+        EXPECT_EQ(std::vector<std::uint32_t>(found.begin(), found.end()), expected);
+        listed += expected.empty() ? 0 : 1;
+        full += expected.size() == 12 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GE(listed, 200);
+  EXPECT_GE(full, 100);
+}
+
 TEST(ObservationModel, LearnsHowLikenessFallsWithDistance) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const RememberedRoom fine(61, {}, 0.25);
@@ -70,7 +131,7 @@ TEST(ObservationModel, LearnsHowLikenessFallsWithDistance) {
       const double distance_m =
           distance(fine.memory.info(reference).pose->position(), pose.position());
       if (distance_m > 0.5) continue;
-      found += far - std::pow(match_columns(view, ranking.profiles(reference)).difference, 2);
+      found += far - std::pow(match_columns(view, *ranking.profiles(reference)).difference, 2);
       expected += far * std::exp(-distance_m / of_fine.range_m);
     }
   }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/localisation/internal/profile_cache.hpp"
 
 namespace panonav {
 
@@ -16,45 +17,50 @@ double RankedMatch::score_with(double difference) const {
          std::pow(match.dissimilarity + min_factor, dissimilarity_exponent);
 }
 
-ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int max_cached_views)
-    : memory_(&memory), components_(components) {
+ColumnRanking::ColumnRanking(const VisualMemory& memory, int components,
+                             std::size_t max_cached_profiles)
+    : memory_(&memory),
+      components_(components),
+      cache_(std::make_unique<ProfileCache>(max_cached_profiles)) {
   require(components >= 0 && components <= memory.shape().components, "components", components,
           "0 (all) or 1 .. " + to_text(memory.shape().components));
-  if (memory.size() > static_cast<std::size_t>(max_cached_views)) return;
-  cached_views_.assign(memory.views().begin(), memory.views().end());
-  cached_profiles_.reserve(cached_views_.size());
-  for (const ViewId view : cached_views_)
-    cached_profiles_.emplace_back(memory.packed(view), components);
 }
 
-const ColumnProfiles* ColumnRanking::find_cached(ViewId view) const {
-  const auto at = std::ranges::lower_bound(cached_views_, view);
-  if (at == cached_views_.end() || *at != view) return nullptr;
-  return &cached_profiles_[static_cast<std::size_t>(at - cached_views_.begin())];
+ColumnRanking::~ColumnRanking() = default;
+
+std::shared_ptr<const ColumnProfiles> ColumnRanking::profiles(ViewId view) const {
+  if (auto found = cache_->find(view)) return found;
+  auto made = std::make_shared<const ColumnProfiles>(memory_->packed(view), components_);
+  cache_->insert(view, made);
+  return made;
 }
 
-ColumnProfiles ColumnRanking::profiles(ViewId view) const {
-  if (const ColumnProfiles* const found = find_cached(view)) return *found;
-  return ColumnProfiles(memory_->packed(view), components_);
+std::size_t ColumnRanking::cached_profiles() const {
+  return cache_->size();
 }
 
 std::vector<RankedMatch> ColumnRanking::rank(const PackedSignature& query,
                                              std::span<const Match> matches,
                                              std::span<const std::uint8_t> allowed_rows) const {
   const ColumnProfiles query_profiles(query, components_, allowed_rows);
-  std::vector<RankedMatch> ranked;
-  ranked.reserve(matches.size());
+  std::vector<std::pair<double, RankedMatch>> scored;
+  scored.reserve(matches.size());
   for (const Match& match : matches) {
     // Cached profiles cover all rows.
-    const ColumnProfiles* const found = allowed_rows.empty() ? find_cached(match.view) : nullptr;
     const ColumnMatch columns =
-        found != nullptr ? match_columns(query_profiles, *found)
-                         : match_columns(query_profiles, ColumnProfiles(memory_->packed(match.view),
-                                                                        components_, allowed_rows));
-    ranked.push_back({match, columns});
+        allowed_rows.empty()
+            ? match_columns(query_profiles, *profiles(match.view))
+            : match_columns(query_profiles,
+                            ColumnProfiles(memory_->packed(match.view), components_, allowed_rows));
+    const RankedMatch ranked{match, columns};
+    scored.emplace_back(ranked.score(), ranked);
   }
-  std::ranges::sort(ranked, {},
-                    [](const RankedMatch& r) { return std::pair(r.score(), r.match.view); });
+  std::ranges::sort(scored, {}, [](const std::pair<double, RankedMatch>& scored_match) {
+    return std::pair(scored_match.first, scored_match.second.match.view);
+  });
+  std::vector<RankedMatch> ranked;
+  ranked.reserve(scored.size());
+  for (const auto& [score, match] : scored) ranked.push_back(match);
   return ranked;
 }
 

@@ -169,7 +169,9 @@ struct Localiser::ComparedViews {
   ComparedViews(const VisualMemory& memory_, const LocaliserOptions& options,
                 std::optional<double> spacing_m, std::size_t views)
       : memory(&memory_),
-        ranking(memory_, options.components, std::max(options.reranked_views, 1)),
+        ranking(memory_, options.components,
+                std::max(ColumnRanking::default_max_cached_profiles,
+                         static_cast<std::size_t>(options.reranked_views))),
         support(ranking, spacing_m),
         criterion(ranking, views) {}
   ComparedViews(const ComparedViews&) = delete;

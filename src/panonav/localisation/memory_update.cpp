@@ -134,7 +134,7 @@ void MemoryUpdate::decide_image(std::size_t index) {
   for (const ViewId view : find_views_around(pose->position(), use_.spacing_m)) {
     const ReferencePose& reference = *ranking_->memory().info(view).pose;
     const double off_m = distance(reference.position(), pose->position());
-    const ColumnMatch match = match_columns(profiles, ranking_->profiles(view));
+    const ColumnMatch match = match_columns(profiles, *ranking_->profiles(view));
     const double turn_rad =
         angle_difference(*reference.heading_rad + match.heading_rad, pose->heading_rad);
     const double similarity = std::abs(turn_rad) <= heading_agreement_tolerance_rad

@@ -99,7 +99,7 @@ std::optional<double> NeighbourSupport::supported_difference(
   views.insert(views.begin(), match.match.view);
   for (const ViewId view : views) {
     Fit fit{};
-    fit.columns = column_distances_at_heading(query, ranking_->profiles(view),
+    fit.columns = column_distances_at_heading(query, *ranking_->profiles(view),
                                               heading_rad - *find_pose(view)->heading_rad);
     for (const double column : fit.columns) fit.difference += std::sqrt(column);
     fits.push_back(fit);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -77,7 +78,7 @@ class LeftOutView {
 
   const ColumnMatch& match(std::size_t site) {
     if (!matches_[site]) {
-      matches_[site] = match_columns(profiles_, ranking_->profiles(sites_[site].id));
+      matches_[site] = match_columns(*profiles_, *ranking_->profiles(sites_[site].id));
     }
     return *matches_[site];
   }
@@ -85,7 +86,7 @@ class LeftOutView {
  private:
   const ColumnRanking* ranking_;
   std::span<const PosedView> sites_;
-  ColumnProfiles profiles_;
+  std::shared_ptr<const ColumnProfiles> profiles_;
   std::vector<std::optional<ColumnMatch>> matches_;
 };
 

@@ -116,7 +116,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
 
   const std::vector<ViewId> compared =
       sample_views(memory.views(), options.compared_views, seed + 1);
-  std::vector<ColumnProfiles> references;
+  std::vector<std::shared_ptr<const ColumnProfiles>> references;
   references.reserve(compared.size());
   for (const ViewId view : compared) references.push_back(ranking.profiles(view));
 
@@ -125,21 +125,21 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions
   std::vector<double> nearest_of_mirrored;
   std::vector<double> nearest_view_differences;
   for (const ViewId view : sample) {
-    const ColumnProfiles own = ranking.profiles(view);
+    const std::shared_ptr<const ColumnProfiles> own = ranking.profiles(view);
     const ColumnProfiles reversed(mirror(memory.packed(view)), ranking.components());
     double best = std::numeric_limits<double>::infinity();
     double best_of_mirrored = best;
     for (std::size_t i = 0; i < compared.size(); ++i) {
       best_of_mirrored =
-          std::min(best_of_mirrored, match_columns(reversed, references[i]).difference);
+          std::min(best_of_mirrored, match_columns(reversed, *references[i]).difference);
       if (compared[i] == view) continue;
-      between.push_back(match_columns(own, references[i]).difference);
+      between.push_back(match_columns(*own, *references[i]).difference);
       best = std::min(best, between.back());
     }
     nearest.push_back(best);
     if (const auto neighbour = find_nearest_in_space(memory, view)) {
       nearest_view_differences.push_back(
-          match_columns(own, ranking.profiles(*neighbour)).difference);
+          match_columns(*own, *ranking.profiles(*neighbour)).difference);
     }
     nearest_of_mirrored.push_back(best_of_mirrored);
   }
@@ -214,14 +214,16 @@ PlaceCriterion::PlaceCriterion(const ViewSource& source)
   std::vector<ViewId> ascending = sample_;
   std::ranges::sort(ascending);
   const VisualMemory loaded = source.load(ascending);
-  for (const ViewId view : sample_) profiles_.emplace_back(loaded.packed(view));
+  for (const ViewId view : sample_)
+    profiles_.push_back(std::make_shared<const ColumnProfiles>(loaded.packed(view)));
 }
 
-ColumnProfiles PlaceCriterion::profiles(ViewId view,
-                                        std::span<const std::uint8_t> allowed_rows) const {
+std::shared_ptr<const ColumnProfiles> PlaceCriterion::profiles(
+    ViewId view, std::span<const std::uint8_t> allowed_rows) const {
   return ranking_->components() == 0 && allowed_rows.empty()
              ? ranking_->profiles(view)
-             : ColumnProfiles(ranking_->memory().packed(view), 0, allowed_rows);
+             : std::make_shared<const ColumnProfiles>(ranking_->memory().packed(view), 0,
+                                                      allowed_rows);
 }
 
 double PlaceCriterion::max_chance_difference(const PackedSignature& query,
@@ -234,10 +236,10 @@ double PlaceCriterion::max_chance_difference(const PackedSignature& query,
   std::vector<double> by_chance;
   for (std::size_t i = 0; i < sample_.size() && by_chance.size() < chance_view_count; ++i) {
     if (std::ranges::find(mask.excluded_views, sample_[i]) != mask.excluded_views.end()) continue;
-    const ColumnProfiles reference =
+    const auto reference =
         mask.allowed_rows.empty() ? profiles_[i] : profiles(sample_[i], mask.allowed_rows);
-    by_chance.push_back(better_half_difference(elsewhere, reference,
-                                               match_columns(elsewhere, reference).heading_rad));
+    by_chance.push_back(better_half_difference(elsewhere, *reference,
+                                               match_columns(elsewhere, *reference).heading_rad));
   }
   if (by_chance.empty()) return PlaceEvidence{}.chance;
   const double middle = mean(by_chance);
@@ -266,10 +268,10 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
   const ColumnProfiles query_profiles(query, 0, mask.allowed_rows);
   std::vector<double> differences;
   for (auto match = best.begin(); match != end; ++match) {
-    const ColumnProfiles reference = profiles((*match)->match.view, mask.allowed_rows);
-    const ColumnMatch turned = match_columns(query_profiles, reference);
+    const auto reference = profiles((*match)->match.view, mask.allowed_rows);
+    const ColumnMatch turned = match_columns(query_profiles, *reference);
     found.difference_of_all_columns = std::min(found.difference_of_all_columns, turned.difference);
-    differences.push_back(better_half_difference(query_profiles, reference, turned.heading_rad));
+    differences.push_back(better_half_difference(query_profiles, *reference, turned.heading_rad));
   }
   found.difference = *std::ranges::min_element(differences);
   found.tenth_best_difference = tenth_smallest(std::move(differences));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -125,8 +126,8 @@ class PlaceCriterion {
                                                  std::span<const PackedSignature> candidates) const;
 
  private:
-  [[nodiscard]] ColumnProfiles profiles(ViewId view,
-                                        std::span<const std::uint8_t> allowed_rows) const;
+  [[nodiscard]] std::shared_ptr<const ColumnProfiles> profiles(
+      ViewId view, std::span<const std::uint8_t> allowed_rows) const;
   /// Returns `PlaceEvidence::chance`; 0 for a query without structure.
   [[nodiscard]] double max_chance_difference(const PackedSignature& query,
                                              const ColumnProfiles& query_profiles,
@@ -135,7 +136,7 @@ class PlaceCriterion {
   const ColumnRanking* ranking_ = nullptr;  // null: the memory is not held in RAM
   int views_ = 0;  // size of the memory at construction; 0: the ranking's memory
   std::vector<ViewId> sample_;
-  std::vector<ColumnProfiles> profiles_;  // of the sample, over all rows
+  std::vector<std::shared_ptr<const ColumnProfiles>> profiles_;  // of the sample, over all rows
 };
 
 }  // namespace panonav

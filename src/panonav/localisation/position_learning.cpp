@@ -103,7 +103,7 @@ void add_left_out_view(const ColumnRanking& ranking, const NeighbourSupport& sup
     excluded.push_back(other);
     std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
   }
-  support.rank_by_support(ranking.profiles(view), ranked, excluded);
+  support.rank_by_support(*ranking.profiles(view), ranked, excluded);
   // `Localiser` computes a position only if the best match has a pose, so only such are learnt
   // from.
   const auto begins_posed = [&](std::span<const RankedMatch> matches) {

@@ -115,7 +115,7 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
     estimate.shares = {{matches[0].match.view, 1.0}};
     return estimate;
   }
-  const ResemblingViews near = compare_with_each_other(ranking, matches);
+  const ResemblingViews near = compare_with_each_other(ranking, matches, model.neighbourhood_m);
   const KrigedPosition kriged =
       krige(near, model.neighbourhood_m, model.exponent, model.difference_unit);
   estimate.x_m = kriged.position.x_m;

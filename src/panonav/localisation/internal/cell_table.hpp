@@ -1,5 +1,6 @@
 #pragma once
 
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -7,11 +8,11 @@
 
 namespace panonav {
 
-/// A cell of a square grid.
+/// A cell of a square grid; cells are ordered by x, then by y.
 struct GridCell {
   std::int32_t x = 0;
   std::int32_t y = 0;
-  friend bool operator==(const GridCell&, const GridCell&) = default;
+  friend auto operator<=>(const GridCell&, const GridCell&) = default;
 };
 
 /// Returns floor(`cells`), limited to -limit .. limit. Positions beyond any map and NaN get an

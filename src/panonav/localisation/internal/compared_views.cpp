@@ -1,5 +1,6 @@
 #include "panonav/localisation/internal/compared_views.hpp"
 
+#include <memory>
 #include <utility>
 
 namespace panonav {
@@ -20,7 +21,10 @@ class HeldViews final : public ComparedViews {
         .matches;
   }
   void load(std::span<const ViewId> views, const ProfileCallback& consume) override {
-    for (std::size_t i = 0; i < views.size(); ++i) consume(i, ranking_->profiles(views[i]));
+    const VisualMemory& memory = ranking_->memory();
+    // The filter caches them.
+    for (std::size_t i = 0; i < views.size(); ++i)
+      consume(i, std::make_shared<const ColumnProfiles>(memory.packed(views[i]), components()));
   }
 
  private:
@@ -40,7 +44,8 @@ class IndexedViews final : public ComparedViews {
   void load(std::span<const ViewId> views, const ProfileCallback& consume) override {
     const VisualMemory loaded = index().load(views);
     for (std::size_t i = 0; i < views.size(); ++i) {
-      if (loaded.contains(views[i])) consume(i, ColumnProfiles(loaded.packed(views[i])));
+      if (loaded.contains(views[i]))
+        consume(i, std::make_shared<const ColumnProfiles>(loaded.packed(views[i])));
     }
   }
   void release() override { index_.reset(); }

@@ -15,7 +15,7 @@ namespace panonav {
 class ComparedViews {
  public:
   /// Callback that receives the profiles of a view and its index in the list of requested views.
-  using ProfileCallback = std::function<void(std::size_t, ColumnProfiles&&)>;
+  using ProfileCallback = std::function<void(std::size_t, std::shared_ptr<const ColumnProfiles>)>;
 
   virtual ~ComparedViews() = default;
   [[nodiscard]] virtual SignatureShape shape() const = 0;

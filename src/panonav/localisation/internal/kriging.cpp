@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "panonav/localisation/position_model.hpp"
 
@@ -19,10 +20,11 @@ double squared(double difference) {
 }  // namespace
 
 ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
-                                        std::span<const RankedMatch> matches) {
+                                        std::span<const RankedMatch> matches,
+                                        double neighbourhood_m) {
   ResemblingViews near;
   std::vector<double> squared_query_differences;
-  std::vector<ColumnProfiles> profiles;
+  std::vector<std::shared_ptr<const ColumnProfiles>> profiles;
   for (const RankedMatch& ranked : matches) {
     if (near.views.size() == PositionModel::max_candidates) break;
     const ViewId view = ranked.match.view;
@@ -31,7 +33,8 @@ ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
     near.views.push_back(view);
     near.positions.push_back(*position);
     squared_query_differences.push_back(squared(ranked.columns.difference));
-    profiles.push_back(ranking.profiles(view));
+    const bool is_compared = distance(*position, near.positions[0]) <= neighbourhood_m;
+    profiles.push_back(is_compared ? ranking.profiles(view) : nullptr);
   }
   const auto size = static_cast<Eigen::Index>(near.views.size());
   near.squared_query_differences =
@@ -39,11 +42,10 @@ ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
   near.squared_mutual_differences = Eigen::MatrixXd::Zero(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
     for (Eigen::Index j = 0; j < size; ++j) {
-      if (i == j) continue;
-      near.squared_mutual_differences(i, j) =
-          squared(match_columns(profiles[static_cast<std::size_t>(j)],
-                                profiles[static_cast<std::size_t>(i)])
-                      .difference);
+      const auto& query = profiles[static_cast<std::size_t>(j)];
+      const auto& reference = profiles[static_cast<std::size_t>(i)];
+      if (i == j || !query || !reference) continue;
+      near.squared_mutual_differences(i, j) = squared(match_columns(*query, *reference).difference);
     }
   }
   return near;

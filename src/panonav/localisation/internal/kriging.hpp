@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -27,8 +28,11 @@ struct ResemblingViews {
   Eigen::MatrixXd squared_mutual_differences;
 };
 /// Compares the first `PositionModel::max_candidates` posed views of the matches with each other.
-[[nodiscard]] ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
-                                                      std::span<const RankedMatch> matches);
+/// Mutual differences of views farther than `neighbourhood_m` from the best match are not computed
+/// and 0.
+[[nodiscard]] ResemblingViews compare_with_each_other(
+    const ColumnRanking& ranking, std::span<const RankedMatch> matches,
+    double neighbourhood_m = std::numeric_limits<double>::infinity());
 
 /// Returns the best match's difference divided by that of the best match elsewhere
 /// (`elsewhere_spacings`); 0 if there is no match elsewhere.

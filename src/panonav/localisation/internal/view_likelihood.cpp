@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <tuple>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -62,7 +61,7 @@ void ViewLikelihood::update_sites() {
 }
 
 void ViewLikelihood::keep_profiles(std::span<const Site> former_sites) {
-  std::vector<std::optional<ColumnProfiles>> kept(sites_.size());
+  std::vector<std::shared_ptr<const ColumnProfiles>> kept(sites_.size());
   cached_profiles_ = 0;
   for (std::size_t i = 0; i < former_sites.size(); ++i) {
     if (!profiles_[i]) continue;
@@ -84,33 +83,46 @@ void ViewLikelihood::index_sites() {
   cells_.clear();
   near_sites_.clear();
   lanes_.clear();
-  // (cell, distance from the cell's centre, site)
-  std::vector<std::tuple<std::int32_t, std::int32_t, float, std::uint32_t>> entries;
-  for (std::uint32_t s = 0; s < sites_.size(); ++s) {
-    const auto [x, y] = cell_of(sites_[s].position);
-    for (std::int32_t cx = x - around; cx <= x + around; ++cx) {
-      for (std::int32_t cy = y - around; cy <= y + around; ++cy) {
-        const double distance_m = distance(centre_of({cx, cy}), sites_[s].position);
-        if (distance_m > reach_m + 0.5 * cell_m_) continue;
-        entries.emplace_back(cx, cy, static_cast<float>(distance_m), s);
+  std::vector<std::pair<GridCell, std::uint32_t>> by_cell;  // ascending, with the site in the cell
+  for (std::uint32_t s = 0; s < sites_.size(); ++s)
+    by_cell.emplace_back(cell_of(sites_[s].position), s);
+  std::ranges::sort(by_cell);
+  // Column by column of cells, so that only the sites near one column are listed at once.
+  std::vector<NearSite> entries;
+  std::int32_t next_x = std::numeric_limits<std::int32_t>::min();
+  for (const auto& [site_cell, unused] : by_cell) {
+    for (std::int32_t x = std::max(next_x, site_cell.x - around); x <= site_cell.x + around; ++x) {
+      entries.clear();
+      auto near = std::ranges::lower_bound(by_cell, x - around, {},
+                                           [](const auto& entry) { return entry.first.x; });
+      for (; near != by_cell.end() && near->first.x <= x + around; ++near) {
+        const Point2 position = sites_[near->second].position;
+        for (std::int32_t y = near->first.y - around; y <= near->first.y + around; ++y) {
+          const double distance_m = distance(centre_of({x, y}), position);
+          if (distance_m > reach_m + 0.5 * cell_m_) continue;
+          entries.push_back({y, static_cast<float>(distance_m), near->second});
+        }
       }
+      add_cells(x, entries);
     }
+    next_x = std::max(next_x, site_cell.x + around + 1);
   }
+  group_of_cell_.assign(cells_.size() + 1, 0);
+}
+
+void ViewLikelihood::add_cells(std::int32_t x, std::vector<NearSite>& entries) {
   std::ranges::sort(entries);
   for (std::size_t i = 0; i < entries.size();) {
-    const GridCell grid_cell{std::get<0>(entries[i]), std::get<1>(entries[i])};
+    const GridCell grid_cell{x, entries[i].y};
     Cell cell{grid_cell, static_cast<std::uint32_t>(near_sites_.size()), 0, 0, 0};
     std::size_t count = 0;
-    for (; i < entries.size() && std::get<0>(entries[i]) == grid_cell.x &&
-           std::get<1>(entries[i]) == grid_cell.y;
-         ++i) {
-      if (count++ < max_near_sites) near_sites_.push_back(std::get<3>(entries[i]));
+    for (; i < entries.size() && entries[i].y == grid_cell.y; ++i) {
+      if (count++ < max_near_sites) near_sites_.push_back(entries[i].site);
     }
     cell.end = static_cast<std::uint32_t>(near_sites_.size());
     table_.find_or_add(grid_cell);
     cells_.push_back(cell);
   }
-  group_of_cell_.assign(cells_.size() + 1, 0);
 }
 
 GridCell ViewLikelihood::cell_of(Point2 position) const noexcept {
@@ -170,7 +182,7 @@ void ViewLikelihood::load_profiles(std::span<const std::uint32_t> sites) {
     views.push_back(sites_[site].view);
   }
   if (views.empty()) return;
-  views_->load(views, [&](std::size_t i, ColumnProfiles&& profiles) {
+  views_->load(views, [&](std::size_t i, std::shared_ptr<const ColumnProfiles> profiles) {
     profiles_[loaded[i]] = std::move(profiles);
     ++cached_profiles_;
   });
