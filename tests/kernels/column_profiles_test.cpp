@@ -47,14 +47,14 @@ float value_at(const std::vector<float>& view, std::size_t band, std::size_t col
 
 TEST(ColumnProfilesKernel, ReconstructsTheSumOfWavesOnEveryInstructionSet) {
   Random random(1);
-  const Components given(random);
+  const Components spectra(random);
   int checked = 0;
   for (const auto& [components, bands] : {std::pair{15, 16}, {1, 16}, {64, 16}, {8, 5}, {15, 1}}) {
     std::vector<float> plain(view_size);
-    reconstruct_bands(given.waves(components, bands), plain, Instructions::scalar);
+    reconstruct_bands(spectra.waves(components, bands), plain, Instructions::scalar);
     for (const Instructions set : available_instructions()) {
       std::vector<float> view(view_size);
-      reconstruct_bands(given.waves(components, bands), view, set);
+      reconstruct_bands(spectra.waves(components, bands), view, set);
       for (std::size_t b = 0; b < static_cast<std::size_t>(bands); ++b) {
         for (std::size_t c = 0; c < columns; ++c) {
           EXPECT_EQ(value_at(view, b, c), value_at(plain, b, c)) << name(set);
@@ -62,8 +62,8 @@ TEST(ColumnProfilesKernel, ReconstructsTheSumOfWavesOnEveryInstructionSet) {
           for (std::size_t k = 0; k < static_cast<std::size_t>(components); ++k) {
             const double angle = 2.0 * std::numbers::pi * static_cast<double>(k * c) / columns;
             expected +=
-                static_cast<double>(given.real[k * matched_bands + b]) * std::cos(angle) -
-                static_cast<double>(given.imaginary[k * matched_bands + b]) * std::sin(angle);
+                static_cast<double>(spectra.real[k * matched_bands + b]) * std::cos(angle) -
+                static_cast<double>(spectra.imaginary[k * matched_bands + b]) * std::sin(angle);
           }
           ASSERT_NEAR(static_cast<double>(value_at(view, b, c)), expected, 1e-3) << name(set);
           ++checked;
@@ -132,12 +132,12 @@ TEST(ColumnProfilesKernel, ReportsAViewWithoutContrast) {
 
 TEST(ColumnProfilesKernel, RefusesOtherSizes) {
   Random random(3);
-  const Components given(random);
+  const Components spectra(random);
   std::vector<float> view(view_size), shorter(view_size - 1);
   std::vector<std::uint8_t> values(2048), fewer(2047);
   const Instructions set = Instructions::scalar;
-  EXPECT_THROW(reconstruct_bands(given.waves(15, 16), shorter, set), ContractError);
-  EXPECT_THROW(reconstruct_bands(given.waves(15, 17), view, set), ContractError);
+  EXPECT_THROW(reconstruct_bands(spectra.waves(15, 16), shorter, set), ContractError);
+  EXPECT_THROW(reconstruct_bands(spectra.waves(15, 17), view, set), ContractError);
   EXPECT_THROW(subtract_column_means(shorter, 16, set), ContractError);
   EXPECT_THROW((void)quantise_columns(view, 16, {}, fewer, set), ContractError);
 }

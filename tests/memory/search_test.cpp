@@ -214,7 +214,8 @@ TEST(VisualMemorySearch, EveryInstructionSetFindsAndReadsTheSame) {
   std::vector<ViewId> views;
   std::vector<ViewStore::Row> rows;
   for (std::uint32_t i = 0; i < 2500; ++i) {
-    rows.push_back(store.add(maker.next()));
+    const PackedSignature signature = maker.next();
+    rows.push_back(store.add(signature.magnitudes, signature.phases));
     index.insert(store, rows.back());
     views.push_back(ViewId{3 * i});
   }

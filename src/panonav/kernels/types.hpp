@@ -79,6 +79,21 @@ struct DistanceKernels {
                             uint32_t* indices);
 };
 
+/// Scale by which sums become bytes, in groups of 8 sums.
+struct SumScale {
+  const int32_t *offsets,      ///< sum with code 0, one for each sum
+      *highest;                ///< largest sum within the scale, one for each sum
+  const uint64_t* steps;       ///< difference of two codes, one for each group, at least 1
+  const float* inverse_steps;  ///< 1 / step, one for each group
+  size_t groups;               ///< number of groups
+};
+
+/// Result of encoding sums.
+struct EncodedSums {
+  int32_t missed;  ///< sum of all |sum - offset - step * code|
+  bool is_within;  ///< every sum lies within the scale
+};
+
 /// Number of views in a block of `cell_bounds`.
 inline constexpr size_t cell_block = 64;
 

@@ -8,13 +8,13 @@
 #include <mutex>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/memory/internal/comparison.hpp"
 #include "panonav/memory/internal/exact_search.hpp"
 #include "panonav/memory/internal/link_set.hpp"
+#include "panonav/memory/internal/name_index.hpp"
 #include "panonav/memory/internal/sketch_index.hpp"
 #include "panonav/memory/internal/view_store.hpp"
 #include "panonav/memory/reference_validation.hpp"
@@ -45,19 +45,19 @@ struct VisualMemory::Implementation {
         views(other.views),
         rows(other.rows),
         view_of_row(other.view_of_row),
+        names(other.names),
         links(other.links),
-        next_id(other.next_id) {
-    names.reserve(views.size());
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      names.emplace(records[rows[i]].name, views[i]);
-    }
-  }
+        next_id(other.next_id) {}
   Implementation(Implementation&&) = delete;
   Implementation& operator=(const Implementation&) = delete;
   Implementation& operator=(Implementation&&) = delete;
   ~Implementation() = default;
 
   [[nodiscard]] std::optional<std::size_t> find_position(ViewId view) const {
+    if (views.empty() || view < views.front()) return std::nullopt;
+    // Where no view was removed, ids follow each other.
+    const std::size_t offset = view.value - views.front().value;
+    if (offset < views.size() && views[offset] == view) return offset;
     const auto found = std::ranges::lower_bound(views, view);
     if (found == views.end() || *found != view) return std::nullopt;
     return static_cast<std::size_t>(found - views.begin());
@@ -69,6 +69,9 @@ struct VisualMemory::Implementation {
   }
   void require_view(ViewId view) const { static_cast<void>(position(view)); }
   [[nodiscard]] Row row(ViewId view) const { return rows[position(view)]; }
+  [[nodiscard]] auto name_of_row() const {
+    return [this](Row row) -> const std::string& { return records[row].name; };
+  }
 
   /// Returns the views and the index for a search, after indexing all rows that were appended since
   /// the last search.
@@ -93,11 +96,11 @@ struct VisualMemory::Implementation {
   mutable std::atomic<bool> all_indexed = true;
   mutable std::mutex indexing;
   std::deque<ReferenceInfo>
-      records;                // by row of the store; a deque, so that names stay where they are
+      records;                // by row of the store; a deque, so that they stay where they are
   std::vector<ViewId> views;  // ascending
   std::vector<Row> rows;      // of `views`
   std::vector<ViewId> view_of_row;
-  std::unordered_map<std::string_view, ViewId> names;  // the text belongs to `records`
+  NameIndex names;
   LinkSet links;
   std::uint64_t next_id = 0;
 };
@@ -151,17 +154,23 @@ ViewId VisualMemory::append(const FourierSignature& signature, ReferenceInfo inf
 }
 
 void VisualMemory::append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info) {
+  require_signature(signature, implementation_->shape);
+  append_with_id(id, signature.magnitudes, signature.phases, std::move(info));
+}
+
+void VisualMemory::append_with_id(ViewId id, std::span<const std::uint8_t> magnitudes,
+                                  std::span<const std::uint8_t> phases, ReferenceInfo info) {
   Implementation& memory = *implementation_;
-  require_signature(signature, memory.shape);
+  require_signature(magnitudes, phases, memory.shape);
   validate(info);
-  if (memory.names.contains(info.name)) {
+  if (memory.names.find(info.name, memory.name_of_row())) {
     throw ContractError("view name", "\"" + info.name + "\", which the memory already contains",
                         "a name that is unique");
   }
   require(id.value >= memory.next_id, "view id", id.value,
           ">= " + std::to_string(memory.next_id) + ", ids grow");
 
-  const Row row = memory.store.add(signature);
+  const Row row = memory.store.add(magnitudes, phases);
   if (row == memory.records.size()) {
     memory.records.push_back(std::move(info));
     memory.view_of_row.push_back(id);
@@ -169,7 +178,7 @@ void VisualMemory::append_with_id(ViewId id, const PackedSignature& signature, R
     memory.records[row] = std::move(info);
     memory.view_of_row[row] = id;
   }
-  memory.names.emplace(memory.records[row].name, id);
+  memory.names.insert(memory.records[row].name, row);
   memory.views.push_back(id);
   memory.rows.push_back(row);
   memory.not_indexed.push_back(row);
@@ -182,7 +191,7 @@ void VisualMemory::remove(ViewId view) {
   const std::size_t position = memory.position(view);
   const Row row = memory.rows[position];
   memory.links.erase_links_of(view);
-  memory.names.erase(memory.records[row].name);
+  memory.names.erase(memory.records[row].name, memory.name_of_row());
   memory.records[row] = {};
   memory.index_rows();
   memory.index.erase(row);
@@ -200,9 +209,9 @@ bool VisualMemory::contains(ViewId view) const noexcept {
 }
 
 std::optional<ViewId> VisualMemory::find(std::string_view name) const {
-  const auto found = implementation_->names.find(name);
-  if (found == implementation_->names.end()) return std::nullopt;
-  return found->second;
+  const auto row = implementation_->names.find(name, implementation_->name_of_row());
+  if (!row) return std::nullopt;
+  return implementation_->view_of_row[*row];
 }
 
 const ReferenceInfo& VisualMemory::info(ViewId view) const {

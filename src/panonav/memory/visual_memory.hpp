@@ -117,6 +117,9 @@ class VisualMemory {
   ViewId append(const FourierSignature& signature, ReferenceInfo info);
   /// Appends a view with this id, which must be larger than all earlier ids; for readers of files.
   void append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info);
+  /// Does the same with the bytes of a signature (`PackedSignature`).
+  void append_with_id(ViewId id, std::span<const std::uint8_t> magnitudes,
+                      std::span<const std::uint8_t> phases, ReferenceInfo info);
   /// Removes a view and its links. Throws ContractError if there is no such view.
   void remove(ViewId view);
 

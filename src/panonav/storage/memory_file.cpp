@@ -79,9 +79,9 @@ struct MemoryFile::Implementation {
   /// another.
   void append_row(const ViewRow& row, VisualMemory& memory) {
     const auto signature = tables->check_row(row, header.shape, scratch).signature;
-    unpack_signature(signature, header.shape, packed);
     try {
-      memory.append_with_id(row.id, packed, row.info);
+      memory.append_with_id(row.id, signature.first(header.shape.size()),
+                            signature.subspan(header.shape.size()), row.info);
     } catch (const ContractError& error) {
       tables->fail_damaged(error.what());
     }
@@ -132,8 +132,7 @@ struct MemoryFile::Implementation {
   std::filesystem::path address;  ///< as passed to `open`; may contain a password
   std::unique_ptr<MemoryTables> tables;
   MemoryHeader header;
-  RecordBytes scratch = {};     ///< buffer, reused for every view
-  PackedSignature packed = {};  ///< the same
+  RecordBytes scratch = {};  ///< buffer, reused for every view
 };
 
 MemoryFile::MemoryFile(std::unique_ptr<Implementation> implementation)

@@ -108,6 +108,12 @@ struct RowTransformBody {
 };
 
 template <Instructions set>
+struct SketchBody {
+  static EncodedSums encode_sums(const int32_t* sums, const SumScale& scale, uint8_t* codes,
+                                 size_t stride);
+};
+
+template <Instructions set>
 struct SimilarityBody {
   static void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Decay& decay,
                                  const float* x_m, const float* y_m, const float* heading_rad,

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <new>
+#include <utility>
 #include <vector>
 
 namespace panonav {
@@ -20,6 +21,27 @@ struct CacheLineAllocator {
     ::operator delete (pointer, std::align_val_t{64});
   }
   friend bool operator==(CacheLineAllocator, CacheLineAllocator) { return true; }
+};
+
+/// The same, and a vector that grows does not set its new elements, so that the system provides
+/// their memory only once they are written.
+template <class T>
+struct UnsetAllocator : CacheLineAllocator<T> {
+  template <class U>
+  struct rebind {
+    using other = UnsetAllocator<U>;
+  };
+  UnsetAllocator() = default;
+  template <class U>
+  explicit UnsetAllocator(const UnsetAllocator<U>&) noexcept {}
+  template <class U>
+  void construct(U* element) noexcept {
+    ::new (static_cast<void*>(element)) U;
+  }
+  template <class U, class... Arguments>
+  void construct(U* element, Arguments&&... arguments) {
+    ::new (static_cast<void*>(element)) U(std::forward<Arguments>(arguments)...);
+  }
 };
 
 template <class T>

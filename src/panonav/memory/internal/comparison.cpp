@@ -18,10 +18,15 @@ void require_signature(const PackedSignature& signature, SignatureShape shape) {
   if (!(signature.shape == shape)) {
     throw ContractError("signature shape", shape_text(signature.shape), shape_text(shape));
   }
-  require(signature.magnitudes.size() == shape.size(), "number of packed magnitudes",
-          static_cast<double>(signature.magnitudes.size()), std::to_string(shape.size()));
-  require(signature.phases.size() == shape.size(), "number of packed phases",
-          static_cast<double>(signature.phases.size()), std::to_string(shape.size()));
+  require_signature(signature.magnitudes, signature.phases, shape);
+}
+
+void require_signature(std::span<const std::uint8_t> magnitudes,
+                       std::span<const std::uint8_t> phases, SignatureShape shape) {
+  require(magnitudes.size() == shape.size(), "number of packed magnitudes",
+          static_cast<double>(magnitudes.size()), to_text(static_cast<double>(shape.size())));
+  require(phases.size() == shape.size(), "number of packed phases",
+          static_cast<double>(phases.size()), to_text(static_cast<double>(shape.size())));
 }
 
 int resolve_components(int components, SignatureShape shape) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,9 @@ namespace panonav {
 /// Throws ContractError unless the signature has this shape and the number of bytes that the shape
 /// requires.
 void require_signature(const PackedSignature& signature, SignatureShape shape);
+/// Throws ContractError if the bytes are not those of a signature of that shape.
+void require_signature(std::span<const std::uint8_t> magnitudes,
+                       std::span<const std::uint8_t> phases, SignatureShape shape);
 
 /// Returns `components`, or the number of all components for 0. Throws ContractError if out of
 /// range.

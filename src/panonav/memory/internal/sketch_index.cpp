@@ -5,6 +5,8 @@
 #include <cstring>
 #include <numeric>
 
+#include "panonav/kernels/sketch.hpp"
+
 namespace panonav {
 
 namespace {
@@ -34,20 +36,9 @@ std::int32_t sum_bytes(const std::uint8_t* bytes, int count) {
   return sum;
 }
 
-/// Writes the codes nearest to the sums of one group and returns the total rounding error. Bounds
-/// are valid for any code, so rounding of the float product does no harm.
-std::int32_t encode_group(const std::int32_t* sums, const std::int32_t* offsets,
-                          std::uint64_t group_step, float inverse_step, std::uint8_t* codes) {
-  const auto step = static_cast<std::int32_t>(group_step);
-  std::int32_t missed = 0;
-  for (std::size_t i = 0; i < group_bytes; ++i) {
-    const std::int32_t above = sums[i] - offsets[i];
-    const float scaled = static_cast<float>(above) * inverse_step + 0.5F;
-    const auto code = static_cast<std::int32_t>(std::min(std::max(scaled, 0.0F), 255.0F));
-    codes[i] = static_cast<std::uint8_t>(code);
-    missed += std::abs(above - code * step);
-  }
-  return missed;
+kernels::SumScale to_sum_scale(const SketchScale& scale, std::size_t groups) {
+  return {scale.offsets.data(), scale.highest.data(), scale.steps.data(),
+          scale.inverse_steps.data(), groups};
 }
 
 void set_scale(SketchScale& scale, std::vector<std::int32_t> lowest,
@@ -92,8 +83,11 @@ void encode_query(const SketchScale& scale, bool covers, std::span<const std::in
       }
     }
     const std::uint64_t step = scale.steps[group];
-    constant -= encode_group(inside.data(), offsets.data(), step, scale.inverse_steps[group],
-                             values + group * group_bytes);
+    const kernels::SumScale of_group{offsets.data(), offsets.data(), &step,
+                                     &scale.inverse_steps[group], 1};
+    constant -= kernels::encode_sums(inside, of_group, values + group * group_bytes, group_bytes,
+                                     kernels::chosen_instructions())
+                    .missed;
     for (const std::int32_t count : counts) {
       max_slack += count * static_cast<std::int32_t>(step / 2 + 1);
     }
@@ -120,9 +114,13 @@ SketchLayout::SketchLayout(SignatureShape shape_) : shape(shape_) {
 }
 
 void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) const {
-  const auto components = static_cast<std::size_t>(shape.components);
   sums.fine.resize(fine_groups * group_bytes);
   sums.coarse.resize(coarse_groups * group_bytes);
+  sum_blocks(magnitudes, BlockSumsOf{sums.fine, sums.coarse});
+}
+
+void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, const BlockSumsOf& sums) const {
+  const auto components = static_cast<std::size_t>(shape.components);
   const int blocks = fine_blocks > 0 ? fine_blocks : coarse_blocks;
   std::int32_t* const out = fine_blocks > 0 ? sums.fine.data() : sums.coarse.data();
   std::array<int, BlockSums::blocks_per_component + 1> borders{};
@@ -157,23 +155,15 @@ SketchIndex::Segment SketchIndex::make_segment() const {
   return segment;
 }
 
-bool SketchIndex::encode(Segment& segment, std::size_t place, const BlockSums& sums) const {
+bool SketchIndex::encode(Segment& segment, std::size_t place, const BlockSumsOf& sums) const {
   const auto encode_level = [place](Level& level, std::uint8_t* codes, std::size_t group_stride,
-                                    const std::vector<std::int32_t>& values) {
-    const SketchScale& scale = level.scale;
-    std::int32_t slack = 0;
-    std::int32_t outside = 0;
-    for (std::size_t group = 0; group < scale.steps.size(); ++group) {
-      const std::size_t first = group * group_bytes;
-      slack += encode_group(values.data() + first, scale.offsets.data() + first, scale.steps[group],
-                            scale.inverse_steps[group], codes + group * group_stride);
-      for (std::size_t d = first; d < first + group_bytes; ++d) {
-        outside |= (values[d] - scale.offsets[d]) | (scale.highest[d] - values[d]);
-      }
-    }
-    level.slacks[place] = slack;
-    level.covers = level.covers && outside >= 0;
-    return outside >= 0;
+                                    std::span<const std::int32_t> values) {
+    const kernels::EncodedSums encoded =
+        kernels::encode_sums(values, to_sum_scale(level.scale, level.scale.steps.size()), codes,
+                             group_stride, kernels::chosen_instructions());
+    level.slacks[place] = encoded.missed;
+    level.covers = level.covers && encoded.is_within;
+    return encoded.is_within;
   };
   const std::size_t octet = place / 8 * layout_.coarse_groups * 8 + place % 8;
   bool within = encode_level(segment.coarse, segment.coarse.codes.data() + octet * group_bytes,
@@ -187,31 +177,39 @@ bool SketchIndex::encode(Segment& segment, std::size_t place, const BlockSums& s
 
 void SketchIndex::learn_scales(Segment& segment, std::size_t first_row,
                                const ViewStore& store) const {
-  std::vector<std::pair<std::size_t, BlockSums>> all;
-  all.reserve(segment.used);
+  std::vector<std::size_t> places;
+  places.reserve(segment.used);
   for (std::size_t place = 0; place < segment.coarse.slacks.size(); ++place) {
-    if (segment.coarse.slacks[place] == no_slack) continue;
-    all.emplace_back(place, BlockSums{});
-    layout_.sum_blocks(store.magnitudes(static_cast<Row>(first_row + place)), all.back().second);
+    if (segment.coarse.slacks[place] != no_slack) places.push_back(place);
   }
-  BlockSums low = all.front().second;
-  BlockSums high = low;
-  const auto widen = [](const std::vector<std::int32_t>& values, std::vector<std::int32_t>& lowest,
-                        std::vector<std::int32_t>& highest) {
-    for (std::size_t d = 0; d < values.size(); ++d) {
-      lowest[d] = std::min(lowest[d], values[d]);
-      highest[d] = std::max(highest[d], values[d]);
-    }
+  // The sums of the places one after the other.
+  const std::size_t coarse_size = layout_.coarse_groups * group_bytes;
+  const std::size_t fine_size = layout_.fine_groups * group_bytes;
+  std::vector<std::int32_t> coarse(places.size() * coarse_size);
+  std::vector<std::int32_t> fine(places.size() * fine_size);
+  const auto sums_of = [&](std::size_t i) {
+    return BlockSumsOf{std::span(fine).subspan(i * fine_size, fine_size),
+                       std::span(coarse).subspan(i * coarse_size, coarse_size)};
   };
-  for (const auto& [place, sums] : all) {
-    widen(sums.coarse, low.coarse, high.coarse);
-    widen(sums.fine, low.fine, high.fine);
-  }
-  set_scale(segment.coarse.scale, std::move(low.coarse), std::move(high.coarse));
-  set_scale(segment.fine.scale, std::move(low.fine), std::move(high.fine));
-  segment.coarse.covers = true;
-  segment.fine.covers = true;
-  for (const auto& [place, sums] : all) encode(segment, place, sums);
+  for (std::size_t i = 0; i < places.size(); ++i)
+    layout_.sum_blocks(store.magnitudes(static_cast<Row>(first_row + places[i])), sums_of(i));
+  const auto set_learnt_scale = [](Level& level, std::span<const std::int32_t> sums,
+                                   std::size_t size) {
+    std::vector<std::int32_t> lowest(sums.begin(),
+                                     sums.begin() + static_cast<std::ptrdiff_t>(size));
+    std::vector<std::int32_t> highest = lowest;
+    for (; !sums.empty(); sums = sums.subspan(size)) {
+      for (std::size_t d = 0; d < size; ++d) {
+        lowest[d] = std::min(lowest[d], sums[d]);
+        highest[d] = std::max(highest[d], sums[d]);
+      }
+    }
+    set_scale(level.scale, std::move(lowest), std::move(highest));
+    level.covers = true;
+  };
+  set_learnt_scale(segment.coarse, coarse, coarse_size);
+  if (fine_size > 0) set_learnt_scale(segment.fine, fine, fine_size);
+  for (std::size_t i = 0; i < places.size(); ++i) encode(segment, places[i], sums_of(i));
   segment.learnt_from = segment.used;
   segment.outside = 0;
 }
@@ -239,7 +237,7 @@ void SketchIndex::insert(const ViewStore& store, Row row) {
 
   BlockSums sums;
   layout_.sum_blocks(store.magnitudes(row), sums);
-  if (!encode(segment, place, sums)) ++segment.outside;
+  if (!encode(segment, place, {sums.fine, sums.coarse})) ++segment.outside;
   ++segment.used;
   // A scale learnt from fewer views can only be too narrow, so it is learnt again if enough views
   // are outside of it.

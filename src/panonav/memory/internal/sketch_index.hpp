@@ -25,6 +25,12 @@ struct BlockSums {
       coarse;  ///< 2 (few rows: 1) blocks a component, unions of the fine ones
 };
 
+/// Refers to the block sums of one view.
+struct BlockSumsOf {
+  std::span<std::int32_t> fine;    ///< as `BlockSums::fine`
+  std::span<std::int32_t> coarse;  ///< as `BlockSums::coarse`
+};
+
 /// Layout of the sketches of views of one shape. Both levels are laid out in groups of 8 bytes.
 struct SketchLayout {
   explicit SketchLayout(SignatureShape shape_);
@@ -46,6 +52,8 @@ struct SketchLayout {
   /// Computes the block sums of a view. `magnitudes`: component-major. Resizes the vectors of
   /// `sums`.
   void sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) const;
+  /// Does the same in place; the spans have the sizes of the padded levels, filled with zeros.
+  void sum_blocks(const std::uint8_t* magnitudes, const BlockSumsOf& sums) const;
 
   SignatureShape shape;
   int coarse_blocks = 0;   ///< blocks a component: 2, 1 or 0 (views too small to be sketched)
@@ -155,7 +163,7 @@ class SketchIndex {
   /// Makes room for the row.
   Segment& get_or_create_segment(Row row);
   /// Encodes a row; true if all its sums lie within the scales.
-  bool encode(Segment& segment, std::size_t place, const BlockSums& sums) const;
+  bool encode(Segment& segment, std::size_t place, const BlockSumsOf& sums) const;
   void learn_scales(Segment& segment, std::size_t first_row, const ViewStore& store) const;
 
   SketchLayout layout_;

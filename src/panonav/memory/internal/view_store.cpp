@@ -7,7 +7,8 @@ namespace panonav {
 ViewStore::ViewStore(SignatureShape shape)
     : shape_(shape), stride_((shape.size() + 63) / 64 * 64) {}
 
-ViewStore::Row ViewStore::add(const PackedSignature& signature) {
+ViewStore::Row ViewStore::add(std::span<const std::uint8_t> magnitudes,
+                              std::span<const std::uint8_t> phases) {
   Row row = rows_end_;
   if (!free_rows_.empty()) {
     row = free_rows_.back();
@@ -20,8 +21,10 @@ ViewStore::Row ViewStore::add(const PackedSignature& signature) {
   }
   std::uint8_t* const chunk = chunks_[row / rows_per_chunk].data();
   const std::size_t place = row % rows_per_chunk;
-  std::memcpy(chunk + place * stride_, signature.magnitudes.data(), shape_.size());
-  std::memcpy(chunk + rows_per_chunk * stride_ + place * shape_.size(), signature.phases.data(),
+  std::uint8_t* const row_magnitudes = chunk + place * stride_;
+  std::memcpy(row_magnitudes, magnitudes.data(), shape_.size());
+  std::memset(row_magnitudes + shape_.size(), 0, stride_ - shape_.size());
+  std::memcpy(chunk + rows_per_chunk * stride_ + place * shape_.size(), phases.data(),
               shape_.size());
   return row;
 }

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "panonav/memory/internal/aligned_vector.hpp"
@@ -18,8 +19,8 @@ class ViewStore {
 
   explicit ViewStore(SignatureShape shape);
 
-  /// Copies one signature of the store's shape.
-  Row add(const PackedSignature& signature);
+  /// Copies the magnitudes and phases of one signature of the store's shape.
+  Row add(std::span<const std::uint8_t> magnitudes, std::span<const std::uint8_t> phases);
   void free(Row row);
 
   [[nodiscard]] Row rows_end() const noexcept { return rows_end_; }
@@ -35,10 +36,11 @@ class ViewStore {
 
  private:
   static constexpr std::size_t rows_per_chunk = 256;
+  using UnsetVector = std::vector<std::uint8_t, UnsetAllocator<std::uint8_t>>;
 
   SignatureShape shape_;
   std::size_t stride_;
-  std::vector<AlignedVector<std::uint8_t>> chunks_;  // magnitudes of all rows, then their phases
+  std::vector<UnsetVector> chunks_;  // magnitudes of all rows, then their phases; set by `add`
   std::vector<Row> free_rows_;
   Row rows_end_ = 0;
 };
