@@ -52,6 +52,24 @@ TEST(MatchColumns, AgreesWithItsDefinitionOnEveryInstructionSet) {
   EXPECT_GE(checked, 20);
 }
 
+TEST(MatchColumns, RoundsEveryRootAsItsDefinition) {
+  const std::vector<std::uint8_t> query(512, 0);
+  for (int l1 = 0; l1 <= 16 * 255; ++l1) {
+    std::vector<std::uint8_t> reference(2048);
+    for (int b = 0, left = l1; b < 16; ++b) {
+      const int value = std::min(left, 255);
+      std::fill_n(reference.begin() + 128 * b, 128, static_cast<std::uint8_t>(value));
+      left -= value;
+    }
+    const auto expected = static_cast<std::uint16_t>(32 * std::lround(16.0 * std::sqrt(l1)));
+    for (const Instructions set : available_instructions()) {
+      std::vector<std::uint16_t> costs(128);
+      EXPECT_EQ(match_columns(query, reference, costs, set), 0);
+      ASSERT_EQ(costs, std::vector<std::uint16_t>(128, expected)) << name(set) << ", L1 " << l1;
+    }
+  }
+}
+
 TEST(ColumnSumsNearTurn, AgreeWithTheirDefinitionOnEveryInstructionSet) {
   Random random(2);
   int checked = 0;

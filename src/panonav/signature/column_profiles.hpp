@@ -68,7 +68,7 @@ struct ColumnMatch {
 /// robot rotated by `heading_rad` relative to the reference: for each column the minimum over the
 /// nearest rotation step and its two neighbours. `ColumnMatch::difference` is the mean of the
 /// square roots of such values, all at one rotation. Throws ContractError on profiles with other
-/// bands. Cost: 1 microsecond.
+/// bands. Cost: 0.2 microseconds.
 [[nodiscard]] std::array<double, ColumnProfiles::compared_columns> column_distances_at_heading(
     const ColumnProfiles& query, const ColumnProfiles& reference, double heading_rad);
 
