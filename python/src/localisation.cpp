@@ -81,9 +81,9 @@ void bind_places(py::module_& m) {
       .field("known", &NamedPlace::known, "True if the place is in the memory.")
       .field("known_probability", &NamedPlace::known_probability, "Probability of `known`.")
       .field("probability", &NamedPlace::probability,
-             "That the image was taken at `position`; the rest is shared by `alternatives`.")
+             "That the image was taken at `position`, not at one of `alternatives`.")
       .field("alternatives", &NamedPlace::alternatives,
-             "Other places that the image does not exclude, most probable first.")
+             "Other places with at least 5 % of `known_probability`, most probable first.")
       .field(
           "floor", [](const NamedPlace& p) { return name_floor(p.floor()); }, floor_text)
       .field("position", &NamedPlace::position, "None: unknown.")

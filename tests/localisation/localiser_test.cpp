@@ -120,8 +120,12 @@ TEST(Localiser, NamesTheOppositeSideOfASymmetricHallAndSharesTheProbability) {
     if (!found.known) continue;
     ++known;
     double shared = found.probability;
-    for (const AlternativePlace& other : found.alternatives) shared += other.probability;
-    EXPECT_NEAR(shared, found.known_probability, 1e-9);
+    for (const AlternativePlace& other : found.alternatives) {
+      EXPECT_GE(other.probability, 0.05 * found.known_probability);
+      shared += other.probability;
+    }
+    EXPECT_LE(shared, found.known_probability + 1e-9);  // others are too improbable to be named
+    EXPECT_GE(shared, 0.8 * found.known_probability);
     if (found.alternatives.empty()) continue;
     const AlternativePlace& other = found.alternatives.front();
     ASSERT_TRUE(other.position && other.heading_rad);

@@ -47,6 +47,16 @@ constexpr std::size_t nearest_reference_count = 4;
 /// Half width of the compass's search window: the rotation by columns is exact to one column.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
+/// Smallest share of a place by columns at which features are not asked.
+constexpr double min_clear_share = 0.98;
+/// Largest number of alternatives that an answer names: more tell a user no more than that the
+/// place is ambiguous.
+constexpr std::size_t max_alternatives = 3;
+
+ViewId view_of(const RankedMatch& match) {
+  return match.match.view;
+}
+
 // Returns the weighted mean of the robot's headings relative to the best references. The weight is
 // the inverse fourth power of the column difference, because the compass's error grows with the
 // square of the difference. Ignores headings far from that of the best match, which are outliers of
@@ -152,18 +162,6 @@ VisualMemory join_memories(const VisualMemory& part, const VisualMemory& sampled
 
 }  // namespace
 
-void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
-  using T = LocaliserOptions;
-  constexpr OptionTable table{
-      option<&T::top>("number of matches to list", 1, 1e6),
-      option<&T::components>("number of Fourier components to compare; 0: all", 0),
-      option<&T::reranked_views>("if the most similar views do not match the image, compare this "
-                                 "number of views column by column; 0: do not compare columns",
-                                 0, 1e6),
-  };
-  table.visit(options, visitor);
-}
-
 /// The views that queries are compared with, and the data derived from them.
 struct Localiser::ComparedViews {
   ComparedViews(const VisualMemory& memory_, const LocaliserOptions& options,
@@ -212,6 +210,8 @@ class Localiser::Query {
     rank_by_support();                  // places that look similar
     rank_by_features();                 // memories with far references
     estimate_known_probability();       // evidence where columns are inconclusive
+    sort_if_not_reranked();             // by dissimilarity, if this was requested
+    if (place_.known) choose_place();   // features where places look alike
     list_matches();                     // headings by the visual compass
     if (place_.known) estimate_pose();  // [M04 footnote 1]
     return std::move(place_);
@@ -298,13 +298,49 @@ class Localiser::Query {
   }
   [[nodiscard]] bool is_known() const { return place_.known_probability >= 0.5; }
 
+  void sort_if_not_reranked() {
+    if (options_.reranked_views > 0) return;
+    std::ranges::sort(ranked_, {}, [](const RankedMatch& r) {
+      return std::pair(r.match.dissimilarity, r.match.view);
+    });
+  }
+
+  /// Shares the probability among the places that the matches show. If columns do not exclude all
+  /// but the first, features decide, and the most probable place becomes the first.
+  void choose_place() {
+    if (!compared_->memory->info(ranked_.front().match.view).pose) return;
+    const PositionModel& model = localiser_.position_model_;
+    places_ = share_probability(compared_->ranking, compared_->support, model,
+                                ColumnProfiles(view_, options_.components), ranked_,
+                                mask_.excluded_views);
+    const bool is_clear = places_.front().share >= min_clear_share && !model.ambiguous_from;
+    if (places_.size() < 2 || is_clear || options_.reranked_views == 0) return;
+    if (!make_features_ || !localiser_.features_) return;
+    if (!features_) features_ = compute_features(Handedness::original);
+    if (!features_) return;
+    is_place_chosen_by_features_ =
+        share_probability_by_features(places_, [&](const RankedMatch& match) {
+          if (match.verified_features) return match.verified_features;
+          const auto there = localiser_.features_(match.match.view);
+          return there ? std::optional(match_features(*features_, *there).verified) : std::nullopt;
+        });
+    if (is_place_chosen_by_features_) move_chosen_place_first();
+  }
+
+  void move_chosen_place_first() {
+    for (const PlaceShare& place : places_) {
+      for (const RankedMatch& match : place.matches) {
+        *std::ranges::find(ranked_, match.match.view, view_of) = match;
+      }
+    }
+    const std::vector<RankedMatch>& chosen = places_.front().matches;
+    std::ranges::stable_partition(ranked_, [&](const RankedMatch& r) {
+      return std::ranges::find(chosen, r.match.view, view_of) != chosen.end();
+    });
+  }
+
   /// Lists the matches with the heading relative to each, by the visual compass.
   void list_matches() {
-    if (options_.reranked_views == 0) {
-      std::ranges::sort(ranked_, {}, [](const RankedMatch& r) {
-        return std::pair(r.match.dissimilarity, r.match.view);
-      });
-    }
     for (const RankedMatch& r : ranked_) {
       if (static_cast<int>(place_.matches.size()) == options_.top) break;
       place_.matches.push_back(describe_match(r));
@@ -326,24 +362,33 @@ class Localiser::Query {
             reading ? std::optional(reading->heading_rad) : std::nullopt};
   }
 
-  /// Interpolates between references [M04 footnote 1], and shares the probability with places that
-  /// the image does not exclude.
+  /// Interpolates between references [M04 footnote 1], and lists the places that the image does not
+  /// exclude. If features had to decide, the views of the other places are no references, even if
+  /// they are near.
   void estimate_pose() {
-    place_.position = interpolate(ranked_);
+    std::vector<RankedMatch> matches = ranked_;
+    if (is_place_chosen_by_features_) {
+      for (const PlaceShare& other : std::span(places_).subspan(1)) {
+        std::erase_if(matches, [&](const RankedMatch& r) {
+          return std::ranges::find(other.matches, r.match.view, view_of) != other.matches.end();
+        });
+      }
+    }
+    place_.position = interpolate(matches);
     place_.heading_rad = estimate_heading(*compared_->memory, place_.matches);
     if (place_.position && options_.reranked_views > 0 && !is_ranked_by_features_) {
       move_nearest_first(*compared_->memory,
                          {place_.position->position(), floor_of(place_.matches.front().name)},
                          place_.matches);
     }
-    if (place_.position) find_alternatives();
+    if (place_.position && !places_.empty()) list_alternatives();
   }
 
   [[nodiscard]] std::optional<PositionEstimate> interpolate(
       std::span<const RankedMatch> matches) const {
     const PositionModel& model = localiser_.position_model_;
     auto found = interpolate_position(compared_->ranking, model, *compared_->layout, matches,
-                                      mask_.excluded_views);
+                                      mask_.excluded_views, is_place_chosen_by_features_);
     // If only local features recognise the place, the position is no more precise than the
     // neighbourhood.
     if (is_known_by_columns_ || !found) return found;
@@ -354,12 +399,18 @@ class Localiser::Query {
     return found;
   }
 
-  void find_alternatives() {
-    const std::vector<PlaceShare> places = share_probability(
-        compared_->ranking, compared_->support, localiser_.position_model_,
-        ColumnProfiles(view_, options_.components), ranked_, mask_.excluded_views);
-    place_.probability = places.front().share * place_.known_probability;
-    for (const PlaceShare& place : std::span(places).subspan(1)) {
+  void list_alternatives() {
+    place_.probability = places_.front().share * place_.known_probability;
+    std::vector<OtherPlace> others;
+    for (const PlaceShare& place : std::span(places_).subspan(1)) {
+      auto position = interpolate(place.matches);
+      const std::string_view name = compared_->memory->info(place.matches.front().match.view).name;
+      if (position && floor_of(name) == floor_of(place_.matches.front().name)) {
+        others.push_back({distance(position->position(), place_.position->position()) +
+                              position->radius_m.value_or(0.0),
+                          place.share});
+      }
+      if (place.share < min_named_share || place_.alternatives.size() == max_alternatives) continue;
       std::vector<PlaceMatch> matches;
       for (const RankedMatch& match : place.matches) {
         if (matches.size() == nearest_reference_count) break;
@@ -367,8 +418,13 @@ class Localiser::Query {
       }
       const auto heading_rad = estimate_heading(*compared_->memory, matches);
       place_.alternatives.push_back({matches.front(), place.share * place_.known_probability,
-                                     interpolate(place.matches), heading_rad});
+                                     std::move(position), heading_rad});
     }
+    const auto widen = [&](double& bound_m) {
+      bound_m = std::max(bound_m, radius_over_places(bound_m, places_.front().share, others));
+    };
+    if (auto& radius_m = place_.position->radius_m) widen(*radius_m);
+    if (auto& along_route = place_.position->along_route) widen(along_route->within_m);
   }
 
   [[nodiscard]] std::optional<LocalFeatures> compute_features(Handedness handedness) const {
@@ -388,6 +444,8 @@ class Localiser::Query {
   std::optional<LocalFeatures> features_;  // of the query, not mirrored
   bool is_ranked_by_features_ = false;
   bool is_known_by_columns_ = false;
+  std::vector<PlaceShare> places_;  // the chosen one first; empty: unknown place or no position
+  bool is_place_chosen_by_features_ = false;
   Place place_;
 };
 

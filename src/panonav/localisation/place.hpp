@@ -111,13 +111,12 @@ struct AlternativePlace {
 struct Place {
   PlaceEvidence evidence;          ///< from which `known_probability` was computed
   double known_probability = 0.0;  ///< probability that the place is in the memory
-  /// Probability that the query was taken at the chosen place: `known_probability`, less what the
-  /// alternatives get.
+  /// Probability that the query was taken at the chosen place: `known_probability`, less what all
+  /// other places get, also those that are too improbable to be named.
   double probability = 0.0;
-  /// Other places that the query's image does not exclude, most probable first
-  /// (`share_probability`), such as the opposite side of a symmetric hall. Empty if the place is
-  /// unknown or its views have no positions. Bounds of positions hold if the query was taken at
-  /// that place.
+  /// Up to three other places that have a share of at least `min_named_share`, most probable first,
+  /// such as the opposite side of a symmetric hall. Empty if the place is unknown or its views have
+  /// no positions. Their bounds of positions hold if the query was taken at that place.
   std::vector<AlternativePlace> alternatives;
   bool known = false;  ///< `known_probability` is at least 0.5; matches are listed anyway
   /// Matches: the chosen place and its neighbours first, then all others, each group ascending by
@@ -127,7 +126,8 @@ struct Place {
   std::vector<PlaceMatch> matches;
   /// Position interpolated between references; nullopt if the place is unknown or the nearest view
   /// has no pose. If only local features recognise the place, its bound is at least the radius of
-  /// the interpolation's neighbourhood (`PositionModel`).
+  /// the interpolation's neighbourhood (`PositionModel`). Its radius contains the true position
+  /// even if the query was taken at another place of the same floor (`radius_over_places`).
   std::optional<PositionEstimate> position;
   /// Heading of the robot in the frame of the positions, in [-pi, pi); nullopt if the place is
   /// unknown or none of the four nearest views has a heading.

@@ -100,11 +100,9 @@ std::optional<std::array<double, bound_term_count>> bound_terms(const PositionMo
   return {{1.0, std::log(distance_spacings + noise_spacings), std::log(error_spacings)}};
 }
 
-std::optional<PositionEstimate> interpolate_position(const ColumnRanking& ranking,
-                                                     const PositionModel& model,
-                                                     const ReferenceLayout& layout,
-                                                     std::span<const RankedMatch> matches,
-                                                     std::span<const ViewId> excluded) {
+std::optional<PositionEstimate> interpolate_position(
+    const ColumnRanking& ranking, const PositionModel& model, const ReferenceLayout& layout,
+    std::span<const RankedMatch> matches, std::span<const ViewId> excluded, bool is_place_certain) {
   if (matches.empty()) return std::nullopt;
   const auto nearest = find_position(ranking.memory().info(matches[0].match.view));
   if (!nearest) return std::nullopt;
@@ -122,8 +120,8 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
   estimate.y_m = kriged.position.y_m;
   const LocalLayout local = layout.around(*nearest, excluded);
   const double difference = matches[0].columns.difference;
-  const bool is_ambiguous =
-      model.ambiguous_from && ratio_to_elsewhere(near, model.spacing_m) >= *model.ambiguous_from;
+  const bool is_ambiguous = !is_place_certain && model.ambiguous_from &&
+                            ratio_to_elsewhere(near, model.spacing_m) >= *model.ambiguous_from;
   const double min_bound_m = is_ambiguous ? model.ambiguous_radius_m : 0.0;
   if (const auto radius_m = find_radius_m(model, local.kind, difference, kriged.variance))
     estimate.radius_m = std::max(*radius_m, min_bound_m);

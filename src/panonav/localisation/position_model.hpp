@@ -81,10 +81,11 @@ inline constexpr int bound_term_count = 3;
 /// Radius: where views surround the best match, from the kriging variance (`area_error_ratio`);
 /// elsewhere the distance beyond which 95 % of the views differ more than the query from it.
 /// `layout`: of the memory. `matches`: best first; only posed ones near the first count.
-/// `excluded`: not part of the layout. nullopt if the best match has no pose. Cost: 240 comparisons
-/// of columns, 0.7 ms.
+/// `excluded`: not part of the layout. `is_place_certain`: ignore `ambiguous_from`. nullopt if the
+/// best match has no pose. Cost: 240 comparisons of columns, 0.7 ms.
 [[nodiscard]] std::optional<PositionEstimate> interpolate_position(
     const ColumnRanking& ranking, const PositionModel& model, const ReferenceLayout& layout,
-    std::span<const RankedMatch> matches, std::span<const ViewId> excluded = {});
+    std::span<const RankedMatch> matches, std::span<const ViewId> excluded = {},
+    bool is_place_certain = false);
 
 }  // namespace panonav
