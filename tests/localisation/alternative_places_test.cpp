@@ -10,6 +10,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/localiser.hpp"
+#include "panonav/localisation/monte_carlo.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/skips.hpp"
 
@@ -139,6 +140,42 @@ TEST(AlternativePlaces, AreNamedWhereTheyAreNearButTurned) {
   ASSERT_GE(known, 25);
   EXPECT_GE(named, 0.9 * known);
   EXPECT_GE(within, 0.9 * known);
+}
+
+// With a model that tells places hardly apart, the particles stay where they are.
+TEST(AlternativePlaces, ATrackedPoseIsDoubtedWhereTheImageFitsAnotherPlaceBetter) {
+  const RememberedRoom place(31, {5.0, 4.0, 4, 0.15}, 0.4);
+  auto ranking = std::make_shared<const ColumnRanking>(place.memory);
+  ObservationModel model = learn_observation_model(*ranking, {.sampled_views = 8});
+  model.sharpness *= 1e-3;
+  const auto see = [&](const Pose2& pose, double noise_deviation) {
+    return pack(compute_signature(place.room.see(pose, 16, 96, {1.0, noise_deviation}, 7)),
+                place.memory.full_scale());
+  };
+  const auto view_pose = [&](std::size_t i) {
+    const ReferencePose pose = *place.memory.info(place.memory.views()[i]).pose;
+    return Pose2{pose.x_m, pose.y_m, *pose.heading_rad};
+  };
+  const Pose2 here = view_pose(0);
+  const Pose2 there = view_pose(place.memory.size() - 1);
+  ASSERT_GE(distance(here.position(), there.position()), 3.0);
+  MonteCarloLocaliser filter(ranking, model);
+  filter.start_at(here, 0.05, 0.05);
+  const auto before = filter.observe(see(here, 0.01));
+  ASSERT_EQ(before.state, LocalisationState::localised);
+  EXPECT_GE(before.probability, 0.9);
+  // Carried elsewhere without a motion of the odometry.
+  for (int i = 0; i < 3; ++i) {
+    const auto after = filter.observe(see(there, 0.01));
+    ASSERT_TRUE(after.position);
+    ASSERT_LE(distance(*after.position, here.position()), 0.5) << "else the test shows nothing";
+    EXPECT_NE(after.state, LocalisationState::localised);
+    EXPECT_LE(after.probability, 0.5);
+  }
+  // An image that shows no place at all is no evidence against the tracked one.
+  const auto noise = filter.observe(see(here, 5.0));
+  EXPECT_GE(noise.difference_anywhere.value(), model.explained_difference);
+  EXPECT_EQ(noise.state, LocalisationState::localised);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/alternative_places.hpp"
 #include "panonav/localisation/internal/explained_injection.hpp"
 #include "panonav/localisation/internal/particle_motion.hpp"
 #include "panonav/localisation/internal/particle_weighing.hpp"
@@ -87,6 +88,8 @@ struct MonteCarloLocaliser::Implementation {
   PositionError error;
   bool is_uninformed = true;            // no image since a start without a known pose
   double p_inside = p_inside_at_start;  // probability that the robot is in the memorised area
+  // Probability by the last image that the robot is at the heaviest mode, not carried elsewhere.
+  double p_explained_here = 1.0;
   MonteCarloEstimate latest;
 
   Implementation(std::unique_ptr<ComparedViews> views, const ObservationModel& model_,
@@ -114,6 +117,7 @@ struct MonteCarloLocaliser::Implementation {
   void restart(bool is_known) {
     error = {};
     p_inside = is_known ? 1.0 - p_leave : p_inside_at_start;
+    p_explained_here = 1.0;
     is_uninformed = !is_known;
     latest = {};
   }
@@ -138,6 +142,7 @@ struct MonteCarloLocaliser::Implementation {
     latest.particles = static_cast<int>(particles.size());
     latest.effective_particles = effective_sample_size(particles.weight);
     update_error(before, after, exponent, correlation);
+    update_explained_here(after);
     fill_estimate(latest, after);
     resample_if_needed(after.occupied_bins);  // [Fox 2003]
     likelihood.release();
@@ -255,6 +260,23 @@ struct MonteCarloLocaliser::Implementation {
     p_inside = p_inside * ratio / (p_inside * ratio + 1.0 - p_inside);
   }
 
+  /// A carried robot keeps its particles until views at the new place outweigh them. Meanwhile the
+  /// image fits the heaviest mode worse than another place, which doubts the estimate: by the odds
+  /// with which places share the probability of one image (`share_probability`). An image that fits
+  /// no place, such as one with people in view, is no evidence.
+  void update_explained_here(const ParticleModes& found) {
+    p_explained_here = 1.0;
+    if (found.modes.empty() || !latest.difference_anywhere) return;
+    const double anywhere = std::max(*latest.difference_anywhere, min_shared_difference);
+    if (anywhere > model.explained_difference) return;
+    const auto sites = likelihood.sites_near(found.modes.front().mean.position());
+    likelihood.compare(sites);
+    const double here = std::max(likelihood.min_difference(sites).value_or(anywhere), anywhere);
+    const double log_ratio = share_exponent * std::log(here / anywhere);
+    // The weights of the particles account for the prior.
+    p_explained_here = (1.0 - kidnap_probability(p_kidnap, log_ratio, 0.0)) / (1.0 - p_kidnap);
+  }
+
   void update_error(const ParticleModes& before, const ParticleModes& after, double exponent,
                     double correlation) {
     if (after.modes.empty()) return;
@@ -276,10 +298,10 @@ struct MonteCarloLocaliser::Implementation {
     return modes;
   }
 
-  /// True if the first mode has almost all the weight and is no wider than the references'
-  /// resolution.
+  /// True if the first mode has almost all the weight, also by the last image alone, and is no
+  /// wider than the references' resolution.
   [[nodiscard]] bool is_certain(const std::vector<PoseMode>& modes) const {
-    return !modes.empty() && modes.front().weight >= min_localised_weight &&
+    return !modes.empty() && modes.front().weight * p_explained_here >= min_localised_weight &&
            modes.front().spread_m <= std::max(model.spacing_m, model.range_m);
   }
 
@@ -287,7 +309,8 @@ struct MonteCarloLocaliser::Implementation {
     estimate.modes = correct_modes(found.modes);
     estimate.spread_m = position_spread_m(particles);
     estimate.p_inside = p_inside;
-    estimate.probability = found.modes.empty() ? 0.0 : p_inside * found.modes.front().weight;
+    const double p_here = p_inside * p_explained_here;
+    estimate.probability = found.modes.empty() ? 0.0 : p_here * found.modes.front().weight;
     estimate.state = LocalisationState::lost;
     if (p_inside < min_p_inside) return;
     if (!found.modes.empty() && !is_in_memorised_area(found.modes.front().mean.position())) return;
@@ -305,7 +328,7 @@ struct MonteCarloLocaliser::Implementation {
     estimate.modes = std::move(by_position);
     estimate.pose.reset();
     estimate.position = estimate.modes.front().mean.position();
-    estimate.probability = p_inside * estimate.modes.front().weight;
+    estimate.probability = p_here * estimate.modes.front().weight;
   }
 
   void resample_if_needed(std::size_t occupied_bins) {
@@ -327,44 +350,6 @@ struct MonteCarloLocaliser::Implementation {
     });
   }
 };
-
-void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
-  using T = MonteCarloOptions;
-  constexpr OptionTable table{
-      option<&T::min_particles>("smallest number of particles", 1, 1e7),
-      option<&T::max_particles>("largest number of particles", 1, 1e7),
-      option<&T::kld_error>(
-          "allowed error of the particles' distribution; a smaller error needs more particles",
-          1e-4, 1),
-      option<&T::resample_below>("effective sample size below which particles are resampled, as a "
-                                 "share of the number of particles",
-                                 0, 1),
-      option<&T::compass>(
-          "weight particles also by the agreement of their heading with the visual compass"),
-      choice<&T::injection>("positions at which new particles are added; explained: where the "
-                            "image fits; none: no new particles",
-                            "none", "explained"),
-      option<&T::reranked_views>(
-          "if no near view matches the image, compare this number of views column by column", 0,
-          1e6),
-      option<&T::seed>("seed of all random choices", 0),
-  };
-  table.visit(options, visitor);
-}
-
-std::string_view to_string(LocalisationState state) {
-  switch (state) {
-    case LocalisationState::localised:
-      return "localised";
-    case LocalisationState::position_known:
-      return "position_known";
-    case LocalisationState::ambiguous:
-      return "ambiguous";
-    case LocalisationState::lost:
-      break;
-  }
-  return "lost";
-}
 
 MonteCarloLocaliser::MonteCarloLocaliser(const VisualMemory& memory,
                                          const MonteCarloOptions& options,

@@ -73,9 +73,9 @@ struct MonteCarloEstimate {
   double log_ratio_here = 0.0;
   double log_ratio_anywhere = 0.0;  ///< the same over all places (only `Injection::explained`)
   double p_inside = 0.0;            ///< probability of being in the memorised area; lost if < 0.5
-  /// Probability that the robot is at the heaviest mode: `p_inside` times the mode's weight. Of
-  /// estimates with at least 0.9 inside the memorised area, more than 90 % are right
-  /// (docs/decisions.md).
+  /// Probability that the robot is at the heaviest mode: `p_inside` times the mode's weight, less
+  /// if the last image fits another place better. Of estimates with at least 0.9 inside the
+  /// memorised area, more than 90 % are right (docs/decisions.md).
   double probability = 0.0;
   std::uint64_t views_compared = 0;  ///< column by column
   /// Returns the floor of the heaviest mode; empty without modes, or if the floor has no name.
