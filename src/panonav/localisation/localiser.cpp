@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -11,6 +12,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/alternative_places.hpp"
+#include "panonav/localisation/internal/heading_interpolation.hpp"
+#include "panonav/localisation/internal/query_restoration.hpp"
+#include "panonav/localisation/internal/query_views.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
 #include "panonav/memory/floors.hpp"
 #include "panonav/signature/compass.hpp"
@@ -40,9 +44,8 @@ std::optional<LocalFeatures> mask_rows(std::optional<LocalFeatures> features,
   return features;
 }
 
-/// Number of best matches whose headings are averaged, and of which the nearest is listed first: a
-/// grid square has four corners.
-constexpr std::size_t nearest_reference_count = 4;
+/// Largest number of matches that are blurred and compared with a query out of focus.
+constexpr std::size_t blurred_candidates = 64;
 
 /// Half width of the compass's search window: the rotation by columns is exact to one column.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
@@ -55,33 +58,6 @@ constexpr std::size_t max_alternatives = 3;
 
 ViewId view_of(const RankedMatch& match) {
   return match.match.view;
-}
-
-// Returns the weighted mean of the robot's headings relative to the best references. The weight is
-// the inverse fourth power of the column difference, because the compass's error grows with the
-// square of the difference. Ignores headings far from that of the best match, which are outliers of
-// the compass.
-std::optional<double> estimate_heading(const VisualMemory& memory,
-                                       std::span<const PlaceMatch> matches) {
-  constexpr double agreement_rad = radians(15.0);  // three times the compass's typical error
-  constexpr double min_difference = 1e-2;          // below it all weights are equal
-  std::optional<double> centre_rad;
-  double sum = 0.0;
-  double weights = 0.0;
-  for (const PlaceMatch& match : matches.first(std::min(nearest_reference_count, matches.size()))) {
-    const auto& pose = memory.info(match.view).pose;
-    if (!pose || !pose->heading_rad || !match.heading_rad) continue;
-    if (floor_of(match.name) != floor_of(matches.front().name)) continue;
-    const double heading_rad = *pose->heading_rad + *match.heading_rad;
-    if (!centre_rad) centre_rad = heading_rad;
-    const double offset = angle_difference(heading_rad, *centre_rad);
-    if (std::abs(offset) > agreement_rad) continue;
-    const double weight = std::pow(std::max(min_difference, match.column_difference), -4.0);
-    sum += weight * offset;
-    weights += weight;
-  }
-  if (!centre_rad) return std::nullopt;
-  return wrap_angle(*centre_rad + sum / weights);
 }
 
 // Moves the best reference nearest to the interpolated position to the front. The position
@@ -103,61 +79,6 @@ std::vector<ViewId> to_ids(std::span<const RankedMatch> matches) {
   std::vector<ViewId> ids;
   for (const RankedMatch& match : matches) ids.push_back(match.match.view);
   return ids;
-}
-
-// Replaces overlapping rectangles by one that encloses both, until none overlap.
-std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) {
-  const auto overlap = [](const PositionBounds& a, const PositionBounds& b) {
-    return a.min_x_m <= b.max_x_m && b.min_x_m <= a.max_x_m && a.min_y_m <= b.max_y_m &&
-           b.min_y_m <= a.max_y_m;
-  };
-  for (std::size_t i = 0; i < boxes.size();) {
-    const auto other =
-        std::find_if(boxes.begin() + static_cast<std::ptrdiff_t>(i) + 1, boxes.end(),
-                     [&](const PositionBounds& box) { return overlap(boxes[i], box); });
-    if (other == boxes.end()) {
-      ++i;
-      continue;
-    }
-    boxes[i] = {
-        std::min(boxes[i].min_x_m, other->min_x_m), std::max(boxes[i].max_x_m, other->max_x_m),
-        std::min(boxes[i].min_y_m, other->min_y_m), std::max(boxes[i].max_y_m, other->max_y_m)};
-    boxes.erase(other);
-    i = 0;
-  }
-  return boxes;
-}
-
-// Returns rectangles around the references that may support one of the matches
-// (`NeighbourSupport`) or belong to its layout. `spacing_m`: of the references with headings.
-std::vector<PositionBounds> bound_neighbours(const VisualMemory& memory,
-                                             std::span<const RankedMatch> ranked, double spacing_m,
-                                             double position_spacing_m) {
-  std::vector<PositionBounds> boxes;
-  const double radius_m =
-      std::max(NeighbourSupport::radius_m(spacing_m), ReferenceLayout::reach_m(position_spacing_m));
-  if (!(radius_m > 0.0)) return boxes;
-  for (const RankedMatch& match :
-       ranked.first(std::min(ranked.size(), NeighbourSupport::max_examined))) {
-    const auto& pose = memory.info(match.match.view).pose;
-    if (!pose) continue;
-    boxes.push_back(
-        {pose->x_m - radius_m, pose->x_m + radius_m, pose->y_m - radius_m, pose->y_m + radius_m});
-  }
-  return join_overlapping(std::move(boxes));
-}
-
-VisualMemory join_memories(const VisualMemory& part, const VisualMemory& sampled) {
-  VisualMemory all(part.shape(), part.full_scale(), part.elevations());
-  std::vector<ViewId> views;
-  std::ranges::set_union(part.views(), sampled.views(), std::back_inserter(views));
-  for (const ViewId view : views) {
-    const VisualMemory& from = part.contains(view) ? part : sampled;
-    // Meanwhile, another user may have reused the name for another view.
-    if (all.find(from.info(view).name)) continue;
-    all.append_with_id(view, from.packed(view), from.info(view));
-  }
-  return all;
 }
 
 }  // namespace
@@ -185,12 +106,13 @@ struct Localiser::ComparedViews {
 /// The evaluation of one query.
 class Localiser::Query {
  public:
-  Query(const Localiser& localiser, ViewIndex& index, const PackedSignature& view,
-        const SearchMask& mask, const QueryFeatures& features)
+  Query(const Localiser& localiser, ViewIndex& index, RestoredQuery query, const SearchMask& mask,
+        const QueryFeatures& features)
       : localiser_(localiser),
         options_(localiser.options_),
         index_(index),
-        view_(view),
+        restored_(std::move(query)),
+        view_(restored_.signature),
         mask_(mask),
         make_features_(features),
         compared_(localiser.held_.get()) {
@@ -215,6 +137,16 @@ class Localiser::Query {
     list_matches();                     // headings by the visual compass
     if (place_.known) estimate_pose();  // [M04 footnote 1]
     return std::move(place_);
+  }
+
+  /// After `answer`: returns the query with its tilt removed, or to be compared with blurred views
+  /// (`restore_query`), unless columns leave no doubt that the place is known.
+  [[nodiscard]] std::vector<RestoredQuery> restore() const {
+    if (options_.reranked_views == 0 || options_.components != 0 || !mask_.allowed_rows.empty() ||
+        compared_ == nullptr || is_known_without_doubt_) {
+      return {};
+    }
+    return restore_query(restored_, *compared_->memory, ranked_);
   }
 
  private:
@@ -249,19 +181,36 @@ class Localiser::Query {
                   .rank(view_, found.matches, mask_.allowed_rows);
   }
 
-  /// Loads the views that this query needs from a memory that is not held in RAM: the candidates,
-  /// the references that may support them, and the sampled views for chance.
+  /// Loads the views that this query needs from a memory that is not held in RAM, or blurs those of
+  /// one that is: the candidates, the references that may support them, and the sampled views for
+  /// chance.
   void load_compared_views() {
-    if (compared_ != nullptr) return;
+    const bool is_blurred = restored_.blur_rad > 0.0;
+    if (compared_ != nullptr && !is_blurred) return;
+    const VisualMemory& found = compared_ != nullptr ? *compared_->memory : *loaded_;
+    const double spacing_m =
+        compared_ != nullptr ? compared_->support.spacing_m() : localiser_.spacing_m_;
+    if (is_blurred) {
+      const auto kept =
+          std::max<std::size_t>(static_cast<std::size_t>(options_.top), blurred_candidates);
+      if (ranked_.size() > kept) ranked_.resize(kept);
+    }
     std::vector<ViewId> views = to_ids(ranked_);
     views.insert(views.end(), mask_.excluded_views.begin(), mask_.excluded_views.end());
-    const auto around = index_.views_within(bound_neighbours(
-        *loaded_, ranked_, localiser_.spacing_m_, localiser_.position_model_.spacing_m));
+    const auto around = index_.views_within(
+        bound_neighbours(found, ranked_, spacing_m, localiser_.position_model_.spacing_m));
     views.insert(views.end(), around.begin(), around.end());
-    loaded_.emplace(join_memories(index_.load(views), *localiser_.sampled_));
-    loaded_views_.emplace(*loaded_, options_, std::optional(localiser_.spacing_m_), index_.size());
+    std::optional<VisualMemory> drawn;
+    if (!localiser_.sampled_) drawn = index_.load(sample_reference_views(found.views()));
+    loaded_.emplace(join_memories(index_.load(views), drawn ? *drawn : *localiser_.sampled_));
+    if (is_blurred) loaded_.emplace(blur_views(*loaded_, restored_.blur_rad));
+    loaded_views_.emplace(*loaded_, options_, std::optional(spacing_m), index_.size());
     loaded_views_->layout.emplace(*loaded_, localiser_.position_model_.spacing_m);
     compared_ = &*loaded_views_;
+    if (!is_blurred) return;
+    std::vector<Match> matches;
+    for (const RankedMatch& match : ranked_) matches.push_back(match.match);
+    ranked_ = compared_->ranking.rank(view_, matches);
   }
 
   void collect_column_evidence() {
@@ -280,11 +229,15 @@ class Localiser::Query {
       rank_by_verified_features(*features_, localiser_.features_, ranked_);
   }
 
-  /// Adds evidence of features only where columns are inconclusive (a sequential test).
+  /// Adds evidence of features only where columns are inconclusive (a sequential test). Those of an
+  /// image out of focus are none: the model was learnt from features of sharp images, of which a
+  /// blurred one of the same place has few.
   void estimate_known_probability() {
     place_.known_probability = place_probability(place_.evidence);
     is_known_by_columns_ = is_known();
-    if (make_features_ && localiser_.features_ && is_inconclusive(place_.evidence)) {
+    is_known_without_doubt_ = is_known_by_columns_ && !is_inconclusive(place_.evidence);
+    if (make_features_ && localiser_.features_ && restored_.blur_rad == 0.0 &&
+        is_inconclusive(place_.evidence)) {
       if (!features_) features_ = compute_features(Handedness::original);
       const auto mirrored = compute_features(Handedness::mirrored);
       if (features_ && mirrored) {
@@ -375,7 +328,7 @@ class Localiser::Query {
       }
     }
     place_.position = interpolate(matches);
-    place_.heading_rad = estimate_heading(*compared_->memory, place_.matches);
+    place_.heading_rad = interpolate_heading(*compared_->memory, place_.matches, place_.position);
     if (place_.position && options_.reranked_views > 0 && !is_ranked_by_features_) {
       move_nearest_first(*compared_->memory,
                          {place_.position->position(), floor_of(place_.matches.front().name)},
@@ -416,7 +369,7 @@ class Localiser::Query {
         if (matches.size() == nearest_reference_count) break;
         matches.push_back(describe_match(match));
       }
-      const auto heading_rad = estimate_heading(*compared_->memory, matches);
+      const auto heading_rad = interpolate_heading(*compared_->memory, matches, position);
       place_.alternatives.push_back({matches.front(), place.share * place_.known_probability,
                                      std::move(position), heading_rad});
     }
@@ -428,13 +381,18 @@ class Localiser::Query {
   }
 
   [[nodiscard]] std::optional<LocalFeatures> compute_features(Handedness handedness) const {
-    return mask_rows(make_features_(handedness), mask_.allowed_rows);
+    auto features = mask_rows(make_features_(handedness), mask_.allowed_rows);
+    if (!features || restored_.tilt == Tilt{}) return features;
+    const double sign = handedness == Handedness::original ? 1.0 : -1.0;
+    return level_features(*std::move(features),
+                          {sign * restored_.tilt.roll_rad, restored_.tilt.pitch_rad});
   }
 
   const Localiser& localiser_;
   const LocaliserOptions& options_;
   ViewIndex& index_;
-  const PackedSignature& view_;
+  RestoredQuery restored_;
+  const PackedSignature& view_;  // of `restored_`
   const SearchMask& mask_;
   const QueryFeatures& make_features_;
   const ComparedViews* compared_;       // null before `load_compared_views` if not held
@@ -446,6 +404,7 @@ class Localiser::Query {
   bool is_known_by_columns_ = false;
   std::vector<PlaceShare> places_;  // the chosen one first; empty: unknown place or no position
   bool is_place_chosen_by_features_ = false;
+  bool is_known_without_doubt_ = false;  // by columns
   Place place_;
 };
 
@@ -493,7 +452,21 @@ Place Localiser::localise(const PackedSignature& query, const SearchMask& mask,
 
 Place Localiser::localise(ViewIndex& index, const PackedSignature& query, const SearchMask& mask,
                           const QueryFeatures& features) const {
-  return Query(*this, index, query, mask, features).answer();
+  Query as_taken(*this, index, {query}, mask, features);
+  Place place = as_taken.answer();
+  constexpr std::size_t max_attempts = 3;  // without the tilt, blurred, and both
+  std::vector<RestoredQuery> pending = as_taken.restore();
+  for (std::size_t i = 0; i < std::min(pending.size(), max_attempts); ++i) {
+    const RestoredQuery restored = pending[i];
+    Query attempt(*this, index, restored, mask, features);
+    Place found = attempt.answer();
+    found.bytes_read += place.bytes_read;
+    found.views_compared += place.views_compared;
+    if (found.known && (!place.known || found.probability >= place.probability)) return found;
+    if (place.known) break;
+    if (restored.blur_rad == 0.0) std::ranges::move(attempt.restore(), std::back_inserter(pending));
+  }
+  return place;
 }
 
 }  // namespace panonav

@@ -51,16 +51,16 @@ class Localiser {
   [[nodiscard]] const PositionModel& position_model() const noexcept { return position_model_; }
 
   /// Localises one query:
-  /// 1. The exact search finds the views of smallest dissimilarity.
-  /// 2. Comparing columns orders up to `reranked_views` of them.
-  /// 3. References around each decide between places that look alike (`NeighbourSupport`).
+  /// 1. The search finds the views of smallest dissimilarity.
+  /// 2. Columns order up to `reranked_views` of them.
+  /// 3. Neighbours decide between similar places (`NeighbourSupport`).
   /// 4. The visual compass gives the heading relative to each match.
-  /// 5. The models decide whether the place is known, and give the position between references
-  ///    [M04 footnote 1] and the absolute heading.
+  /// 5. The models decide if the place is known, and give position [M04 footnote 1] and heading.
+  /// 6. Where columns leave doubt, the query is tried without its tilt, and with blurred views.
   ///
-  /// `features` computes the local features of the query on demand; if empty, none are used. Throws
-  /// ContractError on a query of another shape, and if the memory is not held in RAM. Cost: a
-  /// search and 0.2 ms; if no near view matches, a second search and 3 ms for 1000 views.
+  /// `features` computes local features of the query on demand; empty: none. Throws ContractError
+  /// on a query of another shape, and if the memory is not held. Cost: a search and 0.2 ms; without
+  /// near match 3 ms for 1000 views; in doubt 5 ms and 20 ms an attempt.
   [[nodiscard]] Place localise(const PackedSignature& query, const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
   /// Localises by searching `index`. If the memory is not held in RAM, loads only the views found
