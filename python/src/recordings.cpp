@@ -331,7 +331,7 @@ void bind_memorising(py::module_& m) {
         InterruptibleExecutor executor(threads);
         Memoriser memoriser(memory, options);
         memoriser.recognise_renamed(dataset);
-        DatasetObservations observations(dataset, executor);
+        DatasetObservations observations(dataset, executor, PictureColours::grey);
         std::vector<Observation> batch;
         const auto add = [&] {
           if (!batch.empty()) memoriser.add(std::move(batch), executor);

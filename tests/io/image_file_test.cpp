@@ -100,6 +100,31 @@ TEST_F(ImageFile, JpegIsNearTheSource) {
   }
 }
 
+TEST_F(ImageFile, GreyIsThatOfTheColoursUpToRounding) {
+  Random random(3);
+  const auto path = folder / "picture";
+  const Image noise = random_image(random, 37, 20, 3);
+  write_png(path, noise.view());
+  EXPECT_EQ(read_grey_image(path), to_grey(noise.view()));
+  for (const int channels : {1, 3}) {
+    for (const bool progressive : {false, true}) {
+      write_file(path, make_jpeg(smooth_image(61, 35, channels), 95, progressive));
+      const Image colours = read_image(path);
+      ASSERT_EQ(colours.channels(), channels);
+      const Image expected = to_grey(colours.view());
+      const Image grey = read_grey_image(path);
+      ASSERT_EQ(grey.size(), expected.size());
+      ASSERT_EQ(grey.channels(), 1);
+      for (std::size_t i = 0; i < expected.pixels().size(); ++i) {
+        ASSERT_NEAR(grey.pixels()[i], expected.pixels()[i], 1) << i;
+      }
+      EXPECT_GT(std::ranges::max(grey.pixels()), 200) << "a flat image would prove nothing";
+    }
+  }
+  write_file(path, std::string_view("no image"));
+  EXPECT_THROW((void)read_grey_image(path), FileError);
+}
+
 std::vector<Bytes> sample_files(Random& random) {
   const Image noise = random_image(random, 40, 30, 1);
   const Image smooth = smooth_image(40, 30, 3);

@@ -106,6 +106,18 @@ TEST(PanoramaFromPicture, TakesColourAsGrey) {
   for (auto& value : colour.pixels()) value = static_cast<std::uint8_t>(random.index(256));
   const Image grey = to_grey(colour.view());
   EXPECT_EQ(panorama_from_picture(colour.view(), {}), panorama_from_picture(grey.view(), {}));
+  Image sphere(64, 32, 3);
+  for (auto& value : sphere.pixels()) value = static_cast<std::uint8_t>(random.index(256));
+  const Image grey_sphere = to_grey(sphere.view());
+  const ElevationBand full{-std::numbers::pi / 2, std::numbers::pi / 2};
+  for (const ElevationBand kept : {full, ElevationBand{-0.5, 0.7}, ElevationBand{0.8, full.top_rad},
+                                   ElevationBand{full.bottom_rad, -1.2}}) {
+    const PictureLayout layout{.elevations = full, .kept_elevations = kept};
+    for (const PanoramaShape shape : {PanoramaShape{}, PanoramaShape{5, 20}}) {
+      EXPECT_EQ(panorama_from_picture(sphere.view(), layout, shape),
+                panorama_from_picture(grey_sphere.view(), layout, shape));
+    }
+  }
 }
 
 TEST(PanoramaFromPicture, RefusesBadLayouts) {

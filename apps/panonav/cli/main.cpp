@@ -16,6 +16,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/storage/memory_scheme.hpp"
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace {
 
@@ -44,6 +47,16 @@ class LeftOutWarnings {
   LeftOutWarnings& operator=(const LeftOutWarnings&) = delete;
 };
 
+/// Lets the C library keep up to 32 MB of freed memory for the next image. By default it returns
+/// the memory of a large image to the system, and each of its pages costs a page fault again.
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  constexpr int max_kept_bytes = 32 << 20;  // the largest that the library accepts
+  mallopt(M_MMAP_THRESHOLD, max_kept_bytes);
+  mallopt(M_TRIM_THRESHOLD, max_kept_bytes);
+#endif
+}
+
 ExitCode run(std::string_view& verb, std::span<const std::string> words) {
   panonav::command::register_components();
   const auto verbs = panonav::command::all_verbs();
@@ -67,6 +80,7 @@ int main(int argc, char** argv) {
   // Ignores the signal for file size limits, so that such a write fails with a message instead of
   // killing the process.
   std::signal(SIGXFSZ, SIG_IGN);
+  keep_freed_memory();
   std::string_view verb;
   try {
     const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);

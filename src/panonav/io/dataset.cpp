@@ -420,6 +420,12 @@ Image read_picture(const DatasetEntry& entry) {
   return entry.store ? entry.store->read(entry.store_index) : read_image(entry.path);
 }
 
+Image read_grey_picture(const DatasetEntry& entry) {
+  if (!entry.store) return read_grey_image(entry.path);
+  Image picture = entry.store->read(entry.store_index);
+  return picture.channels() == 1 ? std::move(picture) : to_grey(picture.view());
+}
+
 std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry) {
   if (!entry.store) return read_encoded_image(entry.path);
   if (auto encoded = entry.store->encoded(entry.store_index)) return std::move(*encoded);

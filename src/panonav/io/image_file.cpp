@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -44,6 +45,15 @@ Image decode_image(Bytes bytes, std::string_view name, const ImageLimits& limits
 Image read_image(const std::filesystem::path& path, const ImageLimits& limits) {
   const auto bytes = read_file(path, image_limit_bytes);
   return decode_image(bytes, path.string(), limits);
+}
+
+Image read_grey_image(const std::filesystem::path& path, const ImageLimits& limits) {
+  const auto bytes = read_file(path, image_limit_bytes);
+  const std::string name = path.string();
+  Image image = image_format(bytes, name) == ImageFormat::png
+                    ? detail::decode_png(bytes, name, limits)
+                    : detail::decode_jpeg(bytes, name, limits, detail::JpegColours::luma);
+  return image.channels() == 1 ? std::move(image) : to_grey(image.view());
 }
 
 GreyLevels read_grey_levels(const std::filesystem::path& path, const ImageLimits& limits) {

@@ -27,6 +27,10 @@ struct ImageLimits {
 /// file is missing, of another format, damaged, cut short or beyond the limits; no content can make
 /// it crash.
 [[nodiscard]] Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
+/// Reads a picture in grey. Of a JPEG, only the luma is decoded; it differs from `to_grey` of the
+/// colours by rounding. Throws as `read_image`.
+[[nodiscard]] Image read_grey_image(const std::filesystem::path& path,
+                                    const ImageLimits& limits = {});
 
 /// Grey levels of a picture with 16 bits each.
 struct GreyLevels {

@@ -10,6 +10,27 @@
 
 namespace panonav {
 
+namespace {
+
+// Returns the index of the match that `rank_by_verified_features` puts first. Ends each comparison
+// as soon as it cannot change the result.
+std::size_t find_most_verified(const LocalFeatures& query, const FeatureSource& features,
+                               std::span<const RankedMatch> ranked) {
+  std::size_t found = 0;
+  int most_verified = 0;
+  for (std::size_t i = 0; i < std::min<std::size_t>(verified_candidates, ranked.size()); ++i) {
+    const auto there = features(ranked[i].match.view);
+    if (!there) continue;
+    const int verified = match_features(query, *there, most_verified).verified;
+    if (verified <= most_verified) continue;
+    most_verified = verified;
+    found = i;
+  }
+  return found;
+}
+
+}  // namespace
+
 void rank_by_verified_features(const LocalFeatures& query, const FeatureSource& features,
                                std::vector<RankedMatch>& ranked) {
   const auto end = ranked.begin() + static_cast<std::ptrdiff_t>(
@@ -77,12 +98,11 @@ FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupp
     std::vector<RankedMatch> ranked = ranking.rank(query, found.matches);
     if (ranked.empty()) continue;
     support.rank_by_support(ColumnProfiles(query, ranking.components()), ranked, excluded);
-    const auto is_right = [&] {
-      return distance_to(ranked[0].match.view) <= right_ratio * nearest;
+    const auto is_right = [&](std::size_t match) {
+      return distance_to(ranked[match].match.view) <= right_ratio * nearest;
     };
-    const bool by_columns = is_right();
-    rank_by_verified_features(*own, features, ranked);
-    const bool by_features = is_right();
+    const bool by_columns = is_right(0);
+    const bool by_features = is_right(find_most_verified(*own, features, ranked));
     ++trial.sampled_views;
     trial.columns_right += by_columns ? 1 : 0;
     trial.features_right += by_features ? 1 : 0;

@@ -7,8 +7,8 @@
 #include <limits>
 #include <memory>
 #include <numbers>
-#include <optional>
 #include <span>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -16,7 +16,6 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/voronoi.hpp"
-#include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/sample.hpp"
 #include "panonav/memory/view_index.hpp"
 
@@ -71,23 +70,20 @@ std::vector<std::uint32_t> find_nearest_sites(std::span<const PosedView> sites, 
 class LeftOutView {
  public:
   LeftOutView(const ColumnRanking& ranking, std::span<const PosedView> sites, std::size_t own)
-      : ranking_(&ranking),
-        sites_(sites),
-        profiles_(ranking.profiles(sites[own].id)),
-        matches_(sites.size()) {}
+      : ranking_(&ranking), sites_(sites), profiles_(ranking.profiles(sites[own].id)) {}
 
   const ColumnMatch& match(std::size_t site) {
-    if (!matches_[site]) {
-      matches_[site] = match_columns(*profiles_, *ranking_->profiles(sites_[site].id));
-    }
-    return *matches_[site];
+    const auto found = matches_.find(site);
+    if (found != matches_.end()) return found->second;
+    const ColumnMatch compared = match_columns(*profiles_, *ranking_->profiles(sites_[site].id));
+    return matches_.emplace(site, compared).first->second;
   }
 
  private:
   const ColumnRanking* ranking_;
   std::span<const PosedView> sites_;
   std::shared_ptr<const ColumnProfiles> profiles_;
-  std::vector<std::optional<ColumnMatch>> matches_;
+  std::unordered_map<std::size_t, ColumnMatch> matches_;  // by site; of few of many sites
 };
 
 // Returns the similarity of two views; negative if they differ more than distant views do on
@@ -295,10 +291,19 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
                                          const LearningOptions& options) {
   validate(options);
   constexpr int max_place_samples = 40;  // the default of `learn_place_model`
-  LearningSample sample(ranking, options);
-  const PlaceModel place = learn_place_model(
+  return learn_observation_model_with_places(
       ranking,
-      {.sampled_views = std::min(options.sampled_views, max_place_samples), .seed = options.seed});
+      learn_place_model(ranking,
+                        {.sampled_views = std::min(options.sampled_views, max_place_samples),
+                         .seed = options.seed}),
+      options);
+}
+
+ObservationModel learn_observation_model_with_places(const ColumnRanking& ranking,
+                                                     const PlaceModel& place,
+                                                     const LearningOptions& options) {
+  validate(options);
+  LearningSample sample(ranking, options);
   ObservationModel model;
   model.spacing_m = sample.spacing_m();
   model.explained_difference = place.threshold;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/sample.hpp"
 
 namespace panonav {
@@ -40,5 +41,8 @@ struct ObservationModel {
 /// plus a place model.
 [[nodiscard]] ObservationModel learn_observation_model(const ColumnRanking& ranking,
                                                        const LearningOptions& options = {});
+/// Learns the same with a place model that was learnt from the same views.
+[[nodiscard]] ObservationModel learn_observation_model_with_places(
+    const ColumnRanking& ranking, const PlaceModel& place, const LearningOptions& options = {});
 
 }  // namespace panonav

@@ -87,11 +87,17 @@ Image to_picture(const Panorama& panorama) {
   const int columns = panorama.columns();
   Image picture(columns, panorama.rows());
   for (int y = 0; y < panorama.rows(); ++y) {
-    for (int u = 0; u < columns; ++u) {
-      const int column = (columns / 2 - u + columns) % columns;
-      const float value = std::clamp(panorama.at(y, column), 0.0F, 1.0F);
-      picture.at(u, y) = static_cast<std::uint8_t>(std::lround(value * 255.0F));
-    }
+    const std::span<const float> row = panorama.row(y);
+    std::uint8_t* const to = &picture.at(0, y);
+    const auto fill = [&](int begin, int end, int first_column) {
+      for (int u = begin; u < end; ++u) {
+        const float value = std::clamp(row[first_column - (u - begin)], 0.0F, 1.0F) * 255.0F;
+        to[u] = static_cast<std::uint8_t>(static_cast<int>(static_cast<double>(value) + 0.5));
+      }
+    };
+    const int turned = columns / 2 + 1;  // columns from the forward direction to column 0
+    fill(0, std::min(turned, columns), columns / 2);
+    fill(turned, columns, columns - 1);
   }
   return picture;
 }

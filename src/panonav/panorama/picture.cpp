@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -68,41 +70,83 @@ void validate_layout(const PictureLayout& layout) {
   }
 }
 
+/// New samples of a row, with all weights in one list.
+class RowSamples {
+ public:
+  RowSamples(int width, const PictureLayout& layout, int columns) : width_(width) {
+    const double column_step = static_cast<double>(width) / columns;
+    const double sign = layout.direction == ColumnDirection::clockwise ? -1.0 : 1.0;
+    for (int c = 0; c < columns; ++c) {
+      const Sample sample =
+          make_sample(layout.forward_column * width + sign * c * column_step - 0.5, column_step);
+      first_.push_back((sample.first % width + width) % width);
+      weights_.insert(weights_.end(), sample.weights.begin(), sample.weights.end());
+      end_.push_back(weights_.size());
+      max_count_ = std::max(max_count_, sample.weights.size());
+    }
+  }
+  /// Values that a line needs: those of the picture, then the first ones again.
+  [[nodiscard]] std::size_t line_size() const {
+    return static_cast<std::size_t>(width_) + max_count_;
+  }
+  void wrap(std::span<float> line) const {
+    for (auto u = static_cast<std::size_t>(width_); u < line.size(); ++u) {
+      line[u] = line[u - static_cast<std::size_t>(width_)];
+    }
+  }
+  /// Sums the samples of a wrapped line.
+  void sample(std::span<const float> line, std::span<float> values) const {
+    std::size_t weight = 0;
+    for (std::size_t c = 0; c < values.size(); ++c) {
+      float sum = 0.0F;
+      const float* from = line.data() + first_[c];
+      for (; weight < end_[c]; ++weight) sum += weights_[weight] * *from++;
+      values[c] = std::clamp(sum * (1.0F / 255.0F), 0.0F, 1.0F);
+    }
+  }
+
+ private:
+  int width_;
+  std::vector<int> first_;
+  std::vector<std::size_t> end_;
+  std::vector<float> weights_;
+  std::size_t max_count_ = 0;
+};
+
 // Resamples the picture to `shape`, from height `top` (fraction from the upper edge) in steps of
 // `row_step` old rows. Each row is interpolated vertically before its columns. Rows beyond the
-// picture repeat its edge.
+// picture repeat its edge. Colours are converted to grey only in rows that are used.
 std::vector<float> sample_grey(ImageView picture, const PictureLayout& layout, double top,
                                double row_step, PanoramaShape shape) {
-  const double column_step = static_cast<double>(picture.width) / shape.columns;
-  const double sign = layout.direction == ColumnDirection::clockwise ? -1.0 : 1.0;
-  std::vector<Sample> column_samples;
-  for (int c = 0; c < shape.columns; ++c) {
-    Sample sample = make_sample(
-        layout.forward_column * picture.width + sign * c * column_step - 0.5, column_step);
-    sample.first = (sample.first % picture.width + picture.width) % picture.width;
-    column_samples.push_back(std::move(sample));
-  }
-  std::vector<float> values(static_cast<std::size_t>(shape.rows) * shape.columns);
-  std::vector<float> line(static_cast<std::size_t>(picture.width));
+  const RowSamples row_samples(picture.width, layout, shape.columns);
+  std::vector<Sample> samples;
   for (int y = 0; y < shape.rows; ++y) {
-    const Sample row_sample =
-        make_sample(top * picture.height + (y + 0.5) * row_step - 0.5, row_step);
+    samples.push_back(make_sample(top * picture.height + (y + 0.5) * row_step - 0.5, row_step));
+  }
+  const auto clamp_row = [&](int v) { return std::clamp(v, 0, picture.height - 1); };
+  const int first_row = clamp_row(samples.front().first);
+  Image grey(1, 1);
+  if (picture.channels != 1) {
+    const Sample& last = samples.back();
+    const int last_row = clamp_row(last.first + static_cast<int>(last.weights.size()) - 1);
+    grey = to_grey({picture.data + first_row * picture.stride, picture.width,
+                    last_row - first_row + 1, picture.channels, picture.stride});
+  }
+  const auto row_data = [&](int v) {
+    return picture.channels == 1 ? picture.data + v * picture.stride : &grey.at(0, v - first_row);
+  };
+  std::vector<float> values(static_cast<std::size_t>(shape.rows) * shape.columns);
+  std::vector<float> line(row_samples.line_size());
+  for (int y = 0; y < shape.rows; ++y) {
+    const Sample& row_sample = samples[static_cast<std::size_t>(y)];
     std::fill(line.begin(), line.end(), 0.0F);
     for (std::size_t i = 0; i < row_sample.weights.size(); ++i) {
-      const int v = std::clamp(row_sample.first + static_cast<int>(i), 0, picture.height - 1);
-      const std::uint8_t* from = picture.data + v * picture.stride;
+      const std::uint8_t* from = row_data(clamp_row(row_sample.first + static_cast<int>(i)));
       for (int u = 0; u < picture.width; ++u) line[u] += row_sample.weights[i] * from[u];
     }
-    for (int c = 0; c < shape.columns; ++c) {
-      float sum = 0.0F;
-      int u = column_samples[c].first;
-      for (const float weight : column_samples[c].weights) {
-        sum += weight * line[u];
-        if (++u == picture.width) u = 0;
-      }
-      values[static_cast<std::size_t>(y) * shape.columns + c] =
-          std::clamp(sum * (1.0F / 255.0F), 0.0F, 1.0F);
-    }
+    row_samples.wrap(line);
+    row_samples.sample(line, std::span(values).subspan(static_cast<std::size_t>(y) * shape.columns,
+                                                       static_cast<std::size_t>(shape.columns)));
   }
   return values;
 }
@@ -132,11 +176,6 @@ Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
   const double kept_rows = (bottom - top) * picture.height;
   if (shape.rows == 0) shape.rows = std::max(1, static_cast<int>(std::lround(kept_rows)));
   if (shape.columns == 0) shape.columns = picture.width;
-  Image grey_copy(1, 1);
-  if (picture.channels != 1) {
-    grey_copy = to_grey(picture);
-    picture = grey_copy.view();
-  }
   auto values = sample_grey(picture, layout, top, kept_rows / shape.rows, shape);
   return {shape.rows, shape.columns, band, std::move(values)};
 }

@@ -12,8 +12,9 @@
 
 namespace panonav {
 
-Observation read_observation(const DatasetEntry& entry) {
-  Observation observation(read_picture(entry));
+Observation read_observation(const DatasetEntry& entry, PictureColours colours) {
+  Observation observation(colours == PictureColours::grey ? read_grey_picture(entry)
+                                                          : read_picture(entry));
   observation.name = entry.file;
   observation.file = entry.path;
   observation.stamp_s = entry.stamp_s;
@@ -116,8 +117,9 @@ void leave_out_unusable_pictures(Dataset& dataset, Executor& executor, bool head
   require_usable_entries(dataset);
 }
 
-DatasetObservations::DatasetObservations(Dataset dataset, Executor& executor)
-    : dataset_(std::move(dataset)), executor_(&executor) {}
+DatasetObservations::DatasetObservations(Dataset dataset, Executor& executor,
+                                         PictureColours colours)
+    : dataset_(std::move(dataset)), executor_(&executor), colours_(colours) {}
 
 std::optional<Observation> DatasetObservations::next() {
   if (next_ == size()) return std::nullopt;
@@ -127,7 +129,7 @@ std::optional<Observation> DatasetObservations::next() {
     decoded_.resize(std::min(decoded_ahead, size() - next_));
     executor_->for_each_chunk(decoded_.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
       try {
-        decoded_[i].observation = read_observation(dataset_.entries[first_decoded_ + i]);
+        decoded_[i].observation = read_observation(dataset_.entries[first_decoded_ + i], colours_);
       } catch (const Error&) {
         decoded_[i].failure = std::current_exception();
       }

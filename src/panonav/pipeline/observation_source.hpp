@@ -15,9 +15,16 @@
 
 namespace panonav {
 
+/// Colours in which a picture is read. Signatures, local features and thumbnails need only grey.
+enum class PictureColours {
+  stored,  ///< those of the file
+  grey     ///< grey levels; of a JPEG in less time (`read_grey_picture`)
+};
+
 /// Reads the picture of an entry, and returns it with the entry's data. Several threads may call it
 /// concurrently. Throws FileError on a picture that is missing or damaged.
-[[nodiscard]] Observation read_observation(const DatasetEntry& entry);
+[[nodiscard]] Observation read_observation(const DatasetEntry& entry,
+                                           PictureColours colours = PictureColours::stored);
 
 /// Returns the poses of all entries in the frame of the data set. If the data set has no headings,
 /// computes them from the path, as the tangent fitted to the positions within 0.3 m of path on each
@@ -92,7 +99,8 @@ class DatasetObservations final : public ObservationSource {
   static constexpr std::size_t decoded_ahead = 16;  ///< pictures held at most
 
   /// Takes all entries of a data set, in its order.
-  DatasetObservations(Dataset dataset, Executor& executor);
+  DatasetObservations(Dataset dataset, Executor& executor,
+                      PictureColours colours = PictureColours::stored);
 
   [[nodiscard]] const PictureSource& pictures() const noexcept override { return dataset_.source; }
   [[nodiscard]] std::optional<Observation> next() override;
@@ -106,6 +114,7 @@ class DatasetObservations final : public ObservationSource {
   };
   Dataset dataset_;
   Executor* executor_;
+  PictureColours colours_;
   std::size_t next_ = 0;
   std::size_t first_decoded_ = 0;
   std::vector<Decoded> decoded_;

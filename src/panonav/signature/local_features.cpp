@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <numbers>
 #include <span>
 #include <utility>
@@ -100,12 +103,15 @@ Grey compute_corner_strengths(const Grey& smooth) {
     const float* const above = smooth.row(y - 1);
     const float* const here = smooth.row(y);
     const float* const below = smooth.row(y + 1);
+    float* const xx_row = xx.row(y);
+    float* const xy_row = xy.row(y);
+    float* const yy_row = yy.row(y);
     for (int x = 0; x < columns; ++x) {
       const float along = here[x + 1] - here[x - 1];
       const float down = below[x] - above[x];
-      xx.row(y)[x] = along * along;
-      xy.row(y)[x] = along * down;
-      yy.row(y)[x] = down * down;
+      xx_row[x] = along * along;
+      xy_row[x] = along * down;
+      yy_row[x] = down * down;
     }
   }
   for (Grey* products : {&xx, &xy, &yy}) {
@@ -114,11 +120,15 @@ Grey compute_corner_strengths(const Grey& smooth) {
   }
   Grey strengths(rows, columns, 2, 2);
   for (int y = 0; y < rows; ++y) {
+    const float* const xx_row = xx.row(y);
+    const float* const xy_row = xy.row(y);
+    const float* const yy_row = yy.row(y);
+    float* const strength_row = strengths.row(y);
     for (int x = 0; x < columns; ++x) {
-      const float a = xx.row(y)[x];
-      const float b = xy.row(y)[x];
-      const float c = yy.row(y)[x];
-      strengths.row(y)[x] = 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
+      const float a = xx_row[x];
+      const float b = xy_row[x];
+      const float c = yy_row[x];
+      strength_row[x] = 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
     }
   }
   strengths.fill_padding();
@@ -147,13 +157,16 @@ std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row)
   // from 3 x 3 smoothing, 2 from differences over two pixels, 25 from the sum over 5 x 5 pixels.
   constexpr float min_strength = 25.0F * (2.0F * 9.0F) * (2.0F * 9.0F);
   const Grey strengths = compute_corner_strengths(smooth);
-  std::vector<Corner> all;  // by column
-  for (int x = 0; x < strengths.columns; ++x) {
-    for (int y = first_row; y < end_row; ++y) {
-      const float strength = strengths.row(y)[x];
-      if (strength > min_strength && is_corner(strengths, y, x)) all.push_back({x, y, strength});
+  std::vector<Corner> all;
+  for (int y = first_row; y < end_row; ++y) {
+    const float* const row = strengths.row(y);
+    for (int x = 0; x < strengths.columns; ++x) {
+      // Its neighbours in the row exclude most pixels.
+      if (!(row[x] > min_strength && row[x] > row[x - 1] && row[x] >= row[x + 1])) continue;
+      if (is_corner(strengths, y, x)) all.push_back({x, y, row[x]});
     }
   }
+  std::ranges::sort(all, {}, [](const Corner& c) { return std::pair(c.column, c.row); });
   const int columns = strengths.columns;
   const int window = static_cast<int>(window_half_width_rad / (2.0 * std::numbers::pi) * columns);
   std::vector<Corner> kept;
@@ -181,7 +194,8 @@ std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row)
 
 // Draws the pairs of points around a corner that a descriptor compares: normally distributed about
 // the corner, the same for every view [Calonder et al. 2010].
-std::array<std::array<int, 4>, descriptor_bits> sample_point_pairs(int rows, int columns) {
+using PointPairs = std::array<std::array<int, 4>, descriptor_bits>;
+PointPairs sample_point_pairs(int rows, int columns) {
   Random random(5);
   const auto draw_offset = [&](int radius) {
     double value = 0.0;
@@ -189,13 +203,25 @@ std::array<std::array<int, 4>, descriptor_bits> sample_point_pairs(int rows, int
     while (std::abs(value) > radius);
     return static_cast<int>(std::lround(value));
   };
-  std::array<std::array<int, 4>, descriptor_bits> pairs{};
+  PointPairs pairs{};
   for (auto& pair : pairs) {
     do {
       for (std::size_t i = 0; i < pair.size(); ++i)
         pair[i] = draw_offset(i % 2 == 0 ? columns : rows);
     } while (pair[0] == pair[2] && pair[1] == pair[3]);
   }
+  return pairs;
+}
+
+// Returns the pairs of these radii, which are drawn once: drawing takes a tenth of an extraction.
+std::shared_ptr<const PointPairs> get_or_sample_point_pairs(int rows, int columns) {
+  static std::mutex mutex;
+  static std::map<std::pair<int, int>, std::shared_ptr<const PointPairs>> drawn;
+  constexpr std::size_t max_drawn = 64;  // 4 kB each; a program uses one or two
+  const std::lock_guard lock(mutex);
+  if (drawn.size() >= max_drawn) drawn.clear();
+  auto& pairs = drawn[{rows, columns}];
+  if (!pairs) pairs = std::make_shared<const PointPairs>(sample_point_pairs(rows, columns));
   return pairs;
 }
 
@@ -338,10 +364,10 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
   const std::vector<Corner> corners =
       find_corners(smooth, std::max(margin_rows, preprocessing.masked_rows_top),
                    shape.rows - std::max(margin_rows, preprocessing.masked_rows_bottom));
-  const auto pairs = sample_point_pairs(radius_rows, radius_columns);
+  const auto pairs = get_or_sample_point_pairs(radius_rows, radius_columns);
   std::array<std::pair<std::ptrdiff_t, std::ptrdiff_t>, descriptor_bits> offsets;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const auto& [x0, y0, x1, y1] = pairs[i];
+  for (std::size_t i = 0; i < pairs->size(); ++i) {
+    const auto& [x0, y0, x1, y1] = (*pairs)[i];
     offsets[i] = {std::ptrdiff_t{y0} * smooth.stride + x0, std::ptrdiff_t{y1} * smooth.stride + x1};
   }
   for (const Corner& corner : corners) {

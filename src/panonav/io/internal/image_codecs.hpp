@@ -32,8 +32,11 @@ void check_image_size(ImageSize size, std::string_view name, const ImageLimits& 
                                  const ImageLimits& limits);
 [[nodiscard]] std::vector<std::uint8_t> encode_png(ImageView image);
 
+/// Colours of a decoded JPEG: all, or only the luma of one that stores it apart, in a third of the
+/// time. The luma is the grey level of `to_grey`, up to rounding.
+enum class JpegColours { all, luma };
 [[nodiscard]] Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
-                                const ImageLimits& limits);
+                                const ImageLimits& limits, JpegColours colours = JpegColours::all);
 /// Decodes at an eighth of the size, only to find damage. Returns the size of the upright picture.
 [[nodiscard]] ImageSize check_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
                                    const ImageLimits& limits);

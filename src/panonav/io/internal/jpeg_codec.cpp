@@ -81,10 +81,11 @@ bool try_open(Reader& reader, const std::uint8_t* data, std::size_t size) {
   return true;
 }
 
-bool start_steps(Reader& reader) {
+bool start_steps(Reader& reader, JpegColours colours) {
   if (setjmp(reader.on_failure)) return false;
-  reader.jpeg.out_color_space =
-      reader.jpeg.jpeg_color_space == JCS_GRAYSCALE ? JCS_GRAYSCALE : JCS_RGB;
+  const bool has_luma = reader.jpeg.jpeg_color_space == JCS_GRAYSCALE ||
+                        (colours == JpegColours::luma && reader.jpeg.jpeg_color_space == JCS_YCbCr);
+  reader.jpeg.out_color_space = has_luma ? JCS_GRAYSCALE : JCS_RGB;
   jpeg_start_decompress(&reader.jpeg);
   return true;
 }
@@ -228,7 +229,7 @@ ImageSize check_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
   reject_printing_colours(reader, name);
   reader.jpeg.scale_num = 1;
   reader.jpeg.scale_denom = 8;
-  if (!start_steps(reader)) fail(reader, name);
+  if (!start_steps(reader, JpegColours::all)) fail(reader, name);
   const std::size_t stride =
       static_cast<std::size_t>(reader.jpeg.output_width) * reader.jpeg.output_components;
   std::vector<std::uint8_t> pixels(stride * reader.jpeg.output_height);
@@ -237,11 +238,11 @@ ImageSize check_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
 }
 
 Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
-                  const ImageLimits& limits) {
+                  const ImageLimits& limits, JpegColours colours) {
   Reader reader;
   const ImageSize size = open(reader, bytes, name, limits);
   reject_printing_colours(reader, name);
-  if (!start_steps(reader)) fail(reader, name);
+  if (!start_steps(reader, colours)) fail(reader, name);
   const int channels = reader.jpeg.output_components;
   if (static_cast<int>(reader.jpeg.output_width) != size.width ||
       static_cast<int>(reader.jpeg.output_height) != size.height ||
