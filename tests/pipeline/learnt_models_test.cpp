@@ -1,11 +1,16 @@
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -115,6 +120,96 @@ TEST_F(KeptModels, OfOtherViewsAreNotUsed) {
   EXPECT_EQ(load_stored_models(file, file.load()).value(), learn_models(file.load()));
   file.set_parameter("learnt models", "1 nonsense");
   EXPECT_TRUE(outdated());
+}
+
+TEST_F(KeptModels, BelongToTheFirstViewsInTwoDigits) {
+  for (const auto& [views, learnt] :
+       std::initializer_list<std::pair<std::size_t, std::size_t>>{{0, 0},
+                                                                  {7, 7},
+                                                                  {99, 99},
+                                                                  {100, 100},
+                                                                  {109, 100},
+                                                                  {110, 110},
+                                                                  {1099, 1000},
+                                                                  {9999, 9900},
+                                                                  {10000, 10000},
+                                                                  {123456, 120000}}) {
+    EXPECT_EQ(count_learnt_views(views), learnt);
+  }
+}
+
+TEST_F(KeptModels, StayWhenOneMoreViewIsAdded) {
+  MemoryFile file = make_file(110);
+  learn_and_store_models(file);
+  const auto before = file.parameter("learnt models");
+  for (int i = 110; i < 119; ++i) file.append(view_at(i, 0.5 * (i % 8), 0.5 * (i / 8)));
+  EXPECT_TRUE(load_stored_models(file, file.load()));
+  learn_and_store_models(file);
+  EXPECT_EQ(file.parameter("learnt models"), before);
+  const ViewId view = file.append(view_at(119, 0.5 * (119 % 8), 0.5 * (119 / 8)));
+  EXPECT_FALSE(load_stored_models(file, file.load())) << "now they belong to 120 views";
+  learn_and_store_models(file);
+  EXPECT_NE(file.parameter("learnt models"), before);
+  EXPECT_EQ(load_stored_models(file, file.load()).value(), learn_models(file.load()));
+  file.remove(std::array{view});
+  learn_and_store_models(file);
+  EXPECT_EQ(file.parameter("learnt models"), before) << "those of the same views are the same";
+}
+
+TEST_F(KeptModels, DoNotDependOnTheStepsInWhichTheMemoryGrew) {
+  MemoryFile at_once = make_file(107);
+  learn_and_store_models(at_once);
+  const auto path_in_steps = folder_.path() / "steps.panonav";
+  MemoryFile in_steps = MemoryFile::create(path_in_steps, at_once.header());
+  for (int i = 0; i < 107; ++i) {
+    in_steps.append(view_at(i, 0.5 * (i % 8), 0.5 * (i / 8)));
+    if (i % 13 == 0 || i > 100) learn_and_store_models(in_steps);
+  }
+  EXPECT_EQ(in_steps.parameter("learnt models"), at_once.parameter("learnt models"));
+  ASSERT_TRUE(load_stored_models(at_once, at_once.load()));
+  Tracker tracker(at_once);
+  at_once.set_parameter("learnt models", "");
+  EXPECT_EQ(Tracker(at_once).localiser().model(), tracker.localiser().model());
+}
+
+TEST_F(KeptModels, DependOnFloorsButNotOnNames) {
+  MemoryFile file = make_file();
+  learn_and_store_models(file);
+  file.rename(ViewId{3}, "another name");
+  EXPECT_TRUE(load_stored_models(file, file.load()));
+  file.rename(ViewId{3}, "floor=attic/another name");
+  EXPECT_FALSE(load_stored_models(file, file.load()));
+}
+
+TEST_F(KeptModels, OfALargeMemoryAreLearntFromWholeAreas) {
+  constexpr int areas = 40;
+  constexpr int views_per_area = 700;
+  MemoryHeader header;
+  header.shape = {1, 2};
+  header.panorama_columns = 32;
+  MemoryFile file = MemoryFile::create(path(), header);
+  std::vector<NewView> views;
+  for (int i = 0; i < areas * views_per_area; ++i) {
+    NewView view;
+    const double x_m = 10.0 * (i / views_per_area) + 0.3 * (i % 28) + 0.1;
+    view.info = {std::to_string(i), ReferencePose{x_m, 0.3 * (i % views_per_area / 28), {}}, {}};
+    view.signature = {header.shape, {1, 2}, {3, 4}};
+    views.push_back(std::move(view));
+  }
+  file.append(views);
+  file.append(NewView{{"beside", ReferencePose{0.2, 0.1, {}}, {}}, views[0].signature, {}, {}});
+  const VisualMemory learnt = load_learnt_views(file, file.places());
+  EXPECT_LE(learnt.size(), max_learnt_views);
+  EXPECT_GT(learnt.size(), max_learnt_views - views_per_area);
+  EXPECT_FALSE(learnt.find("beside")) << "learns from the first 28,000";
+  std::vector<int> counts(areas);
+  for (const ViewId view : learnt.views()) ++counts[(view.value - 1) / views_per_area];
+  const auto whole = std::ranges::count(counts, views_per_area);
+  EXPECT_EQ(whole, 28) << "of 700 views each, up to 20,000 views";
+  EXPECT_EQ(std::ranges::count(counts, 0), areas - whole - 1) << "only the last one is cut";
+  const VisualMemory all = file.load();
+  const auto held = LearntViews(all).memory().views();
+  EXPECT_TRUE(std::ranges::equal(held, learnt.views()));
 }
 
 TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {

@@ -10,6 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/memory_map.hpp"
+#include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {
@@ -81,6 +82,24 @@ TEST_F(Memorising, InBatchesOfAnySizeTheSameViewsAreStored) {
       EXPECT_EQ(memories[m].info(view), memories[0].info(view));
     }
   }
+}
+
+TEST_F(Memorising, OneMoreViewReadsNoSignatureButItsNeighbours) {
+  constexpr int views = 100;
+  {
+    Memoriser memoriser(path(), options());
+    for (int i = 0; i < views; ++i) memoriser.add(seen_at(i));
+    memoriser.finish();
+  }
+  testing::run_sql(path(), "UPDATE views SET checksum = checksum + 1 WHERE id < 90");
+  {
+    const MemoryFile damaged = MemoryFile::open(path(), Access::read_only);
+    EXPECT_THROW((void)damaged.load(), FileError);
+  }
+  Memoriser memoriser(path());
+  memoriser.add(seen_at(views));
+  EXPECT_EQ(memoriser.finish().appended, 1U);
+  EXPECT_EQ(memoriser.file()->counts().views, views + 1U);
 }
 
 TEST_F(Memorising, GoesOnWhereItStoppedAndRefusesOtherViewsUnderKnownNames) {

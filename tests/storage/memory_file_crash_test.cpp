@@ -188,10 +188,10 @@ TEST_F(LogBesideAFile, OfAKilledWriterIsItsOwn) {
 
 // A writer may be killed while its log goes into the file, page by page.
 TEST_F(LogBesideAFile, IsItsOwnWhileItGoesIntoTheFile) {
-  append_and_die(path, 3, 200);
+  append_and_die(path, 3, 150);
   const std::string log = bytes_of(beside("-wal"));
   const std::string before = bytes_of(path);
-  { ASSERT_EQ(MemoryFile::open(path, Access::read_only).load().size(), 203U); }
+  { ASSERT_EQ(MemoryFile::open(path, Access::read_only).load().size(), 153U); }
   const std::string after = bytes_of(path);
   constexpr std::size_t page_bytes = 8192;
   ASSERT_GT(after.size(), before.size() + page_bytes);
@@ -203,7 +203,7 @@ TEST_F(LogBesideAFile, IsItsOwnWhileItGoesIntoTheFile) {
     folder.write("m.panonav-wal", log);
     std::filesystem::remove(beside("-shm"));
     const MemoryFile file = MemoryFile::open(path, Access::read_only);
-    ASSERT_EQ(file.load().size(), 203U) << written;
+    ASSERT_EQ(file.load().size(), 153U) << written;
     ASSERT_TRUE(file.verify().empty());
   }
 }
@@ -307,7 +307,7 @@ TEST_F(MemoryFileCrash, AFullDiskLosesNothing) {
   header.shape = {80, 15};
   header.panorama_columns = 512;
   { (void)MemoryFile::create(path, header); }
-  constexpr rlim_t limit_bytes = 450000;
+  constexpr rlim_t limit_bytes = 500000;
   const int appended = exit_code_of(start_child([&] {
     ::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{limit_bytes, limit_bytes};

@@ -9,6 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/mapping/topological_map.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
@@ -110,6 +111,8 @@ TEST_F(MemoryFileContent, ContentComesBack) {
   EXPECT_EQ(info.thumbnails, 13U);
   EXPECT_GT(info.file_bytes, 50 * 2 * header.shape.size());
   EXPECT_EQ(info.format_version, 1);
+  EXPECT_EQ(file.counts(), (MemoryFile::Counts{info.views, info.views_with_position,
+                                               info.views_with_heading, info.file_bytes}));
   std::uint64_t positions = 0;
   std::uint64_t headings = 0;
   for (const ViewId view : expected.views()) {
@@ -339,10 +342,120 @@ TEST_F(MemoryFileContent, LocalFeaturesAreKeptCheckedAndGoWithTheirView) {
     EXPECT_EQ(file.features(view), added.features);
     EXPECT_THROW((void)file.features(ViewId{99}), ContractError);
   }
-  run_sql(path, "UPDATE features SET features = zeroblob(72)");
+  run_sql(path, "UPDATE features SET bytes = zeroblob(72)");
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
   EXPECT_THROW((void)file.features(ViewId{2}), FileError);
   EXPECT_EQ(file.verify().size(), 1U);
+}
+
+TEST_F(MemoryFileContent, PlacesAreThoseOfTheViews) {
+  MemoryFile file = MemoryFile::create(path, small_header());
+  Random random(12);
+  std::vector<NewView> views;
+  for (int i = 0; i < 40; ++i) {
+    views.push_back(random_view(random, small_header().shape, i));
+    if (i % 5 == 1) views.back().info.name = "floor=ground/" + views.back().info.name;
+    if (i % 5 == 2) views.back().info.name = "floor=/" + views.back().info.name;
+    if (i % 5 == 3) views.back().info.name = "floor>" + views.back().info.name;
+  }
+  const std::vector<ViewId> ids = file.append(views);
+  const auto expect_places = [&] {
+    const VisualMemory memory = file.load();
+    std::vector<MemoryFile::ViewPlace> expected;
+    for (const ViewId view : memory.views()) {
+      const ReferenceInfo& info = memory.info(view);
+      expected.push_back({view, std::string(floor_of(info.name)), info.pose});
+    }
+    EXPECT_EQ(file.places(), expected);
+    EXPECT_EQ(file.counts().views, memory.size());
+  };
+  expect_places();
+  file.change(
+      [&] {
+        file.remove(std::vector{ids[0], ids[6], ids[39]});
+        file.set_pose(ids[3], ReferencePose{-4.0, 4.0, {}});
+        file.set_pose(ids[4], std::nullopt);
+        file.rename(ids[5], "floor=attic/view");
+      },
+      "changed");
+  expect_places();
+  EXPECT_EQ(file.places()[4].floor, "attic");
+  file.undo();
+  expect_places();
+  EXPECT_EQ(file.counts().views, 40U);
+}
+
+TEST_F(MemoryFileContent, ThumbnailsAndFeaturesOfAnySizeComeBack) {
+  MemoryFile file = MemoryFile::create(path, small_header());
+  Random random(13);
+  std::vector<NewView> views;
+  for (const std::size_t size : {1U, 599U, 600U, 601U, 1201U, 4292U, 300000U}) {
+    NewView view = random_view(random, small_header().shape, static_cast<int>(views.size()));
+    for (auto* bytes : {&view.thumbnail, &view.features}) {
+      bytes->resize(size);
+      for (auto& byte : *bytes) byte = static_cast<std::uint8_t>(random.index(256));
+    }
+    views.push_back(std::move(view));
+  }
+  const std::vector<ViewId> ids = file.append(views);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    EXPECT_EQ(file.thumbnail(ids[i]), views[i].thumbnail);
+    EXPECT_EQ(file.features(ids[i]), views[i].features);
+  }
+  EXPECT_EQ(file.views_with_thumbnail(), ids);
+  EXPECT_EQ(file.info().thumbnails, ids.size());
+  EXPECT_TRUE(file.verify().empty());
+  file.change([&] { file.remove(std::array{ids[5]}); }, "removed");
+  EXPECT_EQ(file.info().views_with_features, ids.size() - 1);
+  EXPECT_TRUE(file.verify().empty());
+  file.undo();
+  EXPECT_EQ(file.features(ids[5]), views[5].features);
+}
+
+TEST_F(MemoryFileContent, AViewTakesHardlyMoreThanItsContent) {
+  MemoryHeader header = small_header();
+  header.shape = {80, 15};
+  header.panorama_columns = 512;
+  constexpr std::uint64_t count = 500;
+  std::uint64_t content = 0;  // sizes of thumbnails and features vary as in recordings
+  {
+    MemoryFile file = MemoryFile::create(path, header);
+    Random random(14);
+    std::vector<NewView> views;
+    for (std::uint64_t i = 0; i < count; ++i) {
+      NewView view = random_view(random, header.shape, static_cast<int>(i));
+      view.info.pose = ReferencePose{random.uniform(-5.0, 5.0), random.uniform(-5.0, 5.0), 0.5};
+      view.thumbnail.assign(2000 + random.index(700), 7);
+      view.features.assign(36 * (100 + random.index(40)), 7);
+      content += 2 * header.shape.size() + view.thumbnail.size() + view.features.size();
+      views.push_back(std::move(view));
+    }
+    file.append(views);
+  }
+  const std::uint64_t bytes = MemoryFile::open(path, Access::read_only).counts().file_bytes;
+  constexpr std::uint64_t empty_bytes = 200'000;  // of a file without views
+  EXPECT_LT(static_cast<double>(bytes - empty_bytes), 1.12 * static_cast<double>(content));
+  EXPECT_LT((bytes - empty_bytes) / count, 10'000U);
+}
+
+TEST_F(MemoryFileContent, APartOfAThumbnailThatIsMissingIsDamage) {
+  NewView view = numbered_view(small_header().shape, 1);
+  view.thumbnail.assign(2000, 7);
+  int number = 0;
+  for (const char* sql :
+       {"DELETE FROM thumbnails WHERE part = 256", "DELETE FROM thumbnails WHERE part = 259",
+        "UPDATE thumbnails SET part = 265 WHERE part = 256",
+        "UPDATE thumbnails SET checksum = 1 WHERE part = 256"}) {
+    const auto file_path = folder / (std::to_string(number++) + ".panonav");
+    {
+      MemoryFile file = MemoryFile::create(file_path, small_header());
+      file.append(view);
+    }
+    run_sql(file_path, sql);
+    const MemoryFile file = MemoryFile::open(file_path, Access::read_only);
+    EXPECT_THROW((void)file.thumbnail(ViewId{1}), FileError) << sql;
+    EXPECT_EQ(file.verify().size(), 1U) << sql;
+  }
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ void require_stored_options(const Arguments& declared, const SignatureOptions& s
 }
 
 void print_views_without_position(const MemoryFile& memory, Session& session) {
-  const auto info = memory.info();
+  const auto info = memory.counts();
   const std::uint64_t without = info.views - info.views_with_position;
   if (without == 0 || info.views_with_position == 0 || has_positions_from_map(memory)) return;
   session.print(session.red(std::to_string(without) + " of " + format_count(info.views, "view") +

@@ -61,7 +61,7 @@ void memorise_missing(const Dataset& missing, const Dataset& recording,
   };
   note();
   Progress progress(session, "memorising", missing.entries.size());
-  DatasetObservations source(missing, session.executor());
+  DatasetObservations source(missing, session.executor(), PictureColours::grey);
   std::exception_ptr failure;
   std::size_t read = 0;  // entries of the recording
   while (!failure && read < recording.entries.size()) {
@@ -186,7 +186,7 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
       recording ? collect_orientation_evidence(*recording, memory) : OrientationEvidence{};
   const std::optional<OrientationFault> fault = orientation.find_fault();
   const std::size_t appended = counts.appended;
-  const auto info = memory.info();
+  const auto info = memory.counts();
   if (session.json()) {
     auto skipped_json = ordered_json::array();
     for (const Skipped& one : skipped) {

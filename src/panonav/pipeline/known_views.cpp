@@ -1,8 +1,10 @@
 #include "panonav/pipeline/known_views.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <iterator>
 #include <optional>
 #include <set>
@@ -55,74 +57,97 @@ bool is_known_recording(const MemoryFile& memory, const std::string& mark) {
   return std::ranges::find(marks, mark) != marks.end();
 }
 
+/// An entry of a recording and the view of its name.
+struct KnownEntry {
+  const DatasetEntry* entry;
+  ViewId view;
+};
+
+/// Calls `visit` for 32 entries at a time, with a memory of their views.
+void visit_batches(
+    const MemoryFile& memory, std::span<const KnownEntry> known,
+    const std::function<void(std::span<const KnownEntry>, const VisualMemory&)>& visit) {
+  constexpr std::size_t batch = 32;
+  for (; !known.empty(); known = known.subspan(std::min(batch, known.size()))) {
+    const auto entries = known.first(std::min(batch, known.size()));
+    std::set<ViewId> views;  // a name may occur twice
+    for (const KnownEntry& one : entries) views.insert(one.view);
+    visit(entries, memory.load(std::vector(views.begin(), views.end())));
+  }
+}
+
 }  // namespace
 
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
                        const std::function<void(std::size_t)>& compared,
                        const std::function<void(const DatasetEntry&, const Error&)>& unread) {
-  const VisualMemory views = memory.load();
-  std::vector<const DatasetEntry*> known;
+  std::vector<KnownEntry> known;
   for (const auto& entry : recording.entries) {
-    const auto view = views.find(entry.file);
-    if (!view) continue;
-    known.push_back(&entry);
-    const auto& info = views.info(*view);
-    // Accepts a pose that the recording does not have, as it may come from a map.
-    if ((entry.pose && info.pose != entry.pose) || info.stamp_s != entry.stamp_s) {
-      throw_different_view(memory.path(), entry.file,
-                           "a view with another pose or stamp under the name");
-    }
+    if (const auto view = memory.find(entry.file)) known.push_back({&entry, *view});
   }
+  visit_batches(memory, known, [&](std::span<const KnownEntry> entries, const VisualMemory& views) {
+    for (const auto& [entry, view] : entries) {
+      const auto& info = views.info(view);
+      // Accepts a pose that the recording does not have, as it may come from a map.
+      if ((entry->pose && info.pose != entry->pose) || info.stamp_s != entry->stamp_s) {
+        throw_different_view(memory.path(), entry->file,
+                             "a view with another pose or stamp under the name");
+      }
+    }
+  });
   if (known.empty() || is_known_recording(memory, compute_fingerprint(recording, memory))) return;
 
-  constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < known.size(); begin += batch) {
-    const std::size_t count = std::min(batch, known.size() - begin);
-    std::vector<std::optional<PackedSignature>> signatures(count);
-    std::vector<std::optional<FileError>> failures(count);
-    parallel_for(executor, count, [&](std::size_t i) {
+  visit_batches(memory, known, [&](std::span<const KnownEntry> entries, const VisualMemory& views) {
+    std::vector<std::optional<PackedSignature>> signatures(entries.size());
+    std::vector<std::optional<FileError>> failures(entries.size());
+    parallel_for(executor, entries.size(), [&](std::size_t i) {
       try {
-        signatures[i] = encoder.packed(read_observation(*known[begin + i]));
+        signatures[i] = encoder.packed(read_observation(*entries[i].entry, PictureColours::grey));
       } catch (const FileError& error) {
         failures[i] = error;
       }
     });
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto& entry = *known[begin + i];
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      const auto& [entry, view] = entries[i];
       if (failures[i]) {
         if (!unread) throw *failures[i];
-        unread(entry, *failures[i]);
+        unread(*entry, *failures[i]);
         continue;
       }
-      if (!is_same_picture(*signatures[i], views.packed(*views.find(entry.file)))) {
-        throw_different_view(memory.path(), entry.file, "another image under the name");
+      if (!is_same_picture(*signatures[i], views.packed(view))) {
+        throw_different_view(memory.path(), entry->file, "another image under the name");
       }
     }
-    if (compared) compared(count);
-  }
+    if (compared) compared(entries.size());
+  });
 }
 
 std::map<std::string, ViewId> find_renamed_views(const Dataset& recording, const MemoryFile& memory,
                                                  const ViewEncoder& encoder) {
-  const VisualMemory views = memory.load();
-  const std::span<const ViewId> ids = views.views();
   std::vector<std::optional<ViewId>> known;  // by entry
   std::set<ViewId> assigned;
   for (const DatasetEntry& entry : recording.entries) {
-    known.push_back(views.find(entry.file));
+    known.push_back(memory.find(entry.file));
     if (known.back()) assigned.insert(*known.back());
   }
   std::map<std::string, ViewId> renamed;
+  if (assigned.empty() || std::ranges::all_of(known, [](const auto& view) { return !!view; })) {
+    return renamed;
+  }
+  const std::vector<ViewId> ids = memory.views();
   const auto assign_if_same = [&](std::size_t i, ViewId view) {
+    if (assigned.contains(view)) return;
     const DatasetEntry& entry = recording.entries[i];
+    const VisualMemory views = memory.load(std::array{view});
     const ReferenceInfo& info = views.info(view);
-    if (assigned.contains(view) || (entry.pose && info.pose != entry.pose) ||
-        info.stamp_s != entry.stamp_s) {
+    if ((entry.pose && info.pose != entry.pose) || info.stamp_s != entry.stamp_s) {
       return;
     }
     try {
-      if (!is_same_picture(encoder.packed(read_observation(entry)), views.packed(view))) return;
+      if (!is_same_picture(encoder.packed(read_observation(entry, PictureColours::grey)),
+                           views.packed(view)))
+        return;
     } catch (const Error&) {
       return;  // is named and skipped when it is memorised
     }
@@ -144,6 +169,7 @@ std::map<std::string, ViewId> find_renamed_views(const Dataset& recording, const
 }
 
 void remember_recording(const Dataset& recording, MemoryFile& memory) {
+  if (recording.entries.size() < 2) return;  // comparing one image costs less than a mark for each
   const std::string mark = compute_fingerprint(recording, memory);
   if (is_known_recording(memory, mark)) return;
   const std::string before = memory.parameter(recordings_parameter).value_or("");

@@ -33,7 +33,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
                                                                const ViewEncoder& encoder);
 
 /// Stores in the memory that its views with names of this recording come from this recording, so
-/// that `check_known_views` need not compare images.
+/// that `check_known_views` need not compare images. Does nothing for a single image.
 void remember_recording(const Dataset& recording, MemoryFile& memory);
 
 /// Marks all recordings as unknown. Call it after removing views, since later views of the same

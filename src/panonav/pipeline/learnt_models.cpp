@@ -2,6 +2,10 @@
 
 #include <cmath>
 #include <concepts>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +14,7 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
 #include "panonav/memory/floors.hpp"
+#include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/storage/checksum.hpp"
 
@@ -20,7 +25,7 @@ namespace {
 constexpr const char* parameter_name = "learnt models";
 /// Version of the learning method; raised when its results change, so that older models are
 /// ignored.
-constexpr std::string_view learning_version = "6";
+constexpr std::string_view learning_version = "7";
 
 // Visits the members of each model in the order in which they are stored.
 template <class Model, class Visit>
@@ -103,36 +108,57 @@ class Reader {
   mutable bool ok_ = true;
 };
 
-/// Returns a hash of the views, their signatures and their poses.
-std::string compute_fingerprint(const VisualMemory& memory) {
-  RecordBytes scratch;
-  std::uint64_t hash = checksum({}, memory.shape().size());
-  for (const ViewId view : memory.views()) {
-    scratch.clear();
-    scratch.add(std::int64_t{view.value});
-    if (const auto& pose = memory.info(view).pose) {
-      if (const auto floor = floor_of(memory.info(view).name); !floor.empty()) scratch.add(floor);
-      scratch.add(pose->x_m);
-      scratch.add(pose->y_m);
-      if (pose->heading_rad) scratch.add(*pose->heading_rad);
+/// Fingerprint of the views from which models are learnt: their ids, floors and poses. Signatures
+/// are left out, as that of an id never changes.
+class Fingerprint {
+ public:
+  explicit Fingerprint(SignatureShape shape) : hash_(checksum({}, shape.size())) {}
+  void add(ViewId view, std::string_view floor, const std::optional<ReferencePose>& pose) {
+    record_.clear();
+    record_.add(std::int64_t{view.value});
+    if (pose) {
+      if (!floor.empty()) record_.add(floor);
+      record_.add(pose->x_m);
+      record_.add(pose->y_m);
+      if (pose->heading_rad) record_.add(*pose->heading_rad);
     }
-    const PackedSignature signature = memory.packed(view);
-    hash = checksum(scratch.bytes(), hash);
-    hash = checksum(signature.magnitudes, hash);
-    hash = checksum(signature.phases, hash);
+    hash_ = checksum(record_.bytes(), hash_);
   }
-  return to_hex_digits(hash);
+  [[nodiscard]] std::string text() const { return to_hex_digits(hash_); }
+
+ private:
+  RecordBytes record_;
+  std::uint64_t hash_;
+};
+
+std::string compute_fingerprint(const VisualMemory& memory) {
+  Fingerprint fingerprint(memory.shape());
+  for (const ViewId view : memory.views().first(count_learnt_views(memory.size()))) {
+    const ReferenceInfo& info = memory.info(view);
+    fingerprint.add(view, floor_of(info.name), info.pose);
+  }
+  return fingerprint.text();
 }
 
-/// Reads stored models; nullopt if there are none, or if they were not learnt from the views of
-/// `memory` (null: not checked).
-std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemory* memory) {
+std::string compute_fingerprint(SignatureShape shape,
+                                std::span<const MemoryFile::ViewPlace> places) {
+  Fingerprint fingerprint(shape);
+  for (const auto& place : places.first(count_learnt_views(places.size()))) {
+    fingerprint.add(place.view, place.floor, place.pose);
+  }
+  return fingerprint.text();
+}
+
+/// Reads stored models; nullopt if there are none, or if they were learnt from views of another
+/// fingerprint (nullopt: not checked).
+std::optional<LearntModels> read_models(const MemoryFile& file,
+                                        const std::optional<std::string>& fingerprint) {
   const auto text = file.parameter(parameter_name);
   if (!text) return std::nullopt;
   const Reader reader(*text);
   if (reader.word() != learning_version) return std::nullopt;
   const std::string views = reader.word();
-  if (memory != nullptr && views != compute_fingerprint(*memory)) return std::nullopt;
+  if (fingerprint && views != *fingerprint) return std::nullopt;
   LearntModels models;
   visit_members(models.place, reader);
   visit_members(models.position, reader);
@@ -142,6 +168,34 @@ std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemo
   reader(has_observation);
   if (has_observation) visit_members(models.observation.emplace(), reader);
   if (!reader.ok()) return std::nullopt;
+  return models;
+}
+
+/// Learns all models but the observation model from the views of the ranking.
+LearntModels learn_from(const ColumnRanking& ranking, const FeatureSource& features) {
+  const NeighbourSupport support(ranking);
+  return {learn_place_model(ranking), learn_position_model(ranking), support.spacing_m(),
+          std::nullopt,
+          features && evaluate_features(ranking, support, features).is_significantly_better()};
+}
+
+/// Returns a source that reads the features of each view only once; empty if `source` is.
+FeatureSource keep_read_features(const FeatureSource& source) {
+  if (!source) return {};
+  using Kept = std::map<ViewId, std::optional<LocalFeatures>>;
+  return [source, kept = std::make_shared<Kept>()](ViewId view) {
+    const auto found = kept->find(view);
+    return found != kept->end() ? found->second : kept->emplace(view, source(view)).first->second;
+  };
+}
+
+LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& features) {
+  const ColumnRanking ranking(memory);
+  LearntModels models = learn_from(ranking, features);
+  try {
+    models.observation = learn_observation_model_with_places(ranking, models.place);
+  } catch (const ContractError&) {  // nothing to learn from
+  }
   return models;
 }
 
@@ -164,29 +218,30 @@ FeatureSource make_feature_source(const MemoryFile& file) {
 
 LearntModels learn_place_models(const VisualMemory& memory, const FeatureSource& features,
                                 int components) {
-  const ColumnRanking ranking(memory, components);
-  const NeighbourSupport support(ranking);
-  return {learn_place_model(ranking), learn_position_model(ranking), support.spacing_m(),
-          std::nullopt,
-          features && evaluate_features(ranking, support, features).is_significantly_better()};
+  const LearntViews learnt(memory);
+  return learn_from(ColumnRanking(learnt.memory(), components), features);
+}
+
+ObservationModel learn_tracking_model(const VisualMemory& memory, const LearningOptions& options) {
+  const LearntViews learnt(memory);
+  return learn_observation_model(ColumnRanking(learnt.memory()), options);
 }
 
 LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features) {
-  LearntModels models = learn_place_models(memory, features, 0);
-  try {
-    models.observation = learn_observation_model(ColumnRanking(memory));
-  } catch (const ContractError&) {  // nothing to learn from
-  }
-  return models;
+  const LearntViews learnt(memory);
+  return learn_all_from(learnt.memory(), features);
 }
 
 void learn_and_store_models(MemoryFile& file) {
-  const VisualMemory memory = file.load();
-  if (memory.empty() || load_stored_models(file, memory)) return;
-  const LearntModels models = learn_models(memory, make_feature_source(file));
+  const std::vector<MemoryFile::ViewPlace> places = file.places();
+  if (places.empty()) return;
+  const std::string fingerprint = compute_fingerprint(file.header().shape, places);
+  if (read_models(file, fingerprint)) return;
+  const LearntModels models = learn_all_from(load_learnt_views(file, places),
+                                             keep_read_features(make_feature_source(file)));
   Writer writer;
   writer.word(learning_version);
-  writer.word(compute_fingerprint(memory));
+  writer.word(fingerprint);
   visit_members(models.place, writer);
   visit_members(models.position, writer);
   writer(models.spacing_m);
@@ -197,11 +252,11 @@ void learn_and_store_models(MemoryFile& file) {
 }
 
 std::optional<LearntModels> load_stored_models(const MemoryFile& file, const VisualMemory& memory) {
-  return read_models(file, &memory);
+  return read_models(file, compute_fingerprint(memory));
 }
 
 std::optional<LearntModels> load_stored_models(const MemoryFile& file) {
-  return read_models(file, nullptr);
+  return read_models(file, std::nullopt);
 }
 
 }  // namespace panonav

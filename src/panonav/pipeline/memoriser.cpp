@@ -95,7 +95,8 @@ MemoryHeader make_header_from_recording(const Dataset& recording, const Signatur
   std::vector<Observation> first;
   std::exception_ptr failure;
   process_in_order(
-      count, executor, [&](std::size_t i) { return read_observation(recording.entries[i]); },
+      count, executor,
+      [&](std::size_t i) { return read_observation(recording.entries[i], PictureColours::grey); },
       [&](std::size_t, Observation&& observation) { first.push_back(std::move(observation)); },
       [&](std::size_t, const std::exception_ptr& error) { failure = error; });
   if (first.empty() && failure) std::rethrow_exception(failure);

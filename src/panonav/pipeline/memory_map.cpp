@@ -401,12 +401,12 @@ void require_known_elevations(const PictureSource& source, const std::string& in
 
 std::optional<MemoryMap> map_views(MemoryFile& memory, const std::map<std::string, Pose2>& odometry,
                                    Executor& executor, const std::function<void()>& mapped) {
-  const VisualMemory views = memory.load();
-  const auto has_pose = [&](ViewId view) { return views.info(view).pose.has_value(); };
-  if (views.size() < 2 || views.shape().components < 3 ||
-      (!has_positions_from_map(memory) && std::ranges::any_of(views.views(), has_pose))) {
+  const MemoryFile::Counts counts = memory.counts();
+  if (counts.views < 2 || memory.header().shape.components < 3 ||
+      (!has_positions_from_map(memory) && counts.views_with_position > 0)) {
     return std::nullopt;
   }
+  const VisualMemory views = memory.load();
   auto unordered = find_unordered_views(memory, views, odometry);
   const bool has_walk = unordered.size() < views.size();
   if (!has_walk) unordered.clear();

@@ -82,7 +82,7 @@ ObservationModel load_or_learn_model(const MemoryFile& file, const ColumnRanking
   const auto models = load_stored_models(file, memory);
   if (models && models->observation) return *models->observation;
   try {
-    return learn_observation_model(ranking);
+    return learn_tracking_model(memory);
   } catch (const ContractError& error) {  // the views are all in one place
     throw FileError(file.path().string(), error.what());
   }

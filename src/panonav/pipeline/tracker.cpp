@@ -55,7 +55,9 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& m
                 options.odometry.value_or(OdometryNoise{})};
       }
     }
-    return MonteCarloLocaliser(memory, options.filter, options.odometry.value_or(OdometryNoise{}));
+    return {std::make_shared<const ColumnRanking>(memory),
+            learn_tracking_model(memory, {.seed = options.filter.seed}), options.filter,
+            options.odometry.value_or(OdometryNoise{})};
   } catch (const ContractError& error) {  // the views are all in one place
     throw FileError(file.path().string(), error.what());
   }

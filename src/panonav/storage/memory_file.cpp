@@ -446,6 +446,14 @@ std::vector<ViewId> MemoryFile::views_within(const PositionBounds& bounds) const
   return views;
 }
 
+std::vector<MemoryFile::ViewPlace> MemoryFile::places() const {
+  return implementation_->read([](MemoryTables& tables) { return tables.places(); });
+}
+
+MemoryFile::Counts MemoryFile::counts() const {
+  return implementation_->read([](MemoryTables& tables) { return tables.counts(); });
+}
+
 std::vector<Link> MemoryFile::links() const {
   return implementation_->read([](MemoryTables& tables) {
     std::vector<Link> links;

@@ -76,6 +76,21 @@ class MemoryFile {
     bool undoable = false;          ///< false: too old, only its description is kept
     friend bool operator==(const KeptChange&, const KeptChange&) = default;
   };
+  /// Floor and pose of a view.
+  struct ViewPlace {
+    ViewId view;                        ///< its id
+    std::string floor;                  ///< `floor_of` its name
+    std::optional<ReferencePose> pose;  ///< nullopt: unknown
+    friend bool operator==(const ViewPlace&, const ViewPlace&) = default;
+  };
+  /// Numbers of views.
+  struct Counts {
+    std::uint64_t views = 0;                ///< reference views
+    std::uint64_t views_with_position = 0;  ///< of these, with x and y
+    std::uint64_t views_with_heading = 0;   ///< of these, with a heading
+    std::uint64_t file_bytes = 0;           ///< including the write-ahead log
+    friend bool operator==(const Counts&, const Counts&) = default;
+  };
   /// Counts and sizes.
   struct Info {
     std::uint64_t views = 0;                ///< reference views
@@ -222,6 +237,11 @@ class MemoryFile {
   /// Returns the views whose positions are within these bounds (inclusive), ascending. Servers use
   /// an index of positions; of a file all views are read.
   [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) const;
+  /// Returns where all views were taken, ascending. A file reads its indexes, not the signatures:
+  /// 100,000 views take about 40 ms.
+  [[nodiscard]] std::vector<ViewPlace> places() const;
+  /// Returns the numbers of views, at a cost as `places`; on a server as `info`.
+  [[nodiscard]] Counts counts() const;
   /// Returns all links, ascending.
   [[nodiscard]] std::vector<Link> links() const;
   /// Returns the rows of a server that the functions above left out since the memory was opened,

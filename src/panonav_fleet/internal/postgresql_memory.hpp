@@ -78,6 +78,7 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> names() override;
   [[nodiscard]] std::vector<ViewId> views() override;
   [[nodiscard]] std::vector<PosedView> views_within(const PositionBounds& bounds) override;
+  [[nodiscard]] std::vector<MemoryFile::ViewPlace> places() override;
   [[nodiscard]] std::vector<ViewId> views_with_attachment(ViewAttachment table) override;
   [[nodiscard]] bool has_attachments(ViewAttachment table) override;
   [[nodiscard]] std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) override;

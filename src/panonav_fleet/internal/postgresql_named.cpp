@@ -1,6 +1,7 @@
 // Stores maps, routes and the last change of a memory on a server, and counts its rows.
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/floors.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/memory_schema.hpp"
 #include "panonav_fleet/internal/postgresql_memory.hpp"
@@ -138,6 +139,21 @@ std::set<ViewId> PostgresqlTables::verify_structure(const Check& check) {
     views.insert(all.begin(), all.end());
   });
   return views;
+}
+
+std::vector<MemoryFile::ViewPlace> PostgresqlTables::places() {
+  std::vector<MemoryFile::ViewPlace> places;
+  const Rows rows = connection_.run(
+      "SELECT id, name, x_m, y_m, heading_rad FROM panonav.views WHERE memory = $1 ORDER BY id",
+      Values().add(memory_));
+  for (int i = 0; i < rows.size(); ++i) {
+    auto& place = places.emplace_back(MemoryFile::ViewPlace{
+        read_view_id(rows, i, 0), std::string(floor_of(rows.text(i, 1))), {}});
+    const auto x_m = rows.real(i, 2);
+    const auto y_m = rows.real(i, 3);
+    if (x_m && y_m) place.pose = ReferencePose{*x_m, *y_m, rows.real(i, 4)};
+  }
+  return places;
 }
 
 MemoryFile::Info PostgresqlTables::info() {

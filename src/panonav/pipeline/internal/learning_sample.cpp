@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
+
+#include "panonav/localisation/place_model.hpp"
 
 namespace panonav {
 
@@ -20,21 +23,25 @@ PositionBounds enclosing_area_bounds(Point2 position) {
   return {x_m, x_m + area_side_m, y_m, y_m + area_side_m};
 }
 
-}  // namespace
+/// Functions by which `choose_learning_sample` finds positions.
+struct PositionSource {
+  std::function<std::optional<Point2>(ViewId)> position;  ///< nullopt: unknown
+  std::function<std::vector<ViewId>(const PositionBounds&)> views_within;
+};
 
-VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> views,
-                                  std::span<const ViewId> sampled, std::size_t max_views) {
+// Returns the views, ascending, that `load_learning_sample` loads.
+std::vector<ViewId> choose_learning_sample(std::span<const ViewId> views,
+                                           std::span<const ViewId> sampled, std::size_t max_views,
+                                           const PositionSource& source) {
   std::vector<ViewId> sample;
   const auto add = [&](std::span<const ViewId> more) {
     sample.insert(sample.end(), more.begin(), more.end());
   };
-  const VisualMemory seeds = index.load(sampled);
   for (const ViewId seed : sampled) {
     if (sample.size() >= max_views) break;
-    if (!seeds.contains(seed)) continue;
-    if (const auto& pose = seeds.info(seed).pose) {
-      const PositionBounds area = enclosing_area_bounds(pose->position());
-      add(index.views_within(std::span(&area, 1)));
+    if (const auto position = source.position(seed)) {
+      add(source.views_within(enclosing_area_bounds(*position)));
+      std::erase_if(sample, [&](ViewId view) { return view > views.back(); });
     } else {
       const auto at =
           static_cast<std::size_t>(std::ranges::lower_bound(views, seed) - views.begin());
@@ -45,7 +52,55 @@ VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> view
     sample.erase(std::unique(sample.begin(), sample.end()), sample.end());
   }
   if (sample.size() > max_views) sample.resize(max_views);
-  return index.load(sample);
+  return sample;
+}
+
+}  // namespace
+
+std::size_t count_learnt_views(std::size_t views) noexcept {
+  constexpr std::size_t max_kept = 100;  // two digits
+  std::size_t unit = 1;
+  while (views / unit >= max_kept) unit *= 10;
+  return views / unit * unit;
+}
+
+LearntViews::LearntViews(const VisualMemory& memory) : all_(&memory) {
+  const auto views = memory.views().first(count_learnt_views(memory.size()));
+  HeldViewIndex index(memory);
+  if (views.size() > max_learnt_views) {
+    part_ = load_learning_sample(index, views, sample_reference_views(views), max_learnt_views);
+  } else if (views.size() < memory.size()) {
+    part_ = index.load(views);
+  }
+}
+
+VisualMemory load_learnt_views(const MemoryFile& file,
+                               std::span<const MemoryFile::ViewPlace> places) {
+  std::vector<ViewId> views;
+  for (const auto& place : places.first(count_learnt_views(places.size()))) {
+    views.push_back(place.view);
+  }
+  if (views.size() <= max_learnt_views) return file.load(views);
+  const PositionSource source{
+      [&](ViewId view) -> std::optional<Point2> {
+        const auto place = std::ranges::lower_bound(places, view, {}, &MemoryFile::ViewPlace::view);
+        return place->pose ? std::optional(place->pose->position()) : std::nullopt;
+      },
+      [&](const PositionBounds& bounds) { return file.views_within(bounds); }};
+  return file.load(
+      choose_learning_sample(views, sample_reference_views(views), max_learnt_views, source));
+}
+
+VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> views,
+                                  std::span<const ViewId> sampled, std::size_t max_views) {
+  const VisualMemory seeds = index.load(sampled);
+  const PositionSource source{
+      [&](ViewId view) -> std::optional<Point2> {
+        if (!seeds.contains(view) || !seeds.info(view).pose) return std::nullopt;
+        return seeds.info(view).pose->position();
+      },
+      [&](const PositionBounds& bounds) { return index.views_within(std::span(&bounds, 1)); }};
+  return index.load(choose_learning_sample(views, sampled, max_views, source));
 }
 
 }  // namespace panonav

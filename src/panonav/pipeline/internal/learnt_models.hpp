@@ -23,7 +23,8 @@ struct LearntModels {
   bool by_features = false;
   friend bool operator==(const LearntModels&, const LearntModels&) = default;
 };
-/// Learns the models of a memory. `features`: empty if the memory has none.
+/// Learns the models of a memory from the views of `LearntViews`. `features`: empty if the memory
+/// has none.
 [[nodiscard]] LearntModels learn_models(const VisualMemory& memory,
                                         const FeatureSource& features = {});
 
@@ -32,13 +33,17 @@ struct LearntModels {
 [[nodiscard]] LearntModels learn_place_models(const VisualMemory& memory,
                                               const FeatureSource& features, int components);
 
+/// Learns the observation model from the same views. Throws as `learn_observation_model`.
+[[nodiscard]] ObservationModel learn_tracking_model(const VisualMemory& memory,
+                                                    const LearningOptions& options = {});
+
 /// Returns a function that reads the local features of a view from the file at each call; empty if
 /// the file has none. The file must outlive the function.
 [[nodiscard]] FeatureSource make_feature_source(const MemoryFile& file);
 
 /// Reads the models stored in the file, bit for bit as returned by `learn_models`; nullopt if there
-/// are none or the views have changed since. `memory`: all views of the file. Does not change the
-/// file. Cost: one pass over the signatures, 40 ms for 100,000 of 20 x 15.
+/// are none or views from which they are learnt (`count_learnt_views`) have changed since.
+/// `memory`: all views of the file. Does not change the file. Cost: a pass over the poses.
 [[nodiscard]] std::optional<LearntModels> load_stored_models(const MemoryFile& file,
                                                              const VisualMemory& memory);
 /// Reads the models stored last, even if the views have changed since.

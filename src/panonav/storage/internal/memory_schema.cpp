@@ -34,8 +34,8 @@ constexpr std::array<Table, 12> tables{{
     {"log",
      "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT"},
     {"features",
-     "CREATE TABLE features(view INTEGER PRIMARY KEY, features BLOB NOT NULL, checksum INTEGER NOT "
-     "NULL) STRICT"},
+     "CREATE TABLE features(part INTEGER PRIMARY KEY, bytes BLOB NOT NULL, checksum INTEGER) "
+     "STRICT"},
     {"history",
      "CREATE TABLE history(id INTEGER PRIMARY KEY, what TEXT NOT NULL, stamp_s REAL NOT NULL, "
      "changes BLOB, checksum INTEGER NOT NULL) STRICT"},
@@ -53,8 +53,8 @@ constexpr std::array<Table, 12> tables{{
      "CREATE TABLE synchronised_links(a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT "
      "NULL, checksum INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID"},
     {"thumbnails",
-     "CREATE TABLE thumbnails(view INTEGER PRIMARY KEY, picture BLOB NOT NULL, checksum INTEGER "
-     "NOT NULL) STRICT"},
+     "CREATE TABLE thumbnails(part INTEGER PRIMARY KEY, bytes BLOB NOT NULL, checksum INTEGER) "
+     "STRICT"},
     {"views",
      "CREATE TABLE views(id INTEGER PRIMARY KEY AUTOINCREMENT, name TEXT NOT NULL UNIQUE, x_m "
      "REAL, y_m REAL, heading_rad REAL, stamp_s REAL, signature BLOB NOT NULL, checksum INTEGER "
@@ -75,6 +75,8 @@ constexpr std::string_view sequence = "CREATE TABLE sqlite_sequence(name,seq)";
 constexpr std::string_view names_index = "sqlite_autoindex_views_1";
 // Index of the second end of links, so that the links of a view are found from either end.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
+// Index of poses, so that places are found and counted without reading signatures.
+constexpr const char* poses_index = "CREATE INDEX views_pose ON views(x_m, y_m, heading_rad)";
 
 std::string to_hexadecimal(std::uint32_t value) {
   std::array<char, 16> text{};
@@ -142,6 +144,7 @@ void create_schema(Database& database) {
   database.execute("INSERT INTO log VALUES(1, zeroblob(16), randomblob(16))");
   database.execute(("PRAGMA user_version=" + std::to_string(memory_format_version)).c_str());
   database.execute(links_index);
+  database.execute(poses_index);
 }
 
 void require_schema(Database& database) {
@@ -151,7 +154,8 @@ void require_schema(Database& database) {
   std::map<std::string_view, Entry> missing{
       {"sqlite_sequence", {"table", "sqlite_sequence", sequence}},
       {names_index, {"index", "views", ""}},
-      {"links_b", {"index", "links", links_index}}};
+      {"links_b", {"index", "links", links_index}},
+      {"views_pose", {"index", "views", poses_index}}};
   for (const Table& table : tables) missing[table.name] = {"table", table.name, table.sql};
   const auto fail = [&](std::string_view type, std::string_view name, const char* what) {
     database.fail_damaged(std::string(type) + " " + std::string(name.substr(0, 60)) + " " + what);

@@ -101,4 +101,9 @@ void MemoryTables::check_attachment(ViewAttachment table, ViewId view,
                          " do not match their checksum");
 }
 
+MemoryFile::Counts MemoryTables::counts() {
+  const MemoryFile::Info all = info();
+  return {all.views, all.views_with_position, all.views_with_heading, all.file_bytes};
+}
+
 }  // namespace panonav

@@ -182,6 +182,8 @@ class MemoryTables {
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;
   /// Returns the views within the bounds, ascending.
   [[nodiscard]] virtual std::vector<PosedView> views_within(const PositionBounds& bounds) = 0;
+  /// Returns where all views were taken, ascending.
+  [[nodiscard]] virtual std::vector<MemoryFile::ViewPlace> places() = 0;
   /// Returns the views that have an entry in the table, ascending.
   [[nodiscard]] virtual std::vector<ViewId> views_with_attachment(ViewAttachment table) = 0;
   [[nodiscard]] virtual bool has_attachments(ViewAttachment table) = 0;
@@ -231,6 +233,8 @@ class MemoryTables {
   /// fail. Returns the ids of all views found.
   [[nodiscard]] virtual std::set<ViewId> verify_structure(const Check& check) = 0;
   [[nodiscard]] virtual MemoryFile::Info info() = 0;
+  /// Returns some of the numbers of `info`, which may cost less.
+  [[nodiscard]] virtual MemoryFile::Counts counts();
 
  private:
   std::vector<MemoryFile::Fault> left_out_;

@@ -35,10 +35,6 @@ std::vector<std::uint8_t> copy_bytes(std::span<const std::uint8_t> bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-const char* attachment_table_name(ViewAttachment table) {
-  return table == ViewAttachment::thumbnails ? "thumbnails" : "features";
-}
-
 }  // namespace
 
 SqliteTables::SqliteTables(std::filesystem::path path, Database database)
@@ -123,19 +119,9 @@ void SqliteTables::insert(std::span<const ViewId> ids, std::span<const NewView> 
     const int constraint = insert_view_.run();
     if (constraint == SQLITE_CONSTRAINT_UNIQUE) throw_used_name("view", view.info.name, path_);
     if (constraint != 0) fail_damaged("the id of a new view is taken");
-    insert_attachment(ViewAttachment::thumbnails, id, view.thumbnail);
-    insert_attachment(ViewAttachment::features, id, view.features);
   }
-}
-
-void SqliteTables::insert_attachment(ViewAttachment table, ViewId view,
-                                     std::span<const std::uint8_t> bytes) {
-  if (bytes.empty()) return;
-  const char* const sql = table == ViewAttachment::thumbnails
-                              ? "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"
-                              : "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)";
-  if (run_statement(database_, sql, view, bytes, attachment_checksum(view, bytes)) != 0) {
-    fail_damaged("an entry of " + std::string(attachment_table_name(table)) + " without a view");
+  for (const ViewAttachment table : {ViewAttachment::thumbnails, ViewAttachment::features}) {
+    insert_attachments(table, ids, views);
   }
 }
 
@@ -160,9 +146,10 @@ void SqliteTables::fail_missing_view(ViewId view) {
 
 void SqliteTables::remove(std::span<const ViewId> views) {
   std::vector<Statement> statements;
-  for (const char* sql :
-       {"DELETE FROM links WHERE a = ?1 OR b = ?1", "DELETE FROM thumbnails WHERE view = ?",
-        "DELETE FROM features WHERE view = ?", "DELETE FROM views WHERE id = ?"}) {
+  for (const char* sql : {"DELETE FROM links WHERE a = ?1 OR b = ?1",
+                          "DELETE FROM thumbnails WHERE part BETWEEN 256 * ?1 AND 256 * ?1 + 255",
+                          "DELETE FROM features WHERE part BETWEEN 256 * ?1 AND 256 * ?1 + 255",
+                          "DELETE FROM views WHERE id = ?"}) {
     statements.emplace_back(database_, sql);
   }
   for (const ViewId view : views) {
@@ -231,72 +218,6 @@ std::optional<ViewId> SqliteTables::find(std::string_view name) {
   if (find_name_.bind(1, name).step()) found = read_view_id(find_name_, 0);
   find_name_.reset();
   return found;
-}
-
-std::vector<std::string> SqliteTables::names() {
-  std::vector<std::string> names;
-  Statement rows(database_, "SELECT name, id FROM views ORDER BY id");
-  std::int64_t before = 0;
-  while (rows.step()) {
-    if (rows.integer(1) <= before) fail_damaged("views are out of order");
-    before = rows.integer(1);
-    names.emplace_back(rows.text(0));
-  }
-  return names;
-}
-
-std::vector<ViewId> SqliteTables::views() {
-  std::vector<ViewId> views;
-  // The index of the names also has the ids, and on far fewer pages than the table.
-  Statement ids(database_, "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1");
-  while (ids.step()) views.push_back(read_view_id(ids, 0));
-  std::ranges::sort(views);
-  return views;
-}
-
-std::vector<PosedView> SqliteTables::views_within(const PositionBounds& bounds) {
-  std::vector<PosedView> views;
-  Statement rows(database_,
-                 "SELECT id, x_m, y_m, heading_rad FROM views WHERE x_m BETWEEN ? AND ? AND y_m "
-                 "BETWEEN ? AND ? ORDER BY id",
-                 bounds.min_x_m, bounds.max_x_m, bounds.min_y_m, bounds.max_y_m);
-  while (rows.step()) {
-    views.push_back({read_view_id(rows, 0),
-                     {optional_real(rows, 1).value_or(0.0), optional_real(rows, 2).value_or(0.0),
-                      optional_real(rows, 3)}});
-  }
-  return views;
-}
-
-bool SqliteTables::has_attachments(ViewAttachment table) {
-  const std::string sql =
-      "SELECT EXISTS (SELECT 1 FROM " + std::string(attachment_table_name(table)) + ")";
-  return database_.integer(sql.c_str()) != 0;
-}
-
-std::vector<ViewId> SqliteTables::views_with_attachment(ViewAttachment table) {
-  std::vector<ViewId> views;
-  const std::string sql =
-      "SELECT view FROM " + std::string(attachment_table_name(table)) + " ORDER BY view";
-  Statement rows(database_, sql.c_str());
-  while (rows.step()) {
-    const ViewId view = read_view_id(rows, 0);
-    if (!views.empty() && view <= views.back()) {
-      fail_damaged(std::string(attachment_table_name(table)) + " are out of order");
-    }
-    views.push_back(view);
-  }
-  return views;
-}
-
-std::optional<StoredBytes> SqliteTables::bytes(ViewAttachment table, ViewId view) {
-  Statement row(database_,
-                table == ViewAttachment::thumbnails
-                    ? "SELECT picture, checksum FROM thumbnails WHERE view = ?"
-                    : "SELECT features, checksum FROM features WHERE view = ?",
-                view);
-  if (!row.step()) return std::nullopt;
-  return StoredBytes{copy_bytes(row.blob(0)), row.integer(1)};
 }
 
 void SqliteTables::write_links(std::span<const Link> links) {
@@ -432,28 +353,6 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
     });
   }
   return views;
-}
-
-MemoryFile::Info SqliteTables::info() {
-  const auto count = [&](const char* sql) {
-    return static_cast<std::uint64_t>(database_.integer(sql));
-  };
-  MemoryFile::Info info;
-  // The condition makes SQLite step through the rows, which the step limit bounds, instead of
-  // counting the entries of pages, which has no limit.
-  info.views = count("SELECT count(*) FROM views WHERE id > 0");
-  info.views_with_position = count("SELECT count(x_m) FROM views WHERE id > 0");
-  info.views_with_heading = count("SELECT count(heading_rad) FROM views WHERE id > 0");
-  info.links = count("SELECT count(*) FROM links WHERE a > 0");
-  info.thumbnails = count("SELECT count(*) FROM thumbnails WHERE view > 0");
-  info.views_with_features = count("SELECT count(*) FROM features WHERE view > 0");
-  info.feature_bytes =
-      count("SELECT coalesce(sum(length(features)), 0) FROM features WHERE view > 0");
-  info.maps = count("SELECT count(*) FROM maps WHERE name > ''");
-  info.routes = count("SELECT count(*) FROM routes WHERE name > ''");
-  info.format_version = memory_format_version;
-  info.file_bytes = static_cast<std::uint64_t>(database_.file_bytes());
-  return info;
 }
 
 }  // namespace panonav

@@ -40,6 +40,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> names() override;
   [[nodiscard]] std::vector<ViewId> views() override;
   [[nodiscard]] std::vector<PosedView> views_within(const PositionBounds& bounds) override;
+  [[nodiscard]] std::vector<MemoryFile::ViewPlace> places() override;
   [[nodiscard]] std::vector<ViewId> views_with_attachment(ViewAttachment table) override;
   [[nodiscard]] bool has_attachments(ViewAttachment table) override;
   [[nodiscard]] std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) override;
@@ -71,6 +72,7 @@ class SqliteTables final : public MemoryTables {
 
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
   [[nodiscard]] MemoryFile::Info info() override;
+  [[nodiscard]] MemoryFile::Counts counts() override;
 
   /// Returns the database, for the tables that only files have (synchronised_tables.hpp).
   [[nodiscard]] Database& database() noexcept { return database_; }
@@ -78,7 +80,10 @@ class SqliteTables final : public MemoryTables {
  private:
   [[nodiscard]] ViewId read_view_id(const Statement& row, int column) const;
   [[nodiscard]] ViewRow read_view_row(const Statement& row) const;
-  void insert_attachment(ViewAttachment table, ViewId view, std::span<const std::uint8_t> bytes);
+  void insert_attachments(ViewAttachment table, std::span<const ViewId> ids,
+                          std::span<const NewView> views);
+  [[nodiscard]] std::uint64_t count_attachments(ViewAttachment table);
+  [[nodiscard]] std::uint64_t attachment_bytes(ViewAttachment table);
   [[nodiscard]] std::vector<std::string> query_texts(const char* sql);
   /// Throws for a view that a search for its id did not find: DamageError if the file lists it all
   /// the same, and otherwise as `throw_unknown_view`. Cost: one pass over all views.

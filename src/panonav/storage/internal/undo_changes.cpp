@@ -27,6 +27,7 @@ struct Column {
 
 constexpr Column integer{FieldType::integer}, text{FieldType::text}, blob{FieldType::blob};
 constexpr Column integer_key{FieldType::integer, true}, text_key{FieldType::text, true};
+constexpr Column integer_or_null{FieldType::integer, false, true};
 constexpr Column real_or_null{FieldType::real, false, true};
 constexpr Column any_type{FieldType::null};
 
@@ -40,13 +41,13 @@ const std::array<UndoTable, 8>& undo_tables() {
   static const std::array<UndoTable, 8> tables{{
       {"views",
        {integer_key, text, real_or_null, real_or_null, real_or_null, real_or_null, blob, integer}},
-      {"thumbnails", {integer_key, blob, integer}},
+      {"thumbnails", {integer_key, blob, integer_or_null}},
       {"links", {integer_key, integer_key, integer, integer}},
       {"maps", {text_key, blob, blob, integer}},
       {"settings", {text_key, any_type, integer}},
       {"routes", {text_key, integer, integer, integer}},
       {"route_blocks", {text_key, integer_key, blob, integer}},
-      {"features", {integer_key, blob, integer}},
+      {"features", {integer_key, blob, integer_or_null}},
   }};
   return tables;
 }
@@ -184,21 +185,24 @@ class ChangeReader {
   }
 
   void add_affected_rows(const std::vector<Field>& row) {
-    const auto add_affected_view = [&](const Field& field) {
-      if (field.number < 1 || field.number > std::numeric_limits<std::uint32_t>::max()) {
-        fail("the id of a view is " + std::to_string(field.number));
+    const auto add_affected_view = [&](std::int64_t number) {
+      if (number < 1 || number > std::numeric_limits<std::uint32_t>::max()) {
+        fail("the id of a view is " + std::to_string(number));
       }
-      rows_.views.push_back({static_cast<std::uint32_t>(field.number)});
+      rows_.views.push_back({static_cast<std::uint32_t>(number)});
     };
     if (table_->name == "links") {
-      add_affected_view(row[0]);
-      add_affected_view(row[1]);
+      add_affected_view(row[0].number);
+      add_affected_view(row[1].number);
     } else if (table_->name == "maps") {
       rows_.maps.emplace(row[0].text);
     } else if (table_->name == "routes" || table_->name == "route_blocks") {
       rows_.routes.emplace(row[0].text);
+    } else if (table_->name == "thumbnails" || table_->name == "features") {
+      constexpr std::int64_t parts_per_view = 256;
+      add_affected_view(row[0].number / parts_per_view);
     } else if (table_->name != "settings") {
-      add_affected_view(row[0]);
+      add_affected_view(row[0].number);
     }
   }
 
