@@ -61,7 +61,7 @@ struct RunMoment {
   std::optional<Image> picture;               ///< as the camera delivered it
   std::vector<std::uint8_t> encoded_picture;  ///< the same as PNG or JPEG; one is enough
   std::optional<Panorama> panorama;           ///< unwarped from the picture
-  std::vector<std::uint8_t> best_match;       ///< thumbnail of the reference, PNG
+  std::vector<std::uint8_t> best_match;       ///< thumbnail of the reference, PNG or JPEG
   std::optional<double> best_match_turn_rad;  ///< heading of the robot relative to that reference
   std::optional<Pose2> pose;                  ///< of the robot
   /// Covariance of x, y and heading, row-major, in m^2, m rad and rad^2.

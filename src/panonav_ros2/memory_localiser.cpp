@@ -183,7 +183,10 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
     if (found.matches.empty()) return;
     try {
       const auto thumbnail = memory_->file.thumbnail(found.matches.front().view);
-      if (thumbnail) best_matches_.publish({{stamp_ns, setup_.frames.base}, "png", *thumbnail});
+      if (!thumbnail) return;
+      constexpr std::uint8_t first_byte_of_png = 0x89;
+      const bool is_png = !thumbnail->empty() && thumbnail->front() == first_byte_of_png;
+      best_matches_.publish({{stamp_ns, setup_.frames.base}, is_png ? "png" : "jpeg", *thumbnail});
     } catch (const ContractError&) {
       // Another program has removed this view from the memory since the memory was read.
     }

@@ -175,7 +175,7 @@ def use_the_page(place: urllib.parse.SplitResult, pictures: dict[str, bytes], ex
                 assert f"x {position['x_m']:.2f} m".replace("-0.00", "0.00") in answer.text, answer.text
             shown = [address for address in answer.loaded if "/views/" in address]
             response, thumbnail = ask("GET", shown[0])
-            assert response.status == 200 and thumbnail.startswith(b"\x89PNG"), shown
+            assert response.status == 200 and thumbnail.startswith(b"\xff\xd8\xff"), shown
             assert answer.fields["memory"] == "office" and answer.files == 2, "the form can be used again"
     good = next(iter(pictures.values()))
     for status, words, answer in (

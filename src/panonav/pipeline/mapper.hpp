@@ -56,7 +56,7 @@ class Mapper {
     FourierSignature signature;           ///< unpacked, as visual odometry needs it
     ReferenceInfo info;                   ///< name, pose and stamp, as the memory keeps them
     std::optional<Pose2> odometry;        ///< absolute, in its own frame; empty: unknown
-    std::vector<std::uint8_t> thumbnail;  ///< PNG file; empty if thumbnails are not kept
+    std::vector<std::uint8_t> thumbnail;  ///< PNG or JPEG file; empty if thumbnails are not kept
   };
 
   /// Pictures come from the memory's own camera. Throws FileError as `MemoryFile::open`,

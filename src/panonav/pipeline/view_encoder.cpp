@@ -259,16 +259,21 @@ std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama) {
   if (step == 1) return encode_png(picture.view());
   Image small(picture.width() / step, std::max(1, picture.height() / step));
   const int rows_averaged = std::min(step, picture.height());
+  std::vector<int> sums(static_cast<std::size_t>(small.width()));
   for (int v = 0; v < small.height(); ++v) {
-    for (int u = 0; u < small.width(); ++u) {
-      int sum = 0;
-      for (int y = 0; y < rows_averaged; ++y) {
-        for (int x = 0; x < step; ++x) sum += picture.at(u * step + x, v * step + y);
+    std::ranges::fill(sums, 0);
+    for (int y = 0; y < rows_averaged; ++y) {
+      const std::uint8_t* from = picture.view().data + (v * step + y) * picture.width();
+      for (int& sum : sums) {
+        for (int x = 0; x < step; ++x) sum += *from++;
       }
-      small.at(u, v) = static_cast<std::uint8_t>(sum / (rows_averaged * step));
+    }
+    for (int u = 0; u < small.width(); ++u) {
+      small.at(u, v) =
+          static_cast<std::uint8_t>(sums[static_cast<std::size_t>(u)] / (rows_averaged * step));
     }
   }
-  return encode_png(small.view());
+  return encode_jpeg(small.view());
 }
 
 std::optional<Panorama> panorama_from_thumbnail(std::span<const std::uint8_t> thumbnail,

@@ -99,7 +99,8 @@ class ViewEncoder {
 /// place, so it may saturate.
 [[nodiscard]] float largest_nonconstant_magnitude(const FourierSignature& signature);
 
-/// Returns a small image of the view for display, as PNG.
+/// Returns a small image of the view for display: a PNG of panoramas of at most 256 columns, which
+/// is exact; a JPEG of larger ones.
 [[nodiscard]] std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama);
 
 /// Restores the panorama of a thumbnail made by `encode_thumbnail`, enlarged to the memory's size.
