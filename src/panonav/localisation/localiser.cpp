@@ -140,13 +140,17 @@ class Localiser::Query {
   }
 
   /// After `answer`: returns the query with its tilt removed, or to be compared with blurred views
-  /// (`restore_query`), unless columns leave no doubt that the place is known.
+  /// (`restore_query`), unless the place is known without doubt. Undisturbed queries of known
+  /// places in doubt are frequent in places that repeat themselves, so only one match is tried for
+  /// them.
   [[nodiscard]] std::vector<RestoredQuery> restore() const {
     if (options_.reranked_views == 0 || options_.components != 0 || !mask_.allowed_rows.empty() ||
         compared_ == nullptr || is_known_without_doubt_) {
       return {};
     }
-    return restore_query(restored_, *compared_->memory, ranked_);
+    const std::span<const RankedMatch> ranked(ranked_);
+    const std::size_t count = is_known() ? std::min<std::size_t>(1, ranked.size()) : ranked.size();
+    return restore_query(restored_, *compared_->memory, ranked.first(count));
   }
 
  private:
@@ -235,7 +239,6 @@ class Localiser::Query {
   void estimate_known_probability() {
     place_.known_probability = place_probability(place_.evidence);
     is_known_by_columns_ = is_known();
-    is_known_without_doubt_ = is_known_by_columns_ && !is_inconclusive(place_.evidence);
     if (make_features_ && localiser_.features_ && restored_.blur_rad == 0.0 &&
         is_inconclusive(place_.evidence)) {
       if (!features_) features_ = compute_features(Handedness::original);
@@ -247,6 +250,8 @@ class Localiser::Query {
       }
     }
     place_.known = is_known();
+    constexpr double min_certain_probability = 0.98;  // as `is_inconclusive`
+    is_known_without_doubt_ = place_.known_probability >= min_certain_probability;
     place_.probability = place_.known_probability;
   }
   [[nodiscard]] bool is_known() const { return place_.known_probability >= 0.5; }
@@ -404,7 +409,7 @@ class Localiser::Query {
   bool is_known_by_columns_ = false;
   std::vector<PlaceShare> places_;  // the chosen one first; empty: unknown place or no position
   bool is_place_chosen_by_features_ = false;
-  bool is_known_without_doubt_ = false;  // by columns
+  bool is_known_without_doubt_ = false;
   Place place_;
 };
 
