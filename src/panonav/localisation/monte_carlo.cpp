@@ -271,8 +271,9 @@ struct MonteCarloLocaliser::Implementation {
     if (anywhere > model.explained_difference) return;
     const auto sites = likelihood.sites_near(found.modes.front().mean.position());
     likelihood.compare(sites);
-    const double here = std::max(likelihood.min_difference(sites).value_or(anywhere), anywhere);
-    const double log_ratio = share_exponent * std::log(here / anywhere);
+    const auto here = likelihood.min_difference(sites);
+    if (!here || *here <= anywhere) return;
+    const double log_ratio = share_exponent * std::log(*here / anywhere);
     // The weights of the particles account for the prior.
     p_explained_here = (1.0 - kidnap_probability(p_kidnap, log_ratio, 0.0)) / (1.0 - p_kidnap);
   }
