@@ -76,7 +76,7 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
   page.add_text(
       "The robot then unwraps each image into a panorama of 80 rows. For each row it stores only "
       "the first 15 components of the Fourier transform. This signature takes 2.4 kB. With "
-      "local features and a thumbnail, the view takes about 19 kB in the memory file. The "
+      "local features and a thumbnail, the view takes about 10 kB in the memory file. The "
       "magnitudes of the components do not change when the robot rotates, so they identify the "
       "place at any heading. The phases give the heading.");
   page.add_views({{std::move(cylinder),
@@ -357,7 +357,7 @@ MemoryFile memorise_run(const Dataset& run, const fs::path& path, Executor& exec
   return MemoryFile::open(path, Access::read_write);
 }
 
-/// Returns the size of the memory file per view, such as "19 kB".
+/// Returns the size of the memory file per view, such as "10 kB".
 std::string format_bytes_per_view(const MemoryFile& file) {
   const auto info = file.info();
   return format_fixed(1e-3 * static_cast<double>(info.file_bytes) / static_cast<double>(info.views),
