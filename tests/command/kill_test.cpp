@@ -44,7 +44,7 @@ std::string content_of(const fs::path& memory) {
                 database,
                 "SELECT id, name, quote(x_m), quote(y_m), quote(heading_rad), quote(stamp_s), "
                 "hex(signature), checksum FROM views ORDER BY id;SELECT part, "
-                "hex(bytes), checksum FROM thumbnails ORDER BY part;SELECT a, b, kind, "
+                "hex(bytes), quote(checksum) FROM thumbnails ORDER BY part;SELECT a, b, kind, "
                 "checksum FROM links "
                 "ORDER BY a, b;SELECT name, hex(nodes), hex(edges), checksum FROM maps ORDER BY "
                 "name;SELECT name, columns, lines, checksum FROM routes ORDER BY name;SELECT "
