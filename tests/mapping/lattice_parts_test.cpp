@@ -14,6 +14,7 @@
 #include "panonav/mapping/dissimilarity_curve.hpp"
 #include "panonav/mapping/internal/lattice_graph.hpp"
 #include "panonav/mapping/internal/lattice_growth.hpp"
+#include "panonav/mapping/internal/lattice_links.hpp"
 #include "panonav/mapping/internal/lattice_solver.hpp"
 
 namespace panonav {
@@ -239,7 +240,7 @@ struct TwoHalls {
   }
   void link(std::size_t a, std::size_t b, const Pose2& step, double residual) {
     const Pose2 back = inverse(step);
-    Lattice::Spring spring{.a = a, .b = b, .dissimilarity = residual};
+    Lattice::Spring spring{.a = a, .b = b, .dissimilarity = residual, .excess_over_mirror = 0.6};
     spring.phases =
         PhaseReading{.turn_rad = wrap_angle(step.heading_rad + random.normal(0.0, 0.03)),
                      .direction_a_rad = std::atan2(step.y_m, step.x_m) + random.normal(0.0, 0.08),
@@ -294,6 +295,23 @@ TEST(LatticeGrowth, AFalseSpringDoesNotFoldAHall) {
   EXPECT_NEAR(across, std::hypot(5.0, 5.0), 0.7);
   EXPECT_FALSE(fits_layout(halls.springs.back(), 1.0, grown.layout.poses[1],
                            grown.layout.poses[TwoHalls::views - 2]));
+}
+
+TEST(LatticeGrowth, LinksThatFitAMirroredViewAsWellAreNotCertain) {
+  TwoHalls halls(6);
+  const auto certain = make_links(halls.poses.size(), halls.springs, 1.0);
+  const std::size_t doubtful = halls.springs.size() / 2;
+  halls.springs[doubtful].excess_over_mirror = 0.0;
+  const auto links = make_links(halls.poses.size(), halls.springs, 1.0);
+  ASSERT_EQ(links.size(), certain.size());
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    if (k == doubtful) {
+      EXPECT_LT(links[k].probability, 0.5);
+      EXPECT_GT(certain[k].probability, 0.5);
+    } else {
+      EXPECT_EQ(links[k].probability, certain[k].probability);
+    }
+  }
 }
 
 TEST(LatticeGrowth, TheOrderOfViewsDoesNotMatter) {

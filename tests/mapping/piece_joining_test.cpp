@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -68,7 +69,7 @@ TEST(PieceJoining, JoinsAtTheTruePose) {
     TwoPieces pieces(random);
     const auto links = pieces.measure_links(random);
     ASSERT_EQ(links.size(), 13U);
-    const auto joined = join_pieces(links, pieces.poses, pieces.components);
+    const auto joined = join_pieces(links, pieces.poses, pieces.components, piece_views);
     ASSERT_EQ(joined.size(), 1U) << "seed " << seed;
     EXPECT_EQ(joined.front().agreeing.size(), links.size());
     for (std::size_t i = 1; i < pieces.poses.size(); ++i) {
@@ -90,7 +91,8 @@ TEST(PieceJoining, JoinsDespiteWrongLinks) {
     scatter(wrong, random);
     for (CrossLink& link : wrong) link.probability = 0.3;
     links.insert(links.end(), wrong.begin(), wrong.end());
-    ASSERT_EQ(join_pieces(links, pieces.poses, pieces.components).size(), 1U) << "seed " << seed;
+    ASSERT_EQ(join_pieces(links, pieces.poses, pieces.components, piece_views).size(), 1U)
+        << "seed " << seed;
     const Pose2 found = inverse(pieces.poses[0]) * pieces.poses[piece_views];
     const Pose2 truth = inverse(pieces.truth[0]) * pieces.truth[piece_views];
     EXPECT_LT(distance(found.position(), truth.position()), 0.4) << "seed " << seed;
@@ -104,7 +106,8 @@ TEST(PieceJoining, DoesNotJoinByInconsistentLinks) {
     auto links = pieces.measure_links(random);
     scatter(links, random);
     const auto before = pieces.poses;
-    EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components).empty()) << "seed " << seed;
+    EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components, piece_views).empty())
+        << "seed " << seed;
     EXPECT_EQ(pieces.poses, before);
   }
 }
@@ -121,7 +124,7 @@ TEST(PieceJoining, DoesNotChooseBetweenTwoPoses) {
         inverse(pieces.poses[other.in_p]) * pieces.p_from_q * shift * pieces.poses[other.in_q];
     links.push_back(other);
   }
-  EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components).empty());
+  EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components, piece_views).empty());
 }
 
 TEST(PieceJoining, NeedsThreeViewsOfEachPiece) {
@@ -131,7 +134,39 @@ TEST(PieceJoining, NeedsThreeViewsOfEachPiece) {
   std::erase_if(links, [](const CrossLink& link) { return link.in_q > piece_views + 1; });
   ASSERT_EQ(links.size(), 5U);
   for (CrossLink& link : links) link.probability = 0.99;
-  EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components).empty());
+  EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components, piece_views).empty());
+}
+
+TEST(PieceJoining, DoesNotJoinPiecesThatAreTooSmall) {
+  Random random(1, 7);
+  TwoPieces pieces(random);
+  const auto links = pieces.measure_links(random);
+  EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components, piece_views + 1).empty());
+  EXPECT_EQ(join_pieces(links, pieces.poses, pieces.components, piece_views).size(), 1U);
+}
+
+TEST(PieceJoining, CrossingsAreProbableLinksThatAgree) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed, 8);
+    const TwoPieces pieces(random);
+    auto links = pieces.measure_links(random);
+    const std::size_t right = links.size();
+    auto wrong = pieces.measure_links(random);
+    wrong.resize(4);
+    for (CrossLink& link : wrong) {
+      link.step = {-link.step.x_m, -link.step.y_m,
+                   wrap_angle(link.step.heading_rad + std::numbers::pi)};
+      link.probability = 0.95;
+    }
+    links.insert(links.end(), wrong.begin(), wrong.end());
+    links[3].probability = 0.99;
+    const auto chosen = choose_crossings(links, pieces.poses, pieces.components);
+    ASSERT_EQ(chosen.size(), 3U) << "seed " << seed;
+    EXPECT_TRUE(std::ranges::binary_search(chosen, std::size_t{3}));
+    for (const std::size_t k : chosen) EXPECT_LT(k, right) << "seed " << seed;
+    for (CrossLink& link : links) link.probability = 0.4;
+    EXPECT_TRUE(choose_crossings(links, pieces.poses, pieces.components).empty());
+  }
 }
 
 TEST(PieceJoining, DoesNotJoinByUnrelatedViews) {
@@ -139,7 +174,7 @@ TEST(PieceJoining, DoesNotJoinByUnrelatedViews) {
   TwoPieces pieces(random);
   auto links = pieces.measure_links(random);
   for (CrossLink& link : links) link.probability = 0.0;
-  EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components).empty());
+  EXPECT_TRUE(join_pieces(links, pieces.poses, pieces.components, piece_views).empty());
 }
 
 }  // namespace

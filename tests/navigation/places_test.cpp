@@ -11,6 +11,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/memory/view_source.hpp"
+#include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/direction_field.hpp"
 #include "panonav/navigation/internal/area_views.hpp"
 #include "panonav/navigation/internal/obstacle.hpp"
@@ -190,6 +191,36 @@ void add_springs_to_neighbours(Lattice& lattice, std::size_t first, std::size_t 
 
 bool has_edge(const NavigationGraph& graph, std::size_t a, std::size_t b) {
   return std::ranges::any_of(graph.exits(a), [&](const auto& exit) { return exit.node == b; });
+}
+
+// Two pieces of an arrangement, of 5 x 5 views each, that no spring connects.
+TEST(NavigationGraph, ACrossingLeadsFromOnePieceToTheOther) {
+  Lattice lattice = exact_grid(5, 10);
+  add_springs_to_neighbours(lattice, 0, 25);
+  add_springs_to_neighbours(lattice, 25, 50);
+  for (std::size_t i = 25; i < 50; ++i) lattice.nodes[i].component = 1;
+  AreaPlanner apart(graph_from_lattice(lattice));
+  apart.set_goal(ViewId{48});
+  EXPECT_TRUE(apart.plan_path(0).empty());
+
+  add_spring(lattice, 22, 27, lattice.nodes[27].pose.position());
+  lattice.crossings.push_back({22, 27, *lattice.springs.back().phases, 0.9});
+  lattice.springs.pop_back();
+  const NavigationGraph graph = graph_from_lattice(lattice);
+  for (const NavigationGraph::Edge& edge : graph.edges()) {
+    EXPECT_EQ(edge.is_crossing, edge.a == ViewId{22} && edge.b == ViewId{27});
+  }
+  AreaPlanner planner(graph);
+  planner.set_goal(ViewId{48});
+  const auto path = planner.plan_path(0);
+  const auto before = std::ranges::find(path, std::size_t{22});
+  ASSERT_NE(before, path.end());
+  EXPECT_EQ(*(before + 1), 27U);
+
+  const TopologicalMap stored = to_topological_map(lattice);
+  EXPECT_EQ(stored.edges.size(), lattice.springs.size() + 1);
+  EXPECT_EQ(stored.edges.back().a, ViewId{22});
+  EXPECT_EQ(stored.edges.back().weight, 0.9);
 }
 
 TEST(NavigationGraph, LengthsAreInSpacingsOfTheReferences) {

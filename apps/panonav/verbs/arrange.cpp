@@ -83,6 +83,7 @@ ordered_json to_json(const ArrangeArguments& arguments, const Lattice& lattice,
                     {"views", lattice.nodes.size()},
                     {"connected_components", std::move(components)},
                     {"joined_pieces", std::move(joins)},
+                    {"crossings", lattice.crossings.size()},
                     {"candidates", lattice.candidates},
                     {"springs", lattice.springs.size()},
                     {"springs_rejected", count_rejected_springs(lattice)},
@@ -138,8 +139,11 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
         session.red(std::to_string(lattice.components.size()) + " parts that are not connected") +
         " holds " + std::to_string(lattice.components.front().views) + " of the " +
         format_count(lattice.nodes.size(), "view") + others +
-        ". Their positions relative to each other are unknown, and no path leads from "
-        "one to another.");
+        ". Their positions relative to each other are unknown" +
+        (lattice.crossings.empty()
+             ? std::string(", and no path leads from one to another.")
+             : "; navigate can cross between some by homing, along " +
+                   format_count(lattice.crossings.size(), "pair") + " of views."));
   }
   if (!lattice.components.front().handedness_known) {
     session.print("The result may be mirrored: left and right cannot be distinguished.");

@@ -111,6 +111,8 @@ std::string describe_event(NavigationDecision::Event event) {
       return "drives home to the goal's view";
     case NavigationDecision::Event::homing_failed:
       return "drove home to another place";
+    case NavigationDecision::Event::crossing:
+      return "drives home to a view of another part of the arrangement";
     case NavigationDecision::Event::route:
       return "follows the recorded route";
     case NavigationDecision::Event::route_left:
@@ -170,6 +172,12 @@ std::string explain_end(const simulation::MissionRun& run, const RobotNavigator&
   return other_floor.empty() ? std::string(explain_end(run.end)) : other_floor;
 }
 
+/// Returns the number of edges between components of the arrangement.
+std::size_t count_crossings(const RobotNavigator& robot) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(robot.graph().edges(), &NavigationGraph::Edge::is_crossing));
+}
+
 ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& robot,
                           const std::string& goal, const Pose2& start,
                           const simulation::MissionRun& run) {
@@ -182,6 +190,7 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
           {"route", to_json_or_null(arguments.route)},
           {"views", graph.size()},
           {"edges", graph.edges().size()},
+          {"crossings", count_crossings(robot)},
           {"areas", planner.areas().nodes.size()},
           {"end", to_string(run.end)},
           {"reason", explain_end(run, robot)},
@@ -268,6 +277,10 @@ void print_graph(const RobotNavigator& robot, Session& session) {
                 (robot.origin() == RobotNavigatorOptions::GraphOrigin::arrangement
                      ? "a new arrangement (panonav arrange can store one)"
                      : "the memory's " + std::string(to_string(robot.origin()))));
+  if (const std::size_t crossings = count_crossings(robot); crossings > 0) {
+    session.print(format_count(crossings, "edge") +
+                  " lead from one part of the arrangement to another; the robot crosses by homing");
+  }
 }
 
 /// Throws FileError if the goal's position is unknown. --kidnap needs it to find the middle of the

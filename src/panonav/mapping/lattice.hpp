@@ -67,6 +67,9 @@ struct Lattice {
     double stiffness = 1.0;              ///< K of [M04 eq. 5]
     double weight = 1.0;                 ///< robust weight, 0 .. 1; near 0: an outlier
     std::optional<PhaseReading> phases;  ///< nullopt without phases
+    /// Correlation of the views less that with a mirrored view, which shows no place
+    /// (`compute_excess_over_mirror`): large if the phases are right. 0 without phases.
+    double excess_over_mirror = 0.0;
   };
   /// Standard deviations of springs, estimated from the arrangement. Lengths are in the unit of the
   /// arrangement.
@@ -93,10 +96,21 @@ struct Lattice {
     std::size_t pairs = 0;  ///< pairs of views that agree on its pose
   };
 
+  /// Two views of different components that probably show the right direction to each other, by all
+  /// pairs of views between the two. The evidence is too weak for a join; a robot can cross between
+  /// the components by homing, and notices if it does not arrive.
+  struct Crossing {
+    std::size_t a = 0;         ///< nodes, a < b
+    std::size_t b = 0;         ///< the other node
+    PhaseReading phases;       ///< of the two views; has a direction
+    double probability = 0.0;  ///< 0 .. 1, that the direction is right, by the two views alone
+  };
+
   std::vector<Node> nodes;            ///< one for each view of the memory, in its order
   std::vector<Spring> springs;        ///< ascending (a, b)
   std::vector<Component> components;  ///< the largest first
   std::vector<Join> joins;            ///< in their order
+  std::vector<Crossing> crossings;    ///< ascending (a, b)
   DissimilarityCurve curve{1.0};      ///< of the last round
   Errors errors;                      ///< of the last round
   /// Number of pairs of views that were measured; those that are no springs were rejected.
@@ -139,7 +153,8 @@ void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& 
 
 /// Converts the arrangement into a map that can be stored and exported: its views with their poses
 /// and components, and its springs as edges of kind `neighbour` with the motion between the poses
-/// and the weight of the spring. Lengths are in the lattice's unit.
+/// and the weight of the spring; then its crossings, as edges between two components with the
+/// motion by the phases and the probability as weight. Lengths are in the lattice's unit.
 [[nodiscard]] TopologicalMap to_topological_map(const Lattice& lattice);
 
 }  // namespace panonav

@@ -22,6 +22,7 @@ struct Spring {
   double length = 0.0;          // in the arrangement
   double weight = 0.0;
   bool is_within_component = false;
+  bool is_crossing = false;
   int support = 0;  // number of third views that confirm it
 };
 
@@ -138,10 +139,12 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
     if (std::isfinite(spacing) && (length > 0.0 || spring.motion)) {
       candidate.spacings = candidate.edge.length = length / spacing;
     }
+    candidate.edge.is_crossing = spring.is_crossing;
     if (read[i] > 0.0) scale_displacement(*candidate.edge.a_from_b, candidate.spacings / read[i]);
     candidate.is_bridge_only =
-        candidate.spacings > (rejected ? max_rejected_edge_spacings : max_edge_spacings) ||
-        (rejected && spring.support < min_rejected_edge_support);
+        !spring.is_crossing &&
+        (candidate.spacings > (rejected ? max_rejected_edge_spacings : max_edge_spacings) ||
+         (rejected && spring.support < min_rejected_edge_support));
     candidates.push_back(candidate);
   }
   return candidates;
@@ -158,7 +161,7 @@ void mark_isolated_edges(std::size_t views, std::vector<Candidate>& candidates) 
   }
   for (auto& list : around) std::ranges::sort(list);
   for (Candidate& candidate : candidates) {
-    if (candidate.is_bridge_only) continue;
+    if (candidate.is_bridge_only || candidate.edge.is_crossing) continue;
     const auto& a = around[candidate.ends.a];
     const auto& b = around[candidate.ends.b];
     const auto common = std::ranges::count_if(
@@ -172,7 +175,8 @@ std::vector<NavigationGraph::Edge> choose_edges(const std::vector<ViewId>& views
                                                 std::vector<Spring> springs, double min_weight) {
   count_support(views.size(), springs);
   std::erase_if(springs, [&](const Spring& spring) {
-    return (spring.weight < min_weight || !spring.is_within_component) && spring.support == 0;
+    return !spring.is_crossing && (spring.weight < min_weight || !spring.is_within_component) &&
+           spring.support == 0;
   });
   std::vector<Candidate> candidates = make_candidates(views, springs, min_weight);
   mark_isolated_edges(views.size(), candidates);
@@ -207,6 +211,12 @@ NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight) {
                        spring.weight,
                        a.component == b.component});
   }
+  for (const Lattice::Crossing& crossing : lattice.crossings) {
+    springs.push_back({.ends = {crossing.a, crossing.b},
+                       .motion = to_motion(crossing.phases),
+                       .weight = crossing.probability,
+                       .is_crossing = true});
+  }
   std::vector<NavigationGraph::Edge> edges = choose_edges(views, std::move(springs), min_weight);
   return {std::move(views), std::move(edges)};
 }
@@ -228,7 +238,7 @@ NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,
     const TopologicalMap::Node& b = arrangement.nodes[ends.b];
     links.push_back({edge.a, edge.b, edge.kind});
     springs.push_back({ends, std::nullopt, distance(a.pose.position(), b.pose.position()),
-                       edge.weight, a.component == b.component});
+                       edge.weight, a.component == b.component, a.component != b.component});
   }
   const std::vector<NavigationGraph::Edge> read = read_edges(source, links, executor);
   for (std::size_t i = 0; i < springs.size(); ++i) springs[i].motion = read[i].a_from_b;

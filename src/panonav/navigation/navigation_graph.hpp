@@ -27,6 +27,9 @@ class NavigationGraph {
     /// Pose of b in the frame of a, in the graph's unit; nullopt if unknown. x and y are 0 for two
     /// views of one place, which have no direction.
     std::optional<Pose2> a_from_b;
+    /// True between two components of an arrangement (`Lattice::Crossing`), which the robot crosses
+    /// by homing.
+    bool is_crossing = false;
     friend bool operator==(const Edge&, const Edge&) = default;
   };
   /// An edge that leaves a node.
@@ -102,10 +105,10 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// references long, and rejected springs of at most one and a half spacings that three third views
 /// confirm. The ends of these springs must have about a quarter of their neighbours in common,
 /// since other springs lead to places that look similar. Springs left out by these rules are used
-/// only if they connect components. Directions and rotations are computed from the phases, so that
-/// a distorted arrangement does not change them. Lengths, in local spacings of the references, come
-/// from the arrangement; those of rejected springs from the phases. Cost: the number of springs
-/// times the number of springs at a view.
+/// only if they connect components. Crossings of the lattice become edges. Directions and rotations
+/// come from the phases, unchanged by a distorted arrangement. Lengths, in local spacings of the
+/// references, come from the arrangement; those of rejected springs and crossings from the phases.
+/// Cost: springs times springs at a view.
 [[nodiscard]] NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight = 0.1);
 
 /// Same as `graph_from_lattice` for a lattice that was stored as a map (`to_topological_map`):

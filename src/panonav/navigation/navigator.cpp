@@ -116,14 +116,16 @@ const Guide& Navigator::Core::guide() const {
   return plan.field.at(planner.areas().index_in_area[*place.node]);
 }
 
-// Commits to a long edge, or to an edge to whose start the robot has come back without an
-// obstruction: then a reference next to the edge has misled it.
-void Navigator::Core::commit_to_edge_if_needed() {
+// Commits to a long edge, to a crossing between two components, or to an edge to whose start the
+// robot has come back without an obstruction: then a reference next to the edge has misled it.
+void Navigator::Core::commit_to_edge_if_needed(Step& step) {
   const double length = relative_length(guide());
+  const bool is_crossing = graph().edges()[guide().edge].is_crossing;
   const bool came_back = progress.steps_without_progress >= options.min_agreeing_steps &&
                          !progress.was_obstructed() &&
                          guide().path_length <= progress.min_path_length && length > 0.0;
-  if (plan.committed || (length < min_long_edge_factor && !came_back)) return;
+  if (plan.committed || (length < min_long_edge_factor && !came_back && !is_crossing)) return;
+  if (is_crossing) step.add_event(NavigationDecision::Event::crossing);
   const double steps = steps_per_edge_length * std::max(1.0, length);
   plan.committed = {*place.node, guide(), static_cast<int>(std::ceil(steps))};
 }
@@ -222,7 +224,7 @@ bool Navigator::Core::is_at_goal() const {
 
 // Returns the direction of an edge in the robot's frame: the field's direction rotated by the
 // compass, corrected by half the difference to the home vector's direction to the end of the edge.
-// nullopt if neither is available.
+// On a crossing that vector alone counts. nullopt if neither is available.
 std::optional<double> Navigator::Core::direction_along_edge(std::size_t from, const Guide& ahead,
                                                             const Step& step) {
   std::optional<double> direction;
@@ -238,6 +240,7 @@ std::optional<double> Navigator::Core::direction_along_edge(std::size_t from, co
       home_vector(views.read_coefficients(next, step.view.components), step.view.view);
   if (!to_next.has_direction()) return direction;
   const double next_rad = to_next.direction_rad();
+  if (graph().edges()[ahead.edge].is_crossing) return next_rad;
   const std::optional<double> expected =
       direction || obstruction.is_present ? direction : step.last_direction_rad;
   const double off = expected ? angle_difference(next_rad, *expected) : 0.0;
@@ -246,7 +249,7 @@ std::optional<double> Navigator::Core::direction_along_edge(std::size_t from, co
 
 void Navigator::Core::follow_field(Step& step) {
   if (place.doubt.unknown_steps > 0 && return_to_known_place(step)) return;
-  commit_to_edge_if_needed();
+  commit_to_edge_if_needed(step);
   const std::size_t from = plan.committed ? plan.committed->from : *place.node;
   const Guide ahead = plan.committed ? plan.committed->guide : guide();
   std::optional<double> direction = direction_along_edge(from, ahead, step);
@@ -385,9 +388,9 @@ std::string_view to_string(NavigationDecision::State state) {
 }
 
 std::string_view to_string(NavigationDecision::Event event) {
-  constexpr std::array<std::string_view, 11> names{
+  constexpr std::array<std::string_view, 12> names{
       "relocalised", "kidnapped", "entered_area",  "unknown_place", "obstructed", "closed",
-      "reopened",    "homing",    "homing_failed", "route",         "route_left"};
+      "reopened",    "homing",    "homing_failed", "crossing",      "route",      "route_left"};
   return names.at(static_cast<std::size_t>(event));
 }
 

@@ -81,6 +81,7 @@ struct NavigationDecision {
     reopened,       ///< blocked edges are tried again
     homing,         ///< homing to the goal begins
     homing_failed,  ///< homing ended at another place
+    crossing,       ///< homing to a view of another component of the arrangement begins
     route,          ///< a leg along a recorded route begins
     route_left,     ///< the leg ended before its end
   };

@@ -147,6 +147,15 @@ PairFeatures compute_pair_features(const HomingView& home, const HomingView& cur
   return features;
 }
 
+double compute_excess_over_mirror(const HomingView& home, const HomingView& current,
+                                  double correlation) {
+  // The correlation comes before displacement and tilt are solved.
+  const FourierHomingOptions options{
+      .starting_estimates = 1, .displacement_search = false, .tilt = false};
+  return to_unbounded(2.0 * correlation) -
+         to_unbounded(2.0 * home_vector(home, mirror(current), options).correlation);
+}
+
 std::optional<HomeVector> find_second_vector(const HomingView& home, const HomingView& current,
                                              const HomeVector& first,
                                              FourierHomingOptions options) {

@@ -36,6 +36,7 @@ std::optional<PhaseReading> read_phases(const HomingView& a, const HomingView& b
   reading.turn_rad = wrap_angle(-from_b.heading_rad + 0.5 * turns_differ);
   reading.turn_disagreement_rad = std::abs(turns_differ);
   reading.residual = 0.5 * (from_a.residual + from_b.residual);
+  reading.correlation = 0.5 * (from_a.correlation + from_b.correlation);
   reading.has_direction = from_a.has_direction() && from_b.has_direction();
   if (!reading.has_direction) return reading;
   reading.length = 0.5 * (from_a.length() + from_b.length());

@@ -24,6 +24,8 @@ struct PhaseReading {
   /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1: the
   /// mean of both readings.
   double residual = 1.0;
+  /// Normalised correlation of the views at the turn, -1 .. 1: the mean of both readings.
+  double correlation = 0.0;
 
   /// Returns the pose of b in the frame of a, by the mean of both directions. `unit`: length of R.
   [[nodiscard]] Pose2 a_from_b(double unit = 1.0) const;

@@ -149,6 +149,24 @@ void learn_probabilities(std::size_t nodes, std::vector<LatticeLink>& links) {
   }
 }
 
+/// Updates the probability of each link by the excess of its correlation over that with a mirrored
+/// view. Ranks and triangles alone take links along similar shelves for certain.
+void weigh_against_mirror(std::span<const double> excess, std::vector<LatticeLink>& links) {
+  // Logistic regression on the links of five arrangements (`loop` twice, `garden`,
+  // `small_warehouse`, `small_house`, 0.5 m). Held out by world, the area under the curve rises
+  // from 0.83 .. 0.97 to 0.92 .. 0.98.
+  constexpr double of_prior = 0.3;
+  constexpr double of_excess = 8.2;
+  constexpr double offset = -2.2;
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    const double prior = links[k].probability;
+    const double log_odds =
+        of_prior * std::log(prior / (1.0 - prior)) + of_excess * excess[k] + offset;
+    links[k].probability =
+        std::clamp(1.0 / (1.0 + std::exp(-log_odds)), min_probability, max_probability);
+  }
+}
+
 /// Rescales links by the local spacing of views. The unit of phases is the distance of the things
 /// around, which is large in halls and small in corridors; but spacings may differ, too. So half of
 /// the difference of a spacing (in that unit) from the median is attributed to the unit.
@@ -189,12 +207,15 @@ bool is_near(const Pose2& a, const Pose2& b, double max_distance) {
 std::vector<LatticeLink> make_links(std::size_t nodes, std::span<const Lattice::Spring> springs,
                                     double unit) {
   std::vector<LatticeLink> links;
+  std::vector<double> excess;
   for (const Lattice::Spring& spring : springs) {
     if (!spring.phases || !has_agreeing_views(spring)) continue;
     links.push_back({spring.a, spring.b, spring.phases->a_from_b(unit),
                      unit * spring.phases->length, spring.phases->residual, 0.0});
+    excess.push_back(spring.excess_over_mirror);
   }
   learn_probabilities(nodes, links);
+  if (nodes > 2) weigh_against_mirror(excess, links);
   rescale_to_spacings(nodes, links);
   return links;
 }

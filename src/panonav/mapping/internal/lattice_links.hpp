@@ -29,8 +29,8 @@ struct LatticeLink {
 [[nodiscard]] bool is_near(const Pose2& a, const Pose2& b, double max_distance);
 
 /// Makes links of the springs whose views agree. Probabilities are learnt from ranks of similarity
-/// and closing triangles; lengths are rescaled by the local spacing of views, and lengths of 0 stay
-/// 0.
+/// and closing triangles, and updated by the comparison with a mirrored view; lengths are rescaled
+/// by the local spacing of views, and lengths of 0 stay 0.
 [[nodiscard]] std::vector<LatticeLink> make_links(std::size_t nodes,
                                                   std::span<const Lattice::Spring> springs,
                                                   double unit);

@@ -59,11 +59,36 @@ SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& optio
 std::vector<NodePair> SpringViews::find_most_similar_pairs(const LatticeOptions& options,
                                                            Executor& executor) const {
   const auto views = memory_->views();
+  return find_pairs(options.neighbours, executor,
+                    [&](std::size_t i) { return std::vector<ViewId>{views[i]}; });
+}
+
+std::vector<NodePair> SpringViews::find_similar_pairs_across(
+    std::span<const std::size_t> components, int count, Executor& executor) const {
+  const auto views = memory_->views();
+  std::map<std::size_t, std::vector<ViewId>> members;
+  for (std::size_t i = 0; i < components.size(); ++i) members[components[i]].push_back(views[i]);
+  if (members.size() < 2) return {};
+  const std::size_t largest =
+      std::ranges::max_element(members, {}, [](const auto& p) { return p.second.size(); })->first;
+  return find_pairs(count, executor, [&](std::size_t i) {
+    // All views are excluded for a view of the largest component.
+    return components[i] == largest ? std::vector<ViewId>(views.begin(), views.end())
+                                    : members.at(components[i]);
+  });
+}
+
+template <class Excluded>
+std::vector<NodePair> SpringViews::find_pairs(int count, Executor& executor,
+                                              const Excluded& excluded) const {
+  const auto views = memory_->views();
   std::vector<std::vector<NodePair>> found(views.size());
   executor.for_each_chunk(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
-      const auto answer = memory_->search(packed_[i], {options.neighbours, components_},
-                                          {.excluded_views = views.subspan(i, 1)});
+      const std::vector<ViewId> left_out = excluded(i);
+      if (left_out.size() == views.size()) continue;
+      const auto answer =
+          memory_->search(packed_[i], {count, components_}, {.excluded_views = left_out});
       for (const Match& match : answer.matches) {
         if (!are_on_one_floor(*memory_, match.view, views[i])) continue;
         const auto j =
@@ -87,6 +112,10 @@ Lattice::Spring SpringViews::measure(NodePair pair,
                                      const std::optional<HeadingWindow>& window) const {
   Lattice::Spring spring{.a = pair.first, .b = pair.second, .dissimilarity = dissimilarity(pair)};
   if (!homing_.empty()) spring.phases = read_phases(homing_[spring.a], homing_[spring.b], window);
+  if (spring.phases) {
+    spring.excess_over_mirror = compute_excess_over_mirror(homing_[spring.b], homing_[spring.a],
+                                                           spring.phases->correlation);
+  }
   return spring;
 }
 

@@ -34,6 +34,10 @@ class SpringViews {
   /// Returns the pairs of each view and its `neighbours` most similar ones, ascending, each once.
   [[nodiscard]] std::vector<NodePair> find_most_similar_pairs(const LatticeOptions& options,
                                                               Executor& executor) const;
+  /// Returns the pairs of each view outside the largest component and the `count` most similar
+  /// views of other components, ascending, each once.
+  [[nodiscard]] std::vector<NodePair> find_similar_pairs_across(
+      std::span<const std::size_t> components, int count, Executor& executor) const;
   [[nodiscard]] double dissimilarity(NodePair pair) const;
   /// Measures the dissimilarity of a pair and, with the option `phases`, the phases; does not set
   /// the length. `window`: allowed headings of the second node minus those of the first.
@@ -45,6 +49,12 @@ class SpringViews {
   [[nodiscard]] double direction_probability(NodePair pair) const;
 
  private:
+  /// Returns the pairs of each view and the `count` most similar ones, without the views that
+  /// `excluded(node)` returns.
+  template <class Excluded>
+  [[nodiscard]] std::vector<NodePair> find_pairs(int count, Executor& executor,
+                                                 const Excluded& excluded) const;
+
   const VisualMemory* memory_;
   int components_;
   std::vector<PackedSignature> packed_;

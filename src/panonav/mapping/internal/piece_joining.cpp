@@ -22,6 +22,11 @@ constexpr double drift_share = 0.25;
 /// Probability that the turn of a wrong link agrees: 15 of 45 degrees, as rooms have right angles.
 constexpr double p_heading_chance = 1.0 / 3.0;
 
+/// Largest number of crossings between two pieces.
+constexpr std::size_t max_crossings = 3;
+/// Smallest probability of a crossing: a wrong one costs a detour, which the robot notices.
+constexpr double min_crossing_probability = 0.5;
+
 class JoinSearch {
  public:
   JoinSearch(std::span<const Pose2> poses, std::span<const CrossLink> links)
@@ -44,6 +49,22 @@ class JoinSearch {
     }
     if (best->evidence - other < min_evidence) return std::nullopt;
     return PieceJoin{average(*best), best->agreeing};
+  }
+
+  /// Returns the most probable links that agree with the best relative pose, without those that are
+  /// less probable than not.
+  [[nodiscard]] std::vector<std::size_t> find_crossings() const {
+    std::optional<Hypothesis> best;
+    for (const std::size_t k : by_probability_) {
+      Hypothesis each = test(k);
+      if (!best || each.evidence > best->evidence) best = std::move(each);
+    }
+    std::vector<std::size_t> chosen;
+    for (const std::size_t k : by_probability_) {
+      if (chosen.size() == max_crossings || links_[k].probability < min_crossing_probability) break;
+      if (std::ranges::binary_search(best->agreeing, k)) chosen.push_back(k);
+    }
+    return chosen;
   }
 
  private:
@@ -157,23 +178,38 @@ std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> links_be
   return between;
 }
 
-std::optional<FoundJoin> find_best_join(std::span<const CrossLink> links,
-                                        std::span<const Pose2> poses,
-                                        std::span<const std::size_t> components) {
+/// Returns the links with these numbers, each from a view of piece p.
+std::vector<CrossLink> links_from(std::size_t p, std::span<const std::size_t> numbers,
+                                  std::span<const CrossLink> links,
+                                  std::span<const std::size_t> components) {
+  std::vector<CrossLink> own;
+  for (const std::size_t k : numbers) {
+    CrossLink link = links[k];
+    if (components[link.in_p] != p) {
+      std::swap(link.in_p, link.in_q);
+      link.step = inverse(link.step);
+    }
+    own.push_back(link);
+  }
+  return own;
+}
+
+std::map<std::size_t, std::size_t> count_views(std::span<const std::size_t> components) {
   std::map<std::size_t, std::size_t> views;
   for (const std::size_t component : components) ++views[component];
+  return views;
+}
+
+std::optional<FoundJoin> find_best_join(std::span<const CrossLink> links,
+                                        std::span<const Pose2> poses,
+                                        std::span<const std::size_t> components,
+                                        std::size_t min_views) {
+  const auto views = count_views(components);
   std::optional<FoundJoin> best;
   for (const auto& [pieces, numbers] : links_between(links, components, views)) {
-    std::vector<CrossLink> own;
-    for (const std::size_t k : numbers) {
-      CrossLink link = links[k];
-      if (components[link.in_p] != pieces.first) {
-        std::swap(link.in_p, link.in_q);
-        link.step = inverse(link.step);
-      }
-      own.push_back(link);
-    }
+    const auto own = links_from(pieces.first, numbers, links, components);
     const std::size_t smaller_views = views.at(pieces.second);
+    if (smaller_views < min_views) continue;
     const auto found = find_piece_join(poses, own, smaller_views);
     if (!found || (best && best->agreeing.size() >= found->agreeing.size())) continue;
     best = FoundJoin{pieces.first, pieces.second, smaller_views, {}, found->p_from_q};
@@ -185,9 +221,9 @@ std::optional<FoundJoin> find_best_join(std::span<const CrossLink> links,
 }  // namespace
 
 std::vector<JoinedPieces> join_pieces(std::span<const CrossLink> links, std::vector<Pose2>& poses,
-                                      std::vector<std::size_t>& components) {
+                                      std::vector<std::size_t>& components, std::size_t min_views) {
   std::vector<JoinedPieces> joined;
-  while (const auto join = find_best_join(links, poses, components)) {
+  while (const auto join = find_best_join(links, poses, components, min_views)) {
     for (std::size_t i = 0; i < poses.size(); ++i) {
       if (components[i] != join->q) continue;
       components[i] = join->p;
@@ -203,6 +239,21 @@ std::optional<PieceJoin> find_piece_join(std::span<const Pose2> poses,
                                          std::size_t smaller_views) {
   return JoinSearch(poses, links)
       .find_best(std::log(min_join_odds * static_cast<double>(smaller_views)));
+}
+
+std::vector<std::size_t> choose_crossings(std::span<const CrossLink> links,
+                                          std::span<const Pose2> poses,
+                                          std::span<const std::size_t> components) {
+  std::vector<std::size_t> chosen;
+  const auto views = count_views(components);
+  for (const auto& [pieces, numbers] : links_between(links, components, views)) {
+    const auto own = links_from(pieces.first, numbers, links, components);
+    for (const std::size_t i : JoinSearch(poses, own).find_crossings()) {
+      chosen.push_back(numbers[i]);
+    }
+  }
+  std::ranges::sort(chosen);
+  return chosen;
 }
 
 }  // namespace panonav

@@ -41,9 +41,17 @@ struct JoinedPieces {
 
 /// Joins the pieces of a layout (`components` of the nodes) by their cross links, those with most
 /// agreeing links first: moves the views of the smaller one and gives them the number of the larger
-/// one. Links inside a piece are not used.
+/// one. Links inside a piece are not used; pieces of fewer than `min_views` views are not joined.
 [[nodiscard]] std::vector<JoinedPieces> join_pieces(std::span<const CrossLink> links,
                                                     std::vector<Pose2>& poses,
-                                                    std::vector<std::size_t>& components);
+                                                    std::vector<std::size_t>& components,
+                                                    std::size_t min_views);
+
+/// Returns the numbers of links by which a robot can cross between two pieces, ascending: at most
+/// three for each two pieces, the most probable ones that agree with the relative pose of the
+/// largest evidence and are more probable than not.
+[[nodiscard]] std::vector<std::size_t> choose_crossings(std::span<const CrossLink> links,
+                                                        std::span<const Pose2> poses,
+                                                        std::span<const std::size_t> components);
 
 }  // namespace panonav

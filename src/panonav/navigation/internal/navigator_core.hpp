@@ -186,7 +186,7 @@ struct Navigator::Core {
   void home_to_goal(Step& step);
   [[nodiscard]] std::optional<double> direction_to_known_place(const QueryView& view);
   [[nodiscard]] bool return_to_known_place(Step& step);
-  void commit_to_edge_if_needed();
+  void commit_to_edge_if_needed(Step& step);
   [[nodiscard]] std::optional<double> direction_along_edge(std::size_t from, const Guide& ahead,
                                                            const Step& step);
   void follow_field(Step& step);
