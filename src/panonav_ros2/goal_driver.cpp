@@ -51,7 +51,7 @@ void GoalDriver::start(const Mission& mission) {
   }
   mission_ = mission;
   if (route_driver_)
-    mission_.min_correlation = route_driver_->follower().tracker().min_correlation();
+    mission_.min_correlation = route_driver_->follower().tracker().limits().min_correlation;
   const std::lock_guard lock(mutex_);
   has_mission_ = true;
   last_command_ = Steady::now();

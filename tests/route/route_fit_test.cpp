@@ -70,6 +70,56 @@ TEST(RouteCrossing, IsTheNearestOfAllStretches) {
   }
 }
 
+// The index finds what a scan of all segments of the window finds, on paths of any shape: straight
+// along an axis, back and forth, with jumps, with a viewpoint on the path.
+TEST(PathIndex, FindsTheCrossingsAndWindowsOfAScan) {
+  Random random(12);
+  std::size_t crossed = 0;
+  std::size_t missed = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<Pose2> path;
+    const int shape = trial % 4;
+    for (int i = 0; i < 3 + trial; ++i) {
+      const double along_m = 0.07 * i;
+      path.push_back(shape == 0   ? Pose2{along_m, 0.5, 0.0}
+                     : shape == 1 ? Pose2{2.0 * std::sin(3.1 * along_m), std::cos(along_m), 0.0}
+                     : shape == 2 ? Pose2{random.uniform(-4, 4), random.uniform(-1, 1), 0.0}
+                                  : Pose2{std::abs(2.0 - along_m), 0.01 * i, 0.0});
+    }
+    const PathIndex index(path);
+    const Point2 viewpoint = trial % 3 == 0 ? path[path.size() / 2].position()
+                                            : Point2{random.uniform(-5, 5), random.uniform(-3, 3)};
+    const double reach_m = random.uniform(0.5, 6.0);
+    const auto distance_m = [&](const Pose2& pose) { return distance(pose.position(), viewpoint); };
+    auto begin =
+        static_cast<std::size_t>(std::ranges::min_element(path, {}, distance_m) - path.begin());
+    std::size_t end = begin;
+    while (end < path.size() && distance_m(path[end]) < reach_m) ++end;
+    while (end > 0 && begin > 0 && distance_m(path[begin - 1]) < reach_m) --begin;
+    const auto window = index.find_window(viewpoint, reach_m);
+    ASSERT_EQ(window.has_value(), end >= begin + 2 && end > 0) << trial;
+    if (!window) continue;
+    ASSERT_EQ(window->begin, begin) << trial;
+    ASSERT_EQ(window->end, end) << trial;
+    for (const std::size_t count : {48U, 361U}) {
+      const auto directions = equal_directions(count);
+      std::vector<RouteCrossing> scanned(count);
+      std::vector<RouteCrossing> found(count);
+      find_crossings(std::span(path).subspan(begin, end - begin), begin, viewpoint, directions,
+                     scanned);
+      index.find_crossings(*window, viewpoint, directions, found);
+      for (std::size_t c = 0; c < count; ++c) {
+        ASSERT_EQ(found[c].along < 0.0F, scanned[c].along < 0.0F) << trial << " " << c;
+        ++(found[c].along < 0.0F ? missed : crossed);
+        EXPECT_NEAR(std::abs(found[c].distance_m), std::abs(scanned[c].distance_m), 1e-5);
+        EXPECT_NEAR(found[c].along, scanned[c].along, 1e-3) << trial << " " << c;
+      }
+    }
+  }
+  EXPECT_GT(crossed, 10000U);
+  EXPECT_GT(missed, 10000U);
+}
+
 TEST(RouteCrossing, ChangesWithTheViewpointAsItSays) {
   const auto path = smooth_path(std::vector<Point2>{{-3, 0}, {-1, 0.4}, {1, -0.3}, {3, 0.2}}, 0.1);
   const auto directions = equal_directions(72);

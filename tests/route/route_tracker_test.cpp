@@ -86,7 +86,7 @@ TEST(RouteLimits, RefuseOtherWorldsAndKeepTheirOwn) {
       route.append(pose, rooms[world].line(pose));
     }
     const RouteTracker tracker(route);
-    EXPECT_GT(tracker.min_detail_correlation(), 0.0);
+    EXPECT_GT(tracker.limits().min_detail_correlation, 0.0);
     for (std::size_t other = 0; other < worlds; ++other) {
       for (int trial = 0; trial < trials; ++trial) {
         const bool found = tracker.search(rooms[other].line(draw_pose())).has_value();
@@ -295,9 +295,12 @@ TEST_F(RouteTracking, CarriesOdometryThroughABlindStretch) {
 }
 
 TEST_F(RouteTracking, ChecksItsInputs) {
+  EXPECT_THROW((void)RouteTracker(route, {}, {}, RouteLimits{.min_correlation = 1.5}),
+               ContractError);
+  EXPECT_THROW((void)RouteTracker(route, {}, {}, RouteLimits{.detail_scale = 4}), ContractError);
   EXPECT_THROW((void)RouteTracker(route, {.search_step_m = 0.0}), OptionError);
   RouteTracker tracker(route, {.min_correlation = 0.8});
-  EXPECT_EQ(tracker.min_correlation(), 0.8);
+  EXPECT_EQ(tracker.limits().min_correlation, 0.8);
   EXPECT_THROW((void)tracker.search(std::vector<float>(10, 0.0F)), ContractError);
   EXPECT_THROW((void)tracker.track(std::vector<float>(10, 0.0F), {}), ContractError);
 }

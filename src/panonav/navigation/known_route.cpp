@@ -28,9 +28,11 @@ std::span<const double> KnownRoute::along_m(ViewId view) const {
 }
 
 KnownRoute make_known_route(const RoutePanorama& route, std::span<const KnownRoute::View> views,
-                            const KnownRouteOptions& options) {
+                            const KnownRouteOptions& options,
+                            const std::optional<RouteLimits>& learnt) {
   validate(options);
-  KnownRoute known{RouteTracker(route, options.tracker, options.fit), {}, options.max_lateral_m};
+  KnownRoute known{
+      RouteTracker(route, options.tracker, options.fit, learnt), {}, options.max_lateral_m};
   for (const KnownRoute::View& placed : views) {
     if (!std::isfinite(placed.pose.x_m) || !std::isfinite(placed.pose.y_m)) {
       throw ContractError("place of view " + std::to_string(placed.view.value), "not finite",

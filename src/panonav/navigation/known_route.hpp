@@ -47,9 +47,11 @@ struct KnownRoute {
 /// Assigns references to a route by their poses in the route's frame (the same as in the memory if
 /// both were recorded in one drive). Leaves out references farther than `max_lateral_m` from the
 /// route. Throws ContractError on a route of fewer than two lines, a pose that is not finite or a
-/// view that comes twice; OptionError. Cost: that of a `RouteTracker`, and views times lines.
+/// view that comes twice; OptionError. `learnt`: as for a `RouteTracker`. Cost: that of a
+/// `RouteTracker`, and views times lines.
 [[nodiscard]] KnownRoute make_known_route(const RoutePanorama& route,
                                           std::span<const KnownRoute::View> views,
-                                          const KnownRouteOptions& options = {});
+                                          const KnownRouteOptions& options = {},
+                                          const std::optional<RouteLimits>& learnt = std::nullopt);
 
 }  // namespace panonav

@@ -11,6 +11,7 @@
 #include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/learnt_route.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/route/route_panorama.hpp"
 
@@ -166,6 +167,7 @@ std::optional<double> scale_routes(MemoryFile& memory, double factor) {
     memory.remove_route(name);
     static_cast<void>(memory.append_route(name, scaled));
     store_route_source(memory, name, source);
+    learn_and_store_route(memory, name);
   }
   return new_scale;
 }

@@ -20,6 +20,7 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/learnt_route.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/memory_map.hpp"
@@ -402,6 +403,7 @@ class Merge {
       if (new_name != name) ++result_.renamed;
       file.append_route(new_name, moved);
       store_route_source(file, new_name, source);
+      learn_and_store_route(file, new_name);
     }
   }
 

@@ -36,16 +36,13 @@ std::size_t find_next(std::span<const PosedImage> images, std::size_t at, const 
   return images.size();
 }
 
-double length(const Pose2& step) {
-  return std::hypot(step.x_m, step.y_m);
-}
-
 bool is_move(const Pose2& step) {
-  return length(step) >= min_step_m;
+  return std::hypot(step.x_m, step.y_m) >= min_step_m;
 }
 
 bool is_turn(const Pose2& step) {
-  return std::abs(step.heading_rad) >= min_turn_rad && length(step) <= max_turn_step_m;
+  return std::abs(step.heading_rad) >= min_turn_rad &&
+         std::hypot(step.x_m, step.y_m) <= max_turn_step_m;
 }
 
 /// Returns the number of the nearest image a step away in another direction than that of `next`;

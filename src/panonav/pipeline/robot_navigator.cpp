@@ -10,6 +10,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/memory/floors.hpp"
+#include "panonav/pipeline/learnt_route.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
@@ -119,7 +120,8 @@ KnownRoute load_known_route(const MemoryFileViews& source, const std::string& na
       if (pose) views.push_back({view, {pose->x_m, pose->y_m, pose->heading_rad.value_or(0.0)}});
     }
   }
-  KnownRoute known = make_known_route(route, views, options);
+  KnownRoute known = make_known_route(
+      route, views, options, load_route_limits(file, name, route, options.tracker, options.fit));
   if (known.references.empty()) {
     throw FileError(path, "none of the " + std::to_string(views.size()) +
                               " views with a pose lies within " +

@@ -3,14 +3,18 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/learnt_route.hpp"
 
 namespace panonav {
 
 namespace {
 
-RouteFitOptions scale_fit(RouteFitOptions fit, const RouteSource& source) {
-  fit.metre = 1.0 / source.rough_unit_m();
-  return fit;
+RouteTracker make_tracker(const MemoryFile& memory, const std::string& name,
+                          const RouteSource& source, const RouteFollowerOptions& options) {
+  const RoutePanorama route = load_route_to_follow(memory, name);
+  const RouteFitOptions fit = scale_fit(options.fit, source);
+  return RouteTracker(route, options.tracker, fit,
+                      load_route_limits(memory, name, route, options.tracker, fit));
 }
 
 }  // namespace
@@ -26,8 +30,7 @@ RouteFollower::RouteFollower(const MemoryFile& memory, const std::optional<Pictu
       source_(read_route_source(memory, name_, memory.route(name_).value().columns())),
       views_(memory.header(), source.value_or(memory.header().source)),
       encoder_(source.value_or(memory.header().source), source_),
-      tracker_(load_route_to_follow(memory, name_), options.tracker,
-               scale_fit(options.fit, source_)),
+      tracker_(make_tracker(memory, name_, source_, options)),
       changes_(tracker_.lines().poses()) {}
 
 RouteFollower::Step RouteFollower::step(std::vector<float> line,

@@ -7,6 +7,7 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/pipeline/learnt_route.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -400,6 +401,7 @@ RouteRecorder::Recorded RouteRecorder::record(
 
 RouteRecorder::Recorded RouteRecorder::finish() {
   flush();
+  learn_and_store_route(file_, options_.name);
   auto route = file_.route(options_.name);
   if (!route) throw ContractError("lines of the route", 0.0, "1 or more");
   return {

@@ -79,7 +79,7 @@ struct RouteLines::Linearised {
 class RouteLines::FitProblem {
  public:
   FitProblem(const RouteLines& route, const Level& level, std::span<const float> line,
-             const Window& window, Pose2& pose)
+             const LineWindow& window, Pose2& pose)
       : route_(route),
         level_(level),
         line_(smooth_line(line, level.sigma)),
@@ -115,7 +115,7 @@ class RouteLines::FitProblem {
   const RouteLines& route_;
   const Level& level_;
   std::vector<float> line_;
-  const Window& window_;
+  const LineWindow& window_;
   Pose2& pose_;
   double settled_tolerance_;  // in metres and radians
   std::vector<Term> terms_;
@@ -139,7 +139,8 @@ void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
 RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& options)
     : columns_(route.columns()),
       options_(options),
-      poses_(route.poses().begin(), route.poses().end()) {
+      poses_(route.poses().begin(), route.poses().end()),
+      path_(poses_) {
   validate(options);
   if (route.size() < 2) {
     throw ContractError("lines of the route", static_cast<double>(route.size()), "2 or more");
@@ -171,26 +172,14 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
   }
 }
 
-std::optional<RouteLines::Window> RouteLines::find_window(Point2 position) const {
-  const auto distance_m = [&](const Pose2& pose) { return distance(pose.position(), position); };
-  const auto nearest =
-      static_cast<std::size_t>(std::ranges::min_element(poses_, {}, distance_m) - poses_.begin());
-  const auto is_in_reach = [&](std::size_t i) {
-    return distance_m(poses_[i]) < options_.reach_m * options_.metre;
-  };
-  if (!is_in_reach(nearest)) return std::nullopt;
-  Window found{nearest, nearest + 1};
-  while (found.begin > 0 && is_in_reach(found.begin - 1)) --found.begin;
-  while (found.end < poses_.size() && is_in_reach(found.end)) ++found.end;
-  if (found.end - found.begin < 2) return std::nullopt;
-  return found;
+std::optional<LineWindow> RouteLines::find_window(Point2 position) const {
+  return path_.find_window(position, options_.reach_m * options_.metre);
 }
 
 std::vector<RouteCrossing> RouteLines::find_crossings_in(
-    const Window& window, Point2 viewpoint, std::span<const Direction2> directions) const {
+    const LineWindow& window, Point2 viewpoint, std::span<const Direction2> directions) const {
   std::vector<RouteCrossing> crossings(directions.size());
-  find_crossings(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
-                 viewpoint, directions, crossings);
+  path_.find_crossings(window, viewpoint, directions, crossings);
   return crossings;
 }
 
@@ -204,7 +193,7 @@ float RouteLines::expected_value(const Level& level, float along,
 }
 
 bool RouteLines::collect_terms(const Level& level, std::span<const float> line, const Pose2& pose,
-                               const Window& window, std::vector<Term>& terms) const {
+                               const LineWindow& window, std::vector<Term>& terms) const {
   const auto crossings = find_crossings_in(window, pose.position(), level.directions);
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
   const double rotation = pose.heading_rad * columns_per_rad;
@@ -438,7 +427,8 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
 }
 
 std::optional<RouteFix> RouteLines::make_fix(std::span<const float> line, const Pose2& pose,
-                                             const Linearised& fitted, const Window& window) const {
+                                             const Linearised& fitted,
+                                             const LineWindow& window) const {
   const Equations::Matrix inverse =
       fitted.equations.matrix.ldlt().solve(Equations::Matrix::Identity());
   if (!inverse.allFinite()) return std::nullopt;

@@ -87,12 +87,20 @@ class RouteLines {
     Pose2 pose;                ///< in the route's frame
     double correlation = 0.0;  ///< at the coarsest level
   };
-  /// Finds the heading at `position` where a line correlates best with the expected line, at the
-  /// coarsest level. nullopt if the lines of sight cross the path in fewer than half of all
-  /// directions. Throws ContractError unless `coarse_line` comes from `to_coarse_line`. Cost:
-  /// O(lines in reach + columns) and some thousand multiplications.
-  [[nodiscard]] std::optional<Candidate> find_candidate(std::span<const float> coarse_line,
-                                                        Point2 position) const;
+  /// A view that the route predicts at the coarsest level.
+  struct CoarseView {
+    Point2 position;  ///< in the route's frame
+    /// Line in the world's frame; NaN where no line of sight crosses the path.
+    std::vector<float> expected;
+  };
+  /// Returns the coarse view at a position; nullopt if the lines of sight cross the path in fewer
+  /// than half of all directions. Cost: a few microseconds.
+  [[nodiscard]] std::optional<CoarseView> make_coarse_view(Point2 position) const;
+  /// Finds the heading at which a line correlates best with a coarse view; nullopt where it has no
+  /// structure. Throws ContractError unless `coarse_line` comes from `to_coarse_line`. Cost: some
+  /// ten thousand multiplications.
+  [[nodiscard]] static std::optional<Candidate> find_candidate(std::span<const float> coarse_line,
+                                                               const CoarseView& view);
   /// Converts a line for `find_candidate`.
   [[nodiscard]] std::vector<float> to_coarse_line(std::span<const float> line) const;
 
@@ -117,22 +125,17 @@ class RouteLines {
     std::vector<Direction2> directions;  // of these
     std::vector<float> values;           // line by line, in the world's frame
   };
-  /// Lines begin .. end - 1, which are in reach.
-  struct Window {
-    std::size_t begin = 0;
-    std::size_t end = 0;
-  };
   struct Term;
   struct Linearised;
   class FitProblem;
-  [[nodiscard]] std::optional<Window> find_window(Point2 position) const;
+  [[nodiscard]] std::optional<LineWindow> find_window(Point2 position) const;
   [[nodiscard]] std::vector<RouteCrossing> find_crossings_in(
-      const Window& window, Point2 viewpoint, std::span<const Direction2> directions) const;
+      const LineWindow& window, Point2 viewpoint, std::span<const Direction2> directions) const;
   /// The value of the route in a column where a line of sight crosses the path.
   [[nodiscard]] float expected_value(const Level& level, float along,
                                      std::size_t column) const noexcept;
   [[nodiscard]] bool collect_terms(const Level& level, std::span<const float> line,
-                                   const Pose2& pose, const Window& window,
+                                   const Pose2& pose, const LineWindow& window,
                                    std::vector<Term>& terms) const;
   [[nodiscard]] static std::array<double, RouteFix::detail_scales_deg.size()> correlate_details(
       const std::vector<Term>& terms, std::size_t columns);
@@ -143,12 +146,13 @@ class RouteLines {
   /// singular.
   [[nodiscard]] std::optional<RouteFix> make_fix(std::span<const float> line, const Pose2& pose,
                                                  const Linearised& fitted,
-                                                 const Window& window) const;
+                                                 const LineWindow& window) const;
   void check_line(std::span<const float> line) const;
 
   int columns_;
   RouteFitOptions options_;
   std::vector<Pose2> poses_;
+  PathIndex path_;             // of the poses
   std::vector<Level> levels_;  // coarse first
 };
 

@@ -53,11 +53,40 @@ struct Correlation {
 // finite.
 Correlation find_best_rotation(std::span<const float> expected, std::span<const float> line) {
   const std::size_t size = expected.size();
+  // The line and its squares in reverse order of rotation, twice, so that no index wraps.
+  std::vector<double> turned(2 * size);
+  std::vector<double> squares(2 * size);
+  for (std::size_t c = 0; c < turned.size(); ++c) {
+    turned[c] = static_cast<double>(line[(2 * size - 1 - c) % size]);
+    squares[c] = turned[c] * turned[c];
+  }
+  // Sums as in `correlate`, for all rotations at once.
+  double n = 0.0;
+  double x = 0.0;
+  double xx = 0.0;
+  std::vector<double> y(size, 0.0);
+  std::vector<double> yy(size, 0.0);
+  std::vector<double> xy(size, 0.0);
+  for (std::size_t c = 0; c < size; ++c) {
+    if (!std::isfinite(expected[c])) continue;
+    const auto a = static_cast<double>(expected[c]);
+    n += 1.0;
+    x += a;
+    xx += a * a;
+    // Rotation r compares column c with column c - r of the line.
+    const double* const values = turned.data() + (size - 1 - c);
+    const double* const value_squares = squares.data() + (size - 1 - c);
+    for (std::size_t r = 0; r < size; ++r) {
+      y[r] += values[r];
+      yy[r] += value_squares[r];
+      xy[r] += a * values[r];
+    }
+  }
   std::vector<double> values(size, -1.0);
-  std::vector<float> turned(2 * size);  // twice, so that no index wraps
-  for (std::size_t c = 0; c < turned.size(); ++c) turned[c] = line[c % size];
-  for (std::size_t rotation = 0; rotation < size; ++rotation) {
-    values[rotation] = correlate(expected, std::span(turned).subspan(size - rotation, size));
+  const double vx = xx - x * x / n;
+  for (std::size_t r = 0; r < size; ++r) {
+    const double vy = yy[r] - y[r] * y[r] / n;
+    if (vx > 1e-9 && vy > 1e-9) values[r] = (xy[r] - x * y[r] / n) / std::sqrt(vx * vy);
   }
   const auto at = static_cast<std::size_t>(std::ranges::max_element(values) - values.begin());
   // Interpolates the maximum by a parabola through the highest value and its neighbours.
@@ -175,29 +204,34 @@ std::vector<float> RouteLines::to_coarse_line(std::span<const float> line) const
   return result;
 }
 
-std::optional<RouteLines::Candidate> RouteLines::find_candidate(std::span<const float> coarse_line,
-                                                                Point2 position) const {
-  if (coarse_line.size() != coarse_columns) {
-    throw ContractError("values of the coarse line", static_cast<double>(coarse_line.size()),
-                        std::to_string(coarse_columns));
-  }
+std::optional<RouteLines::CoarseView> RouteLines::make_coarse_view(Point2 position) const {
   const auto window = find_window(position);
   if (!window) return std::nullopt;
   static const std::vector<Direction2> directions = equal_directions(coarse_columns);
   const auto crossings = find_crossings_in(*window, position, directions);
-  std::vector<float> expected(coarse_columns, std::numeric_limits<float>::quiet_NaN());
+  CoarseView view{position,
+                  std::vector<float>(coarse_columns, std::numeric_limits<float>::quiet_NaN())};
   std::size_t count = 0;
   const auto size = static_cast<std::size_t>(columns_);
   for (std::size_t c = 0; c < coarse_columns; ++c) {
     if (crossings[c].along < 0.0F) continue;
     const std::size_t column = (c * size + coarse_columns / 2) / coarse_columns % size;
-    expected[c] = expected_value(levels_.front(), crossings[c].along, column);
+    view.expected[c] = expected_value(levels_.front(), crossings[c].along, column);
     ++count;
   }
   if (2 * count < coarse_columns) return std::nullopt;
-  const Correlation best = find_best_rotation(expected, coarse_line);
+  return view;
+}
+
+std::optional<RouteLines::Candidate> RouteLines::find_candidate(std::span<const float> coarse_line,
+                                                                const CoarseView& view) {
+  if (coarse_line.size() != coarse_columns) {
+    throw ContractError("values of the coarse line", static_cast<double>(coarse_line.size()),
+                        std::to_string(coarse_columns));
+  }
+  const Correlation best = find_best_rotation(view.expected, coarse_line);
   if (!(best.value > -1.0)) return std::nullopt;
-  return Candidate{{position.x_m, position.y_m,
+  return Candidate{{view.position.x_m, view.position.y_m,
                     wrap_angle(best.rotation * 2.0 * std::numbers::pi / coarse_columns)},
                    best.value};
 }

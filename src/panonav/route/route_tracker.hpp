@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "panonav/core/options.hpp"
 #include "panonav/route/route_fit.hpp"
@@ -26,23 +28,37 @@ struct RouteTrackerOptions {
 };
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 
+/// Values that a tracker learns from a route: limits of accepted fits, and errors beyond the noise.
+struct RouteLimits {
+  double min_correlation = 0.0;  ///< smallest correlation of an accepted fit, 0 .. 1
+  /// Smallest detail correlation of an accepted fit, below 1; -1: not tested.
+  double min_detail_correlation = -1.0;
+  std::size_t detail_scale = 0;      ///< of this, in `RouteFix::detail_scales_deg`
+  double model_variance_m2 = 0.0;    ///< of x and of y, beyond the noise of the lines, >= 0
+  double model_variance_rad2 = 0.0;  ///< of the heading, likewise
+  friend bool operator==(const RouteLimits&, const RouteLimits&) = default;
+};
+/// True if all values are in their ranges.
+[[nodiscard]] bool is_valid(const RouteLimits& limits);
+
 /// Follows a robot along a route panorama: odometry predicts the pose, and each line corrects it.
 /// Without a prediction, or if it fails, the whole route is searched. Deterministic; a copy
 /// continues like the original.
 class RouteTracker {
  public:
-  /// Learns from lines left out of the route, and from lines of no place (negatives and shuffled
-  /// ones):
-  /// - the smallest correlation: above the 95 % quantile of lines of no place by a third of the
+  /// Learns from lines left out of the route, and from negative and shuffled ones, of no place:
+  /// - the smallest correlation: above the 95 % quantile for no place by a third of the
   ///   distance to the 5 % quantile of the lines;
-  /// - the smallest detail correlation: that 1 % of lines of no place exceed, at the finest scale
+  /// - the smallest detail correlation: that 1 % for no place exceed, at the finest scale
   ///   at which most lines exceed it;
-  /// - the variance of errors beyond the noise, so that 95 % of the fits that start `surprise_m`
-  ///   beside the truth lie within the ellipse; that of positions between two lines for few fits.
+  /// - the variance beyond the noise: 95 % of fits from `surprise_m` beside the truth are then in
+  ///   the ellipse; for few fits that between two lines.
   ///
-  /// Throws OptionError, and ContractError on a route of fewer than two lines. Cost: 80 searches.
+  /// `learnt`: of a tracker of this route and options; nothing is then learnt. Throws OptionError,
+  /// ContractError on fewer than two lines or invalid limits. Cost: 80 searches.
   explicit RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options = {},
-                        const RouteFitOptions& fit = {});
+                        const RouteFitOptions& fit = {},
+                        const std::optional<RouteLimits>& learnt = std::nullopt);
 
   /// Locates the robot by a line. `step`: its motion since the last line, in the frame of the robot
   /// at that line [Y03 section 4.1]. nullopt if the line does not match the route, or if it matches
@@ -50,7 +66,7 @@ class RouteTracker {
   /// then predicted by odometry alone. Throws ContractError on a wrong length.
   std::optional<RouteFix> track(std::span<const float> line, const Pose2& step);
 
-  /// Locates the robot by the line alone. Cost: some 10 microseconds for each position tried.
+  /// Locates the robot by the line alone. Cost: some microseconds for each position tried.
   [[nodiscard]] std::optional<RouteFix> search(std::span<const float> line) const;
 
   /// Forgets where the robot is.
@@ -69,18 +85,19 @@ class RouteTracker {
   }
   /// The estimated pose, odometry included; nullopt: unknown.
   [[nodiscard]] const std::optional<Pose2>& pose() const noexcept { return pose_; }
-  /// Smallest correlation of an accepted fit: learnt, or that of the options.
-  [[nodiscard]] double min_correlation() const noexcept { return min_correlation_; }
-  /// Smallest detail correlation of an accepted fit; -1: not tested.
-  [[nodiscard]] double min_detail_correlation() const noexcept { return min_detail_; }
+  /// Learnt limits, or those of the options.
+  [[nodiscard]] const RouteLimits& limits() const noexcept { return limits_; }
   /// The route as prepared for fits.
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
 
  private:
   /// Half of the lines as a route, and lines of the other half.
   struct TestRoute;
-  /// Sets the limits of accepted fits; leaves them if there are too few fits.
-  void learn_limits(const TestRoute& test);
+  /// Lists the views in which a search looks for a line.
+  void list_search_views();
+  /// Sets the limits; leaves those for which there are too few lines or fits.
+  void learn(const RoutePanorama& route, const RouteFitOptions& fit);
+  void learn_acceptance(const TestRoute& test);
   /// True if lines of sight cross the path in at least half of all directions. Otherwise few
   /// directions decide, and any line fits somewhere far from the path.
   [[nodiscard]] bool has_enough_columns(const RouteFix& fix) const;
@@ -94,11 +111,8 @@ class RouteTracker {
   RouteTrackerOptions options_;
   double metre_;  // `RouteFitOptions::metre`
   RouteLines lines_;
-  double min_correlation_ = 0.0;
-  double min_detail_ = -1.0;
-  std::size_t detail_scale_ = 0;      // in `RouteFix::detail_scales_deg`
-  double model_variance_m2_ = 0.0;    // of x and of y, beyond the noise of the lines
-  double model_variance_rad2_ = 0.0;  // of the heading, likewise
+  std::vector<RouteLines::CoarseView> search_views_;
+  RouteLimits limits_;
   std::optional<Pose2> pose_;
   std::optional<double> along_m_;     // of the latest fix; its pass is kept at crossings
   std::optional<Pose2> unconfirmed_;  // unexpected pose by the last line

@@ -395,11 +395,13 @@ void MemoryFile::rename_route(std::string_view name, std::string_view new_name) 
       throw_used_name("route", new_name, path());
     }
     panonav::rename_route(tables, name, new_name);
-    // The parameter with the source of its lines is renamed, too.
-    const std::string from = "route." + std::string(name);
-    if (const auto lines = parameter(from)) {
-      set_parameter("route." + std::string(new_name), *lines);
-      tables.erase_setting(make_parameter_key(from));
+    // The parameters with the source of its lines and what was learnt from them are renamed, too.
+    for (const std::string prefix : {"route.", "learnt route."}) {
+      const std::string from = prefix + std::string(name);
+      if (const auto text = parameter(from)) {
+        set_parameter(prefix + std::string(new_name), *text);
+        tables.erase_setting(make_parameter_key(from));
+      }
     }
   });
 }
