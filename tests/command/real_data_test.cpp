@@ -122,9 +122,9 @@ TEST_F(RealData, TheDefaultBandOfASphereFindsMoreThanTheWholeSphere) {
                          where);
   };
   const int by_default = count("default", {});
-  EXPECT_GE(by_default, 18);  // measured: 20
+  EXPECT_GE(by_default, 28);  // measured: 30
   EXPECT_EQ(count("stated", {"--elevation-deg", "-30", "40"}), by_default);
-  EXPECT_LE(count("whole", {"--elevation-deg", "-90", "90"}), 13);  // measured: 10
+  EXPECT_LT(count("whole", {"--elevation-deg", "-90", "90"}), by_default);  // measured: 22
 }
 
 TEST_F(RealData, GantryPlantsLeaveOneOut) {

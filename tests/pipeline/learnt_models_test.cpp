@@ -122,48 +122,48 @@ TEST_F(KeptModels, OfOtherViewsAreNotUsed) {
   EXPECT_TRUE(outdated());
 }
 
-TEST_F(KeptModels, BelongToTheFirstViewsInTwoDigits) {
+TEST_F(KeptModels, BelongToTheFirstViewsInThreeDigits) {
   for (const auto& [views, learnt] :
        std::initializer_list<std::pair<std::size_t, std::size_t>>{{0, 0},
                                                                   {7, 7},
-                                                                  {99, 99},
-                                                                  {100, 100},
-                                                                  {109, 100},
-                                                                  {110, 110},
-                                                                  {1099, 1000},
-                                                                  {9999, 9900},
-                                                                  {10000, 10000},
-                                                                  {123456, 120000}}) {
+                                                                  {999, 999},
+                                                                  {1000, 1000},
+                                                                  {1009, 1000},
+                                                                  {1010, 1010},
+                                                                  {10099, 10000},
+                                                                  {99999, 99900},
+                                                                  {123456, 123000}}) {
     EXPECT_EQ(count_learnt_views(views), learnt);
   }
 }
 
 TEST_F(KeptModels, StayWhenOneMoreViewIsAdded) {
-  MemoryFile file = make_file(110);
+  const auto view = [](int i) { return view_at(i, 0.5 * (i % 32), 0.5 * (i / 32)); };
+  MemoryFile file = make_file(1010);
   learn_and_store_models(file);
   const auto before = file.parameter("learnt models");
-  for (int i = 110; i < 119; ++i) file.append(view_at(i, 0.5 * (i % 8), 0.5 * (i / 8)));
+  for (int i = 1010; i < 1019; ++i) file.append(view(i));
   EXPECT_TRUE(load_stored_models(file, file.load()));
   learn_and_store_models(file);
   EXPECT_EQ(file.parameter("learnt models"), before);
-  const ViewId view = file.append(view_at(119, 0.5 * (119 % 8), 0.5 * (119 / 8)));
-  EXPECT_FALSE(load_stored_models(file, file.load())) << "now they belong to 120 views";
+  const ViewId last = file.append(view(1019));
+  EXPECT_FALSE(load_stored_models(file, file.load())) << "now they belong to 1,020 views";
   learn_and_store_models(file);
   EXPECT_NE(file.parameter("learnt models"), before);
   EXPECT_EQ(load_stored_models(file, file.load()).value(), learn_models(file.load()));
-  file.remove(std::array{view});
+  file.remove(std::array{last});
   learn_and_store_models(file);
   EXPECT_EQ(file.parameter("learnt models"), before) << "those of the same views are the same";
 }
 
 TEST_F(KeptModels, DoNotDependOnTheStepsInWhichTheMemoryGrew) {
-  MemoryFile at_once = make_file(107);
+  MemoryFile at_once = make_file(1007);
   learn_and_store_models(at_once);
   const auto path_in_steps = folder_.path() / "steps.panonav";
   MemoryFile in_steps = MemoryFile::create(path_in_steps, at_once.header());
-  for (int i = 0; i < 107; ++i) {
+  for (int i = 0; i < 1007; ++i) {
     in_steps.append(view_at(i, 0.5 * (i % 8), 0.5 * (i / 8)));
-    if (i % 13 == 0 || i > 100) learn_and_store_models(in_steps);
+    if (i == 500 || i > 1003) learn_and_store_models(in_steps);
   }
   EXPECT_EQ(in_steps.parameter("learnt models"), at_once.parameter("learnt models"));
   ASSERT_TRUE(load_stored_models(at_once, at_once.load()));
@@ -208,8 +208,8 @@ TEST_F(KeptModels, OfALargeMemoryAreLearntFromWholeAreas) {
   EXPECT_EQ(whole, 28) << "of 700 views each, up to 20,000 views";
   EXPECT_EQ(std::ranges::count(counts, 0), areas - whole - 1) << "only the last one is cut";
   const VisualMemory all = file.load();
-  const auto held = LearntViews(all).memory().views();
-  EXPECT_TRUE(std::ranges::equal(held, learnt.views()));
+  const LearntViews held(all);
+  EXPECT_TRUE(std::ranges::equal(held.memory().views(), learnt.views()));
 }
 
 TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {

@@ -85,13 +85,13 @@ TEST_F(Memorising, InBatchesOfAnySizeTheSameViewsAreStored) {
 }
 
 TEST_F(Memorising, OneMoreViewReadsNoSignatureButItsNeighbours) {
-  constexpr int views = 100;
+  constexpr int views = 1000;  // from there on models stay when one view is added
   {
     Memoriser memoriser(path(), options());
     for (int i = 0; i < views; ++i) memoriser.add(seen_at(i));
     memoriser.finish();
   }
-  testing::run_sql(path(), "UPDATE views SET checksum = checksum + 1 WHERE id < 90");
+  testing::run_sql(path(), "UPDATE views SET checksum = checksum + 1 WHERE id < 990");
   {
     const MemoryFile damaged = MemoryFile::open(path(), Access::read_only);
     EXPECT_THROW((void)damaged.load(), FileError);

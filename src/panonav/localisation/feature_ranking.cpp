@@ -59,6 +59,62 @@ bool FeatureTrial::is_significantly_better() const {
   return changed > 0 && sum * std::pow(0.5, changed) <= 0.05;
 }
 
+namespace {
+
+/// The best match of each view of a memory by columns, and by local features, when it is left out.
+class LeftOutMatches {
+ public:
+  LeftOutMatches(const ColumnRanking& ranking, const NeighbourSupport& support,
+                 const FeatureSource& features)
+      : ranking_(&ranking), support_(&support), features_(&features) {}
+
+  struct Best {
+    ViewId by_columns;
+    ViewId by_features;
+  };
+
+  /// Returns the best matches without views at the same position, because a standing robot takes
+  /// the same view repeatedly; nullopt for a view without features or without other views.
+  [[nodiscard]] std::optional<Best> find(ViewId view) const {
+    const auto own = (*features_)(view);
+    if (!own) return std::nullopt;
+    const VisualMemory& memory = ranking_->memory();
+    const auto position = find_position(memory.info(view));
+    std::vector<ViewId> excluded;
+    for (const ViewId other : memory.views()) {
+      if (other == view || (position && find_position(memory.info(other)) == position)) {
+        excluded.push_back(other);
+      }
+    }
+    const PackedSignature query = memory.packed(view);
+    const auto found = memory.search(
+        query, {.top = verified_candidates, .components = ranking_->components()}, {excluded, {}});
+    std::vector<RankedMatch> ranked = ranking_->rank(query, found.matches);
+    if (ranked.empty()) return std::nullopt;
+    support_->rank_by_support(ColumnProfiles(query, ranking_->components()), ranked, excluded);
+    return Best{ranked.front().match.view,
+                ranked[find_most_verified(*own, *features_, ranked)].match.view};
+  }
+
+ private:
+  const ColumnRanking* ranking_;
+  const NeighbourSupport* support_;
+  const FeatureSource* features_;
+};
+
+/// Returns the distance from a view to the nearest one at another position.
+double distance_to_nearest(const VisualMemory& memory, ViewId view) {
+  const FloorPosition here = *find_position(memory.info(view));
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const ViewId other : memory.views()) {
+    const double distance_m = distance(*find_position(memory.info(other)), here);
+    if (distance_m > 0.0) nearest = std::min(nearest, distance_m);
+  }
+  return nearest;
+}
+
+}  // namespace
+
 FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupport& support,
                                const FeatureSource& features) {
   constexpr int max_sampled = 100;  // takes 0.3 s; five gains without a loss are significant
@@ -70,39 +126,21 @@ FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupp
   if (views.size() < static_cast<std::size_t>(PlaceModel::min_views)) return trial;
   const bool posed =
       std::ranges::all_of(views, [&](ViewId view) { return memory.info(view).pose.has_value(); });
+  const LeftOutMatches matches(ranking, support, features);
   for (const ViewId view : sample_views(views, max_sampled, 1)) {
-    const auto own = features(view);
-    if (!own) continue;
-    const auto rank = std::ranges::lower_bound(views, view) - views.begin();
-    const auto distance_to = [&](ViewId other) {
-      if (!posed) {
-        const auto there = std::ranges::lower_bound(views, other) - views.begin();
-        return static_cast<double>(std::abs(there - rank));
+    const auto best = matches.find(view);
+    if (!best) continue;
+    const double nearest = posed ? distance_to_nearest(memory, view) : 0.0;
+    const auto is_right = [&](ViewId match, ViewId LeftOutMatches::Best::*kind) {
+      if (posed) {
+        return distance(*find_position(memory.info(match)), *find_position(memory.info(view))) <=
+               right_ratio * nearest;
       }
-      return distance(*find_position(memory.info(other)), *find_position(memory.info(view)));
+      const auto back = matches.find(match);
+      return back && (*back).*kind == view;
     };
-    // Excludes views at the same position, because a standing robot takes the same view repeatedly.
-    std::vector<ViewId> excluded;
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const ViewId other : views) {
-      const double distance_m = distance_to(other);
-      if (distance_m > 0.0) {
-        nearest = std::min(nearest, distance_m);
-      } else {
-        excluded.push_back(other);
-      }
-    }
-    const PackedSignature query = memory.packed(view);
-    const auto found = memory.search(
-        query, {.top = verified_candidates, .components = ranking.components()}, {excluded, {}});
-    std::vector<RankedMatch> ranked = ranking.rank(query, found.matches);
-    if (ranked.empty()) continue;
-    support.rank_by_support(ColumnProfiles(query, ranking.components()), ranked, excluded);
-    const auto is_right = [&](std::size_t match) {
-      return distance_to(ranked[match].match.view) <= right_ratio * nearest;
-    };
-    const bool by_columns = is_right(0);
-    const bool by_features = is_right(find_most_verified(*own, features, ranked));
+    const bool by_columns = is_right(best->by_columns, &LeftOutMatches::Best::by_columns);
+    const bool by_features = is_right(best->by_features, &LeftOutMatches::Best::by_features);
     ++trial.sampled_views;
     trial.columns_right += by_columns ? 1 : 0;
     trial.features_right += by_features ? 1 : 0;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <span>
-#include <string_view>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -90,6 +90,8 @@ struct MonteCarloLocaliser::Implementation {
   double p_inside = p_inside_at_start;  // probability that the robot is in the memorised area
   // Probability by the last image that the robot is at the heaviest mode, not carried elsewhere.
   double p_explained_here = 1.0;
+  std::size_t counted_sites = 0;  // number of references when `places` was counted
+  std::size_t places = 1;         // in the memory
   MonteCarloEstimate latest;
 
   Implementation(std::unique_ptr<ComparedViews> views, const ObservationModel& model_,
@@ -113,6 +115,19 @@ struct MonteCarloLocaliser::Implementation {
     return {std::max(model.spacing_m, model.range_m / (mode_reach + 0.5)), headings};
   }
   [[nodiscard]] ParticleModes modes() const { return find_modes(particles, bins()); }
+
+  /// Number of memorised places of the size of a mode. Cost: O(references) where their number has
+  /// changed.
+  [[nodiscard]] std::size_t count_places() {
+    if (counted_sites == likelihood.sites().size()) return places;
+    const double side_m = (2.0 * mode_reach + 1.0) * bins().cell_m;
+    std::set<std::pair<double, double>> cells;
+    for (const ViewLikelihood::Site& site : likelihood.sites()) {
+      cells.emplace(std::floor(site.position.x_m / side_m), std::floor(site.position.y_m / side_m));
+    }
+    counted_sites = likelihood.sites().size();
+    return places = std::max<std::size_t>(1, cells.size());
+  }
 
   void restart(bool is_known) {
     error = {};
@@ -273,7 +288,9 @@ struct MonteCarloLocaliser::Implementation {
     likelihood.compare(sites);
     const auto here = likelihood.min_difference(sites);
     if (!here || *here <= anywhere) return;
-    const double log_ratio = share_exponent * std::log(*here / anywhere);
+    // It may have been carried to any place; the image fits the best one of them also by chance.
+    const double log_ratio =
+        share_exponent * std::log(*here / anywhere) - std::log(static_cast<double>(count_places()));
     // The weights of the particles account for the prior.
     p_explained_here = (1.0 - kidnap_probability(p_kidnap, log_ratio, 0.0)) / (1.0 - p_kidnap);
   }

@@ -17,8 +17,8 @@ enum class PictureKind {
 };
 
 /// Band that is cut out of equirectangular pictures if no other band is stated. Floor and ceiling
-/// look similar at many places: on the walk indoor_walk_360, 34 of 117 images are most similar to
-/// the next or the previous one, with the whole sphere 21 (of ciirc_b670, 20 and 10 of 31).
+/// look similar at many places: on the walk indoor_walk_360, 37 of 117 images are most similar to
+/// the next or the previous one, with the whole sphere 27 (of ciirc_b670, 30 and 22 of 31).
 inline constexpr ElevationBand default_equirectangular_band{radians(-30.0), radians(40.0)};
 
 /// Layout of the pictures of a recording, from which they become panoramic cylinders.

@@ -58,9 +58,9 @@ std::vector<ViewId> choose_learning_sample(std::span<const ViewId> views,
 }  // namespace
 
 std::size_t count_learnt_views(std::size_t views) noexcept {
-  constexpr std::size_t max_kept = 100;  // two digits
+  constexpr std::size_t end_of_exact = 1000;  // of three digits
   std::size_t unit = 1;
-  while (views / unit >= max_kept) unit *= 10;
+  while (views / unit >= end_of_exact) unit *= 10;
   return views / unit * unit;
 }
 

@@ -13,8 +13,8 @@ namespace panonav {
 inline constexpr std::size_t max_learnt_views = 20'000;
 
 /// Returns the number of views, the first of a memory of this size, to which its models belong:
-/// `views` rounded down to two significant digits. So models are learnt again only when the memory
-/// has grown by 1 to 10 %, and do not depend on the steps in which it grew.
+/// `views` rounded down to three significant digits. So models of large memories are learnt again
+/// only when they have grown by 0.1 to 1 %, and do not depend on the steps in which they grew.
 [[nodiscard]] std::size_t count_learnt_views(std::size_t views) noexcept;
 
 /// The views of a memory from which its models are learnt: the first `count_learnt_views`, or of
