@@ -27,10 +27,6 @@ struct CacheLineAllocator {
 /// their memory only once they are written.
 template <class T>
 struct UnsetAllocator : CacheLineAllocator<T> {
-  template <class U>
-  struct rebind {
-    using other = UnsetAllocator<U>;
-  };
   UnsetAllocator() = default;
   template <class U>
   explicit UnsetAllocator(const UnsetAllocator<U>&) noexcept {}
