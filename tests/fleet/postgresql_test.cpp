@@ -109,6 +109,7 @@ TEST_F(MemoryOnServer, CopiesAreTheSameThereAndBack) {
   MemoryFile file = MemoryFile::create(folder / "first.panonav", small_header());
   const std::vector<ViewId> ids = file.append(random_views(0, 1500));
   file.remove(std::vector{ids[3], ids[700]});
+  file.rename(ids[8], "floor=attic/stairs");
   file.link(std::vector<Link>{{ids[1], ids[2], Link::Kind::sequence},
                               {ids[9], ids[4], Link::Kind::closure}});
   file.set_parameter("a 'name'; DROP TABLE panonav.views; --", "1.5");
@@ -130,6 +131,7 @@ TEST_F(MemoryOnServer, CopiesAreTheSameThereAndBack) {
     EXPECT_EQ(other.header(), file.header());
     EXPECT_TRUE(same_content(other.load(), file.load()));
     EXPECT_EQ(other.names(), file.names());
+    EXPECT_EQ(other.places(), file.places());
     EXPECT_EQ(other.views_with_thumbnail(), file.views_with_thumbnail());
     EXPECT_EQ(other.thumbnail(ids[4]), file.thumbnail(ids[4]));
     EXPECT_EQ(other.features(ids[5]), file.features(ids[5]));
