@@ -292,7 +292,7 @@ class Localiser::Query {
       }
     }
     const std::vector<RankedMatch>& chosen = places_.front().matches;
-    std::ranges::stable_partition(ranked_, [&](const RankedMatch& r) {
+    std::stable_partition(ranked_.begin(), ranked_.end(), [&](const RankedMatch& r) {
       return std::ranges::find(chosen, r.match.view, view_of) != chosen.end();
     });
   }
