@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
 """Runs the verbs of panonav on memories and recordings of growing size and prints what they cost.
 
-    bench/product.py PANONAV [--sizes 100,400,1600] [--json]                    # walks in one room, and their memories
+    bench/product.py PANONAV [--sizes 100,400,1600]                             # walks in one room, and their memories
     bench/product.py PANONAV --maker build/bench/bin/make_memory --sizes 1000,10000,100000     # large memories alone
     bench/product.py PANONAV --check
 
 Costs are seconds of processor time of one thread, or milliseconds an image. The growth is the exponent of the cost
 between the last two sizes: 1 is linear. --check counts instructions of two small sizes under callgrind instead, and
-ends with exit code 1 if the larger one is above its bound or grows faster than its share of the bound.
+ends with exit code 1 if the larger one is above its bound.
 """
 import argparse
-import json
 import math
 import os
 import pathlib
@@ -20,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 
-QUERIES = 8  # images of each kind that are asked beside the first one
+QUERIES = 8  # images of each kind that are localised after the first one
 WALK = "--path walk --spacing-m 0.25 --heading path --kind panorama --rows 40 --columns 256 --seed 3"
 VIEWS = "--kind panorama --rows 40 --columns 256 --seed 5"
 CHECKED = (60, 180)  # sizes of --check
@@ -82,7 +81,7 @@ def count_cost(words, instructions=False):
 
 
 class Data:
-    """Recordings and memories in a folder, each made when it is first asked for."""
+    """Recordings and memories in a folder, each made when it is first needed."""
 
     def __init__(self, panonav, folder, maker, largest):
         self.panonav, self.folder, self.maker, self.largest = panonav, folder, maker, largest
