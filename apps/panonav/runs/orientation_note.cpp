@@ -32,7 +32,7 @@ std::vector<Correction> list_corrections(const OrientationFault& fault,
     corrections.push_back({camera ? "direction" : "columns", camera ? "" : "--columns-run",
                            std::string(name_of(direction))});
   }
-  if (fault.turn_rad == 0.0 && !fault.is_mirrored) return corrections;
+  if (fault.turn_rad == 0.0) return corrections;
   if (camera && !std::holds_alternative<EquirectangularModel>(camera->model)) {
     corrections.push_back(
         {"forward_angle_deg", "", format_fixed(degrees(camera->forward_angle_rad), 0)});

@@ -139,19 +139,19 @@ double radius_over_places(double radius_m, double share, std::vector<OtherPlace>
   std::ranges::sort(others, {}, &OtherPlace::reach_m);
   double total = share;
   for (const OtherPlace& other : others) total += other.share;
-  double covered = 0.0;  // share of the other places within `least_m`
-  double least_m = 0.0;
+  double covered = 0.0;  // share of the other places within `inner_m`
+  double inner_m = 0.0;
   for (auto other = others.begin();; ++other) {
     // The share of the errors at the chosen place that the radius must still contain.
     const double needed = (coverage * total - covered) / share;
-    if (needed <= 0.0) return least_m;
+    if (needed <= 0.0) return inner_m;
     if (needed < 1.0) {
       const double found_m =
-          std::max(least_m, radius_m * std::sqrt(std::log1p(-needed) / std::log1p(-coverage)));
+          std::max(inner_m, radius_m * std::sqrt(std::log1p(-needed) / std::log1p(-coverage)));
       if (other == others.end() || found_m <= other->reach_m) return found_m;
     }
     covered += other->share;
-    least_m = other->reach_m;
+    inner_m = other->reach_m;
   }
 }
 

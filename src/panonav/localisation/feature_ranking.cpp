@@ -17,13 +17,13 @@ namespace {
 std::size_t find_most_verified(const LocalFeatures& query, const FeatureSource& features,
                                std::span<const RankedMatch> ranked) {
   std::size_t found = 0;
-  int most_verified = 0;
+  int max_verified = 0;
   for (std::size_t i = 0; i < std::min<std::size_t>(verified_candidates, ranked.size()); ++i) {
     const auto there = features(ranked[i].match.view);
     if (!there) continue;
-    const int verified = match_features(query, *there, most_verified).verified;
-    if (verified <= most_verified) continue;
-    most_verified = verified;
+    const int verified = match_features(query, *there, max_verified).verified;
+    if (verified <= max_verified) continue;
+    max_verified = verified;
     found = i;
   }
   return found;

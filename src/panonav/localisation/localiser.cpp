@@ -50,7 +50,7 @@ constexpr std::size_t blurred_candidates = 64;
 /// Half width of the compass's search window: the rotation by columns is exact to one column.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
-/// Smallest share of a place by columns at which features are not asked.
+/// Smallest share of a place by columns at which features need not decide.
 constexpr double min_clear_share = 0.98;
 /// Largest number of alternatives that an answer names: more tell a user no more than that the
 /// place is ambiguous.
@@ -250,7 +250,6 @@ class Localiser::Query {
       }
     }
     place_.known = is_known();
-    constexpr double min_certain_probability = 0.98;  // as `is_inconclusive`
     is_known_without_doubt_ = place_.known_probability >= min_certain_probability;
     place_.probability = place_.known_probability;
   }
@@ -397,7 +396,7 @@ class Localiser::Query {
   const LocaliserOptions& options_;
   ViewIndex& index_;
   RestoredQuery restored_;
-  const PackedSignature& view_;  // of `restored_`
+  const PackedSignature& view_;  // belongs to `restored_`
   const SearchMask& mask_;
   const QueryFeatures& make_features_;
   const ComparedViews* compared_;       // null before `load_compared_views` if not held

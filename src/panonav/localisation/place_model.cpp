@@ -191,7 +191,8 @@ double place_probability(const PlaceEvidence& evidence) noexcept {
 
 bool is_inconclusive(const PlaceEvidence& evidence) noexcept {
   if (evidence.views < 1 || !(evidence.chance > 0.0)) return false;
-  static const double max_inconclusive_log_odds = std::log(0.98 / 0.02);
+  static const double max_inconclusive_log_odds =
+      std::log(min_certain_probability / (1.0 - min_certain_probability));
   return std::abs(log_odds_by_columns(evidence)) < max_inconclusive_log_odds;
 }
 

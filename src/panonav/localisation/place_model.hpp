@@ -77,7 +77,9 @@ inline constexpr int column_term_count = 6;
 /// the verified features' ratios to the log odds by columns. More verified features never lower the
 /// probability. If the query has too few features to raise the probability, columns alone decide.
 [[nodiscard]] double place_probability(const PlaceEvidence& evidence) noexcept;
-/// True if the probability by columns alone is between 0.02 and 0.98.
+/// Probability from which on, or below its complement, columns alone leave no doubt.
+inline constexpr double min_certain_probability = 0.98;
+/// True if the probability by columns alone leaves a doubt (`min_certain_probability`).
 [[nodiscard]] bool is_inconclusive(const PlaceEvidence& evidence) noexcept;
 /// Number of terms in `place_probability` if columns are inconclusive and features were compared.
 inline constexpr int feature_term_count = 4;

@@ -20,7 +20,7 @@ namespace panonav {
 struct PosedImage {
   Pose2 pose;              ///< of the robot
   std::string_view floor;  ///< with its own frame of poses
-  std::size_t index = 0;   ///< by which the view is asked
+  std::size_t index = 0;   ///< number by which the view is read
 };
 
 /// Compares at most 60 images, evenly spread, with up to three others each: the first of the next
