@@ -57,7 +57,7 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   const auto send_to = [&](Point2 place) {
     FastPeer::write(goal, recordings::ros::PoseStamped{
                               {0, "map"}, recordings::ros::to_pose({place.x_m, place.y_m, 0.0})});
-    return state_of(FastPeer::next(feedback, 20s));
+    return state_of(FastPeer::next(feedback, 90s));  // after the arrangement of all views
   };
   const Point2 there{2.8, 2.8};
   EXPECT_EQ(send_to(there), "moving");
