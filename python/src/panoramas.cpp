@@ -33,10 +33,6 @@ CameraModel make_camera_model(const std::string& name, const py::dict& parameter
 
 namespace {
 
-std::string to_string(ColumnDirection direction) {
-  return direction == ColumnDirection::clockwise ? "clockwise" : "counter-clockwise";
-}
-
 constexpr std::array<const char*, 3> kind_names{"panorama", "equirectangular", "mirror"};
 
 PictureKind parse_kind(const std::string& name) {

@@ -40,5 +40,24 @@ TEST(OrderStatistic, IsOneOfTheValuesAndBelowTheQuantile) {
   }
 }
 
+TEST(Statistics, WeightsOfAGaussianAreSymmetricAndSumToOne) {
+  for (const double deviation : {0.3, 1.0, 2.7}) {
+    const std::vector<float> weights = gaussian_weights(deviation);
+    const std::size_t reach = weights.size() / 2;
+    EXPECT_EQ(weights.size(), 2 * reach + 1);
+    EXPECT_GE(static_cast<double>(reach), 2.5 * deviation);
+    double sum = 0.0;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      EXPECT_EQ(weights[i], weights[weights.size() - 1 - i]);
+      const double off = static_cast<double>(i) - static_cast<double>(reach);
+      sum += weights[i];
+      squares += weights[i] * off * off;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-6);
+    EXPECT_LT(squares, 1.01 * deviation * deviation) << "the ends are cut off";
+  }
+}
+
 }  // namespace
 }  // namespace panonav

@@ -14,10 +14,6 @@ namespace panonav::command {
 
 namespace {
 
-std::string_view name_of(ColumnDirection direction) {
-  return direction == ColumnDirection::clockwise ? "clockwise" : "counter-clockwise";
-}
-
 /// A setting that is wrong: its field in a file, its flag (empty: it has none), and its value.
 struct Correction {
   std::string field, flag, value;
@@ -30,7 +26,7 @@ std::vector<Correction> list_corrections(const OrientationFault& fault,
   if (fault.is_mirrored) {
     const auto direction = camera ? camera->direction : corrected.layout.direction;
     corrections.push_back({camera ? "direction" : "columns", camera ? "" : "--columns-run",
-                           std::string(name_of(direction))});
+                           std::string(to_string(direction))});
   }
   if (fault.turn_rad == 0.0) return corrections;
   if (camera && !std::holds_alternative<EquirectangularModel>(camera->model)) {
@@ -51,7 +47,7 @@ std::string describe_orientation(const OrientationFault& fault, const Orientatio
   std::string text;
   if (fault.is_mirrored) {
     const auto stated = source.camera ? source.camera->direction : source.layout.direction;
-    text = "The columns of the images do not run " + std::string(name_of(stated)) + ": " +
+    text = "The columns of the images do not run " + std::string(to_string(stated)) + ": " +
            (evidence.opposite_turns() > 0 ? std::to_string(evidence.opposite_turns()) + " of " +
                                                 format_count(evidence.turns(), "turn") +
                                                 " of the robot are in the opposite direction. "

@@ -79,12 +79,6 @@ std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
   return clamp_with_tolerance(*r, inner_px, rim_px, slack_px);
 }
 
-/// Returns +1 if azimuth grows counter-clockwise in the displayed picture (equirectangular: with
-/// u), else -1.
-double azimuth_sign(const Camera& camera) {
-  return camera.direction == ColumnDirection::counter_clockwise ? 1.0 : -1.0;
-}
-
 void validate_mirror(const Camera& camera) {
   const auto [width, height] = camera.image_size;
   require(camera.centre.u_px >= 0 && camera.centre.u_px <= width, "centre.u_px", camera.centre.u_px,
@@ -206,8 +200,8 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
                         (model->elevation_top_rad - model->elevation_bottom_rad) * height;
     const auto v = clamp_with_tolerance(v_px, 0, height, tolerance_px(camera));
     if (!v) return std::nullopt;
-    double turns =
-        camera.forward_column + azimuth_sign(camera) * azimuth_rad / (2 * std::numbers::pi);
+    double turns = camera.forward_column +
+                   azimuth_sign(camera.direction) * azimuth_rad / (2 * std::numbers::pi);
     turns -= std::floor(turns);
     const double u_px = turns * width;
     return PixelPoint{u_px < width ? u_px : 0.0, *v};
@@ -219,7 +213,7 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
   }
   const auto radius_px = radius_at(camera, elevation_rad);
   if (!radius_px) return std::nullopt;
-  const double angle_rad = camera.forward_angle_rad + azimuth_sign(camera) * azimuth_rad;
+  const double angle_rad = camera.forward_angle_rad + azimuth_sign(camera.direction) * azimuth_rad;
   const ImageOffset offset =
       distort(camera, {*radius_px * std::cos(angle_rad), -*radius_px * std::sin(angle_rad)});
   return clamp_to_image(
@@ -234,7 +228,7 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
     const double elevation_rad =
         model->elevation_top_rad * (1 - t) + model->elevation_bottom_rad * t;
     const double turns = inside->u_px / camera.image_size.width - camera.forward_column;
-    return Direction3::from_angles(azimuth_sign(camera) * turns * 2 * std::numbers::pi,
+    return Direction3::from_angles(azimuth_sign(camera.direction) * turns * 2 * std::numbers::pi,
                                    elevation_rad);
   }
   if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
@@ -250,8 +244,8 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
   const auto elevation_rad = elevation_at(camera, std::hypot(ideal->right_px, ideal->down_px));
   if (!elevation_rad) return std::nullopt;
   const double angle_rad = std::atan2(-ideal->down_px, ideal->right_px);
-  return Direction3::from_angles(azimuth_sign(camera) * (angle_rad - camera.forward_angle_rad),
-                                 *elevation_rad);
+  return Direction3::from_angles(
+      azimuth_sign(camera.direction) * (angle_rad - camera.forward_angle_rad), *elevation_rad);
 }
 
 std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& camera,

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <string_view>
 #include <variant>
 
 #include "panonav/camera/dual_fisheye_model.hpp"
@@ -42,6 +43,17 @@ enum class ColumnDirection {
   clockwise,         ///< azimuths grow against the columns or the image angle
   counter_clockwise  ///< azimuths grow with them
 };
+/// Names of the senses of rotation in files, in the order of `ColumnDirection`.
+inline constexpr std::array<std::string_view, 2> column_direction_names{"clockwise",
+                                                                        "counter-clockwise"};
+/// Returns the name in files.
+[[nodiscard]] constexpr std::string_view to_string(ColumnDirection direction) {
+  return column_direction_names[direction == ColumnDirection::clockwise ? 0 : 1];
+}
+/// Returns +1 if azimuths grow with the columns or the image angle, else -1.
+[[nodiscard]] constexpr double azimuth_sign(ColumnDirection direction) {
+  return direction == ColumnDirection::counter_clockwise ? 1.0 : -1.0;
+}
 
 /// Calibration of an omnidirectional camera: the mapping between pixels and directions in the robot
 /// frame. The axis of a mirror is vertical. `validate(const Camera&)` checks the invariant; the

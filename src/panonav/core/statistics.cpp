@@ -1,6 +1,7 @@
 #include "panonav/core/statistics.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <vector>
 
@@ -30,6 +31,18 @@ double quantile(std::span<const double> values, double fraction) {
 
 double median(std::span<const double> values) {
   return quantile(values, 0.5);
+}
+
+std::vector<float> gaussian_weights(double deviation) {
+  const int reach = static_cast<int>(std::ceil(2.5 * deviation));
+  std::vector<float> weights;
+  float sum = 0.0F;
+  for (int d = -reach; d <= reach; ++d) {
+    weights.push_back(static_cast<float>(std::exp(-0.5 * d * d / (deviation * deviation))));
+    sum += weights.back();
+  }
+  for (float& weight : weights) weight /= sum;
+  return weights;
 }
 
 double mean(std::span<const double> values) {

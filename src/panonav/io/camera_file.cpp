@@ -19,7 +19,6 @@ namespace panonav {
 
 namespace {
 
-constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
 constexpr std::array<std::string_view, 2> elevation_origins{"known", "assumed"};
 
 int read_whole_number(TomlFields& fields, std::string_view field) {
@@ -103,7 +102,7 @@ CameraFile read_camera(const std::filesystem::path& path, CameraMount mount) {
     read_fixed_numbers(fields, "affine", camera.affine);
     read_fixed_numbers(fields, "distortion", camera.distortion);
   }
-  if (const auto direction = fields.choice("columns", direction_names)) {
+  if (const auto direction = fields.choice("columns", column_direction_names)) {
     camera.direction =
         *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
   }
@@ -158,9 +157,7 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
     if (camera.affine != Camera{}.affine) numbers("affine", camera.affine);
     if (camera.distortion != Camera{}.distortion) numbers("distortion", camera.distortion);
   }
-  text += "columns = \"" +
-          std::string(direction_names[camera.direction == ColumnDirection::clockwise ? 0 : 1]) +
-          "\"\n";
+  text += "columns = \"" + std::string(to_string(camera.direction)) + "\"\n";
   if (camera.has_assumed_elevations) {
     text +=
         "# The shape of the mirror was assumed, so lengths must not be computed from the ground.\n"

@@ -26,7 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
-constexpr std::array<std::string_view, 2> column_directions{"clockwise", "counter-clockwise"};
 constexpr std::array<std::string_view, 10> column_names{
     "file",     "stamp_s",          "x_m",      "y_m",      "heading_deg", "odom_x_m",
     "odom_y_m", "odom_heading_deg", "roll_deg", "pitch_deg"};
@@ -59,7 +58,7 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
     source.layout.kept_elevations = band;
     return source;
   }
-  if (const auto direction = images.choice("columns", column_directions)) {
+  if (const auto direction = images.choice("columns", column_direction_names)) {
     source.layout.direction =
         *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
   }
@@ -313,9 +312,7 @@ std::string format_images_section(const Dataset& dataset) {
   std::optional<ElevationBand> band = source.layout.kept_elevations;
   if (source.kind == PictureKind::panorama) band = source.layout.elevations;
   if (source.kind != PictureKind::mirror) {
-    text += "columns = \"" +
-            std::string(
-                column_directions[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
+    text += "columns = \"" + std::string(to_string(source.layout.direction)) +
             "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
   }
   if (band) {

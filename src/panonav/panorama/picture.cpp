@@ -75,7 +75,7 @@ class RowSamples {
  public:
   RowSamples(int width, const PictureLayout& layout, int columns) : width_(width) {
     const double column_step = static_cast<double>(width) / columns;
-    const double sign = layout.direction == ColumnDirection::clockwise ? -1.0 : 1.0;
+    const double sign = azimuth_sign(layout.direction);
     for (int c = 0; c < columns; ++c) {
       const Sample sample =
           make_sample(layout.forward_column * width + sign * c * column_step - 0.5, column_step);

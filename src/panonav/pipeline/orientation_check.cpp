@@ -67,11 +67,6 @@ std::size_t find_sideways(std::span<const PosedImage> images, std::size_t at, st
   return best;
 }
 
-/// +1 if azimuth grows with the column (or, of a mirror, counter-clockwise in the picture).
-double azimuth_sign(ColumnDirection direction) {
-  return direction == ColumnDirection::counter_clockwise ? 1.0 : -1.0;
-}
-
 ColumnDirection opposite(ColumnDirection direction) {
   return direction == ColumnDirection::clockwise ? ColumnDirection::counter_clockwise
                                                  : ColumnDirection::clockwise;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/least_squares.hpp"
 #include "panonav/signature/fourier_signature.hpp"
@@ -47,18 +48,13 @@ Panorama synthesise(const HomingView& view, int frequencies, int columns) {
 }
 
 Panorama smooth_rows(const Panorama& panorama, double sigma_rows) {
-  const int reach = static_cast<int>(std::ceil(2.5 * sigma_rows));
-  std::vector<float> kernel;
-  float sum = 0.0F;
-  for (int d = -reach; d <= reach; ++d) {
-    kernel.push_back(static_cast<float>(std::exp(-0.5 * d * d / (sigma_rows * sigma_rows))));
-    sum += kernel.back();
-  }
+  const std::vector<float> weights = gaussian_weights(sigma_rows);
+  const int reach = static_cast<int>(weights.size()) / 2;
   Panorama result(panorama.rows(), panorama.columns(), panorama.elevations());
   for (int y = 0; y < panorama.rows(); ++y) {
     for (int d = -reach; d <= reach; ++d) {
       const int from = std::clamp(y + d, 0, panorama.rows() - 1);
-      const float weight = kernel[static_cast<std::size_t>(d + reach)] / sum;
+      const float weight = weights[static_cast<std::size_t>(d + reach)];
       for (int c = 0; c < panorama.columns(); ++c) result.at(y, c) += weight * panorama.at(from, c);
     }
   }

@@ -19,7 +19,6 @@ namespace panonav {
 namespace {
 
 constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
-constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
 constexpr std::array<std::string_view, 2> elevation_origins{"known", "assumed"};
 
 void require_band(const std::optional<ElevationBand>& band, std::string_view field) {
@@ -271,7 +270,7 @@ void visit_camera(Fields& fields, AnyCamera& camera) {
   fields.field(prefix + "centre_v_px", camera.centre.v_px);
   fields.field(prefix + "rim_radius_px", camera.rim_radius_px);
   fields.field(prefix + "inner_radius_px", camera.inner_radius_px);
-  fields.choice(prefix + "direction", direction_names, camera.direction);
+  fields.choice(prefix + "direction", column_direction_names, camera.direction);
   fields.field(prefix + "forward_angle_rad", camera.forward_angle_rad);
   fields.field(prefix + "forward_column", camera.forward_column);
   fields.visit_choice_with_default(prefix + "elevations", elevation_origins,
@@ -290,7 +289,7 @@ void visit_header(Fields& fields, Header& header) {
   fields.options(header.preprocessing);
   auto& source = header.source;
   fields.choice("source.kind", kind_names, source.kind);
-  fields.choice("source.direction", direction_names, source.layout.direction);
+  fields.choice("source.direction", column_direction_names, source.layout.direction);
   fields.field("source.forward_column", source.layout.forward_column);
   fields.band("source.elevation_", source.layout.elevations);
   fields.band("source.kept_elevation_", source.layout.kept_elevations);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/relative_pose/relative_tilt.hpp"
@@ -37,18 +38,6 @@ PackedSignature to_packed(const HomingView& view, float full_scale) {
   return pack(FourierSignature({view.rows(), view.components()}, std::move(magnitudes),
                                std::move(phases), view.elevations()),
               full_scale);
-}
-
-std::vector<float> make_row_kernel(double sigma_rows) {
-  const int reach = static_cast<int>(std::ceil(2.5 * sigma_rows));
-  std::vector<float> kernel;
-  float sum = 0.0F;
-  for (int d = -reach; d <= reach; ++d) {
-    kernel.push_back(static_cast<float>(std::exp(-0.5 * d * d / (sigma_rows * sigma_rows))));
-    sum += kernel.back();
-  }
-  for (float& weight : kernel) weight /= sum;
-  return kernel;
 }
 
 /// Returns the view with adjacent rows averaged, as long as at least `min_rows` remain: enough for
@@ -159,7 +148,7 @@ std::vector<RestoredQuery> restore_query(const RestoredQuery& query, const Visua
 PackedSignature blur(const PackedSignature& view, double blur_rad, const ElevationBand& band) {
   const int rows = view.shape.rows;
   const std::vector<float> kernel =
-      make_row_kernel(blur_rad * rows / (band.top_rad - band.bottom_rad));
+      gaussian_weights(blur_rad * rows / (band.top_rad - band.bottom_rad));
   const int reach = static_cast<int>(kernel.size()) / 2;
   static const std::array<float, 256> cosines = [] {
     std::array<float, 256> table{};
