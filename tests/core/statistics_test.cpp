@@ -57,6 +57,7 @@ TEST(Statistics, WeightsOfAGaussianAreSymmetricAndSumToOne) {
     EXPECT_NEAR(sum, 1.0, 1e-6);
     EXPECT_LT(squares, 1.01 * deviation * deviation) << "the ends are cut off";
   }
+  EXPECT_THROW((void)gaussian_weights(0.0), ContractError);
 }
 
 }  // namespace

@@ -34,6 +34,7 @@ double median(std::span<const double> values) {
 }
 
 std::vector<float> gaussian_weights(double deviation) {
+  require(std::isfinite(deviation) && deviation > 0.0, "deviation", deviation, "> 0");
   const int reach = static_cast<int>(std::ceil(2.5 * deviation));
   std::vector<float> weights;
   float sum = 0.0F;

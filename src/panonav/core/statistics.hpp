@@ -14,7 +14,7 @@ namespace panonav {
 /// ContractError on no values. Cost: O(n log n).
 [[nodiscard]] double median(std::span<const double> values);
 /// Returns the weights of a Gaussian at whole numbers up to 2.5 deviations on both sides of 0, with
-/// the sum 1. `deviation`: > 0.
+/// the sum 1. Throws ContractError unless `deviation` is finite and > 0.
 [[nodiscard]] std::vector<float> gaussian_weights(double deviation);
 /// Arithmetic mean. Throws ContractError on no values.
 [[nodiscard]] double mean(std::span<const double> values);
