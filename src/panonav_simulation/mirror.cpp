@@ -66,8 +66,8 @@ MirrorRay HyperboloidalMirror::trace(PixelPoint pixel) const {
   MirrorRay ray;
   Point point{};
   if (!reflect(std::hypot(right_px, up_px), point) || point.radius_mm > rim_radius_mm_) return ray;
-  const double sense = camera_.direction == ColumnDirection::counter_clockwise ? 1.0 : -1.0;
-  const double azimuth = sense * (std::atan2(up_px, right_px) - camera_.forward_angle_rad);
+  const double azimuth =
+      azimuth_sign(camera_.direction) * (std::atan2(up_px, right_px) - camera_.forward_angle_rad);
   const double c = std::cos(azimuth);
   const double s = std::sin(azimuth);
   ray.origin = {1e-3 * point.radius_mm * c, 1e-3 * point.radius_mm * s,
