@@ -107,7 +107,7 @@ TEST(SpreadOf, IsTheRootMeanSquareDistanceFromTheMean) {
 
 TEST(MonteCarlo, ARobotThatStandsStillDoesNotBecomeSurer) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  // Two rooms that look exactly alike: both stay possible however often the robot looks.
+  // Two rooms whose views are equal: both stay possible however often the robot looks.
   const Room room(79, {});
   std::vector<FourierSignature> signatures;
   std::vector<std::optional<ReferencePose>> poses;
