@@ -339,7 +339,7 @@ void bind_memorising(py::module_& m) {
         };
         while (auto seen = observations.next()) {
           batch.push_back(std::move(*seen));
-          if (batch.size() == DatasetObservations::decoded_ahead) add();
+          if (!observations.has_decoded()) add();
         }
         add();
         return memoriser.finish(executor);

@@ -66,8 +66,7 @@ void memorise_missing(const Dataset& missing, const Dataset& recording,
   std::size_t read = 0;  // entries of the recording
   while (!failure && read < recording.entries.size()) {
     std::vector<Observation> batch;
-    while (!failure && batch.size() < DatasetObservations::decoded_ahead &&
-           read < recording.entries.size()) {
+    while (!failure && (batch.empty() || source.has_decoded()) && read < recording.entries.size()) {
       const DatasetEntry& entry = recording.entries[read];
       if (known.contains(entry.file)) {
         if (!batch.empty()) break;  // earlier images first

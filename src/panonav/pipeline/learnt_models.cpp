@@ -179,13 +179,17 @@ LearntModels learn_from(const ColumnRanking& ranking, const FeatureSource& featu
           features && evaluate_features(ranking, support, features).is_significantly_better()};
 }
 
-/// Returns a source that reads the features of each view only once; empty if `source` is.
+/// Returns a source that keeps the features of up to a thousand views, about 10 MB, so that few are
+/// read twice; empty if `source` is.
 FeatureSource keep_read_features(const FeatureSource& source) {
   if (!source) return {};
   using Kept = std::map<ViewId, std::optional<LocalFeatures>>;
   return [source, kept = std::make_shared<Kept>()](ViewId view) {
+    constexpr std::size_t max_kept = 1000;
     const auto found = kept->find(view);
-    return found != kept->end() ? found->second : kept->emplace(view, source(view)).first->second;
+    if (found != kept->end()) return found->second;
+    if (kept->size() == max_kept) kept->clear();
+    return kept->emplace(view, source(view)).first->second;
   };
 }
 

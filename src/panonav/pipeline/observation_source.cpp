@@ -126,7 +126,9 @@ std::optional<Observation> DatasetObservations::next() {
   if (next_ == first_decoded_ + decoded_.size()) {
     first_decoded_ = next_;
     decoded_.clear();
-    decoded_.resize(std::min(decoded_ahead, size() - next_));
+    const std::size_t affordable = std::max<std::size_t>(
+        max_decoded_bytes / largest_bytes_, static_cast<std::size_t>(executor_->threads()));
+    decoded_.resize(std::min({affordable, decoded_ahead, size() - next_}));
     executor_->for_each_chunk(decoded_.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
       try {
         decoded_[i].observation = read_observation(dataset_.entries[first_decoded_ + i], colours_);
@@ -137,6 +139,10 @@ std::optional<Observation> DatasetObservations::next() {
   }
   Decoded& decoded = decoded_[next_++ - first_decoded_];
   if (decoded.failure) std::rethrow_exception(decoded.failure);
+  if (const Image* const image = std::get_if<Image>(&decoded.observation->picture)) {
+    const std::size_t bytes = image->pixels().size();
+    largest_bytes_ = std::exchange(is_size_known_, true) ? std::max(largest_bytes_, bytes) : bytes;
+  }
   return std::exchange(decoded.observation, std::nullopt);
 }
 

@@ -93,10 +93,12 @@ class ObservationSource {
 };
 
 /// Observations of a data set, a folder or a single picture. Decodes up to `decoded_ahead` pictures
-/// in advance, on all threads of the executor, which must outlive *this.
+/// in advance, fewer if they are large, on all threads of the executor, which must outlive *this.
 class DatasetObservations final : public ObservationSource {
  public:
   static constexpr std::size_t decoded_ahead = 16;  ///< pictures held at most
+  /// Bytes of the pictures held at most, unless each thread needs one that is larger.
+  static constexpr std::size_t max_decoded_bytes = std::size_t{8} << 20U;
 
   /// Takes all entries of a data set, in its order.
   DatasetObservations(Dataset dataset, Executor& executor,
@@ -106,6 +108,10 @@ class DatasetObservations final : public ObservationSource {
   [[nodiscard]] std::optional<Observation> next() override;
   /// Returns the number of entries.
   [[nodiscard]] std::size_t size() const noexcept { return dataset_.entries.size(); }
+  /// Returns true if the next picture is decoded, so that `next()` returns without a wait.
+  [[nodiscard]] bool has_decoded() const noexcept {
+    return next_ < first_decoded_ + decoded_.size();
+  }
 
  private:
   struct Decoded {
@@ -117,6 +123,8 @@ class DatasetObservations final : public ObservationSource {
   PictureColours colours_;
   std::size_t next_ = 0;
   std::size_t first_decoded_ = 0;
+  std::size_t largest_bytes_ = max_decoded_bytes;  // of a picture so far; a guess before the first
+  bool is_size_known_ = false;
   std::vector<Decoded> decoded_;
 };
 
