@@ -194,7 +194,8 @@ FeatureSource keep_read_features(const FeatureSource& source) {
 }
 
 LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& features) {
-  const ColumnRanking ranking(memory);
+  constexpr std::size_t max_cached_profiles = 4000;  // 11 MB
+  const ColumnRanking ranking(memory, 0, max_cached_profiles);
   LearntModels models = learn_from(ranking, features);
   try {
     models.observation = learn_observation_model_with_places(ranking, models.place);
