@@ -73,6 +73,17 @@ inline std::optional<Recording> indoor_walk(PanoramaShape shape) {
                         shape);
 }
 
+/// Panoramas of rooms, 1.2 to 2.2 m apart.
+inline std::optional<Recording> sparse_rooms(PanoramaShape shape) {
+  const auto folder = real_data("ciirc_b670");
+  if (!folder) return std::nullopt;
+  return read_recording(*folder, "poses.csv",
+                        {.direction = ColumnDirection::clockwise,
+                         .elevations = ElevationBand{radians(-90.0), radians(90.0)},
+                         .kept_elevations = ElevationBand{radians(-30.0), radians(40.0)}},
+                        shape);
+}
+
 /// The number at the end of a file name, before its extension; -1 when there is none.
 inline int trailing_number(const std::string& file) {
   const std::string stem = std::filesystem::path(file).stem().string();
