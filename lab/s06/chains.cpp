@@ -5,30 +5,31 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/scenes.hpp"
-#include "panonav_simulation/simulated_odometry.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
 namespace panonav::lab {
 
 namespace {
 
-constexpr double route_length_m = 30.0;
+constexpr double route_length_m = 60.0;
 constexpr double pose_spacing_m = 0.1;
-constexpr double completion_radius_m = 0.2;
-constexpr int max_steps = 1000;
+constexpr double completion_radius_m = 0.5;
+constexpr double max_steps = 1000.0;
+constexpr double max_steps_per_metre = 5.0;
 
 }  // namespace
 
 HomingCamera chain_camera() {
   HomingCamera camera;
   camera.rendering = {.rows = 8, .columns = 128, .rays_per_axis = 2};
-  camera.components = 12;
+  camera.components = 6;
   return camera;
 }
 
@@ -59,51 +60,71 @@ std::vector<std::vector<Pose2>> plan_random_routes(const simulation::FreeSpace& 
   return routes;
 }
 
+DriftingOdometry::DriftingOdometry(const ChainOdometry& limits, Random& random)
+    : scale_(1.0 + random.uniform(-limits.distance_error, limits.distance_error)),
+      turn_rad_per_m_(
+          random.uniform(-limits.heading_error_rad_per_m, limits.heading_error_rad_per_m)) {
+  const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+  wind_m_per_m_ = {limits.drift * std::cos(direction_rad), limits.drift * std::sin(direction_rad)};
+}
+
+Pose2 DriftingOdometry::measure(const Pose2& from, const Pose2& to) const {
+  const Pose2 step = inverse(from) * to;
+  const double length_m = std::hypot(step.x_m, step.y_m);
+  const Point2 wind = Pose2{0.0, 0.0, -from.heading_rad} * wind_m_per_m_;
+  return {scale_ * (step.x_m - length_m * wind.x_m), scale_ * (step.y_m - length_m * wind.y_m),
+          wrap_angle(step.heading_rad + turn_rad_per_m_ * length_m)};
+}
+
 SnapshotChain record_chain(const HomingPlace& place, std::span<const Pose2> route,
-                           std::uint64_t seed) {
-  ChainRecorder recorder;
-  simulation::SimulatedOdometry wheels({}, Random(seed, 3).next());
+                           const ChainSpacing& spacing, std::uint64_t seed) {
+  ChainRecorder recorder({}, spacing);
+  Random errors(seed, 3);
+  const DriftingOdometry odometry({}, errors);
   Random noise_of_views(seed, 4);
   for (std::size_t i = 0; i < route.size(); ++i) {
-    const Pose2 before = wheels.pose();
-    if (i > 0) wheels.advance(inverse(route[i - 1]) * route[i]);
     recorder.add(capture_homing_view(place, route[i], noise_of_views.next()),
-                 inverse(before) * wheels.pose());
+                 i == 0 ? Pose2{} : odometry.measure(route[i - 1], route[i]));
   }
   return recorder.finish();
 }
 
 bool ChainRun::has_completed(double radius_m) const noexcept {
-  return state == ChainState::finished && end_distance_m <= radius_m;
+  return state == ChainState::arrived && end_distance_m <= radius_m;
+}
+
+bool ChainRun::has_arrived_elsewhere(double radius_m) const noexcept {
+  return state == ChainState::arrived && end_distance_m > radius_m;
 }
 
 ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
                       std::span<const Pose2> route, ChainDirection direction, std::uint64_t seed) {
   require(!route.empty(), "poses of the route", 0.0, ">= 1");
   const bool forward = direction == ChainDirection::forward;
-  const Pose2& start = forward ? route.front() : route.back();
+  Pose2 start = forward ? route.front() : route.back();
   const Pose2& end = forward ? route.back() : route.front();
+  Random errors(seed, forward ? 5 : 6);
+  const DriftingOdometry odometry({}, errors);
+  start.heading_rad = errors.uniform(-std::numbers::pi, std::numbers::pi);
   ChainFollower follower(chain, direction);
   simulation::SimulatedRobot robot(*place.free_space, {}, simulation::ObstacleRule::pass, start,
                                    seed);
-  simulation::SimulatedOdometry wheels({}, Random(seed, 3).next());
   Random noise_of_views(seed, 2);
   ChainRun run;
   Pose2 moved;
-  for (int step = 0; step <= max_steps; ++step) {
+  const double last_step = max_steps + max_steps_per_metre * chain.length_m();
+  for (int step = 0; step <= last_step; ++step) {
     run.path.push_back(robot.pose());
     run.lateral_m.push_back(simulation::distance_from_route_m(robot.pose().position(), route));
     const ChainDecision decision =
         follower.decide(capture_homing_view(place, robot.pose(), noise_of_views.next()), moved);
     run.state = decision.state;
-    if (decision.state != ChainState::following) break;
+    if (run.state == ChainState::arrived || run.state == ChainState::lost) break;
     const auto direction_rad = robot.find_free_direction(decision.turn_rad, decision.advance_m);
     if (!direction_rad) break;
-    const Pose2 true_before = robot.pose();
-    const Pose2 odometry_before = wheels.pose();
+    const Pose2 before = robot.pose();
     robot.go(*direction_rad, decision.advance_m);
-    wheels.advance(inverse(true_before) * robot.pose());
-    moved = inverse(odometry_before) * wheels.pose();
+    moved = odometry.measure(before, robot.pose());
   }
   run.end_distance_m = distance(robot.pose().position(), end.position());
   return run;
@@ -121,7 +142,7 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
   executor.for_each_chunk(
       random_routes.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
         for (std::size_t i = begin; i < end; ++i) {
-          chains[i] = record_chain(place, random_routes[i], seed + i);
+          chains[i] = record_chain(place, random_routes[i], {}, seed + i);
           for (const auto direction : {ChainDirection::forward, ChainDirection::back}) {
             runs[directions * i + static_cast<std::size_t>(direction)] =
                 follow_chain(place, chains[i], random_routes[i], direction, seed + i);
@@ -130,10 +151,14 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
       });
 
   std::size_t completed = 0;
+  std::size_t elsewhere = 0;
+  std::vector<double> offset_m;
   std::vector<double> mean_m;
   std::vector<double> worst_m;
   for (const ChainRun& run : runs) {
     completed += run.has_completed(completion_radius_m) ? 1 : 0;
+    elsewhere += run.has_arrived_elsewhere(completion_radius_m) ? 1 : 0;
+    if (run.state == ChainState::arrived) offset_m.push_back(run.end_distance_m);
     double sum_m = 0.0;
     for (const double lateral_m : run.lateral_m) sum_m += lateral_m;
     mean_m.push_back(sum_m / static_cast<double>(run.lateral_m.size()));
@@ -142,18 +167,23 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
   std::vector<double> spacing_m;
   std::vector<double> bytes;
   for (const SnapshotChain& chain : chains) {
-    spacing_m.push_back(chain_length_m(chain) / static_cast<double>(chain.size() - 1));
-    bytes.push_back(bytes_per_metre(chain));
+    spacing_m.push_back(chain.length_m() / static_cast<double>(chain.snapshots() - 1));
+    bytes.push_back(chain.bytes_per_100_m());
   }
   const std::string id = "s06.chain." + name;
-  const std::string what = "chains of snapshots along 30 m in " + name;
+  const std::string what = "chains of snapshots along 60 m in " + name;
   add_rate(reproduction, id + ".completed",
-           what + ", forward and back: driven to within 20 cm of the end", completed, runs.size());
+           what + ", forward and back: driven to within 50 cm of the end", completed, runs.size());
+  add_rate(reproduction, id + ".elsewhere", what + ": reported arrivals elsewhere", elsewhere,
+           runs.size());
+  if (!offset_m.empty()) {
+    add_median(reproduction, id + ".offset", what + ": offset where it has arrived", "m", offset_m);
+  }
   add_mean(reproduction, id + ".lateral", what + ": mean distance from the route", "m", mean_m);
   add_median(reproduction, id + ".lateral_worst", what + ": largest distance from the route", "m",
              worst_m);
   add_mean(reproduction, id + ".spacing", what + ": distance between snapshots", "m", spacing_m);
-  add_mean(reproduction, id + ".bytes", what + ": size", "B/m", bytes);
+  add_mean(reproduction, id + ".bytes", what + ": size", "B/100 m", bytes);
 }
 
 void reproduce_snapshot_chains(int routes, const Experiments& context) {

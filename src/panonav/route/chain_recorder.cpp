@@ -1,0 +1,282 @@
+#include "panonav/route/chain_recorder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/route/internal/snapshot_sight.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Largest deviation of a right home vector from the direction by odometry.
+constexpr double right_direction_rad = 0.6;
+// Distance between views that are kept until the next snapshot.
+constexpr double kept_view_spacing_m = 0.1;
+// Nearer views are not compared, because noise dominates the direction of their home vector.
+constexpr double min_compared_m = 0.15;
+constexpr double max_compared_m = 3.0;
+// Headings at which views, turned to heading 0, are compared: as far as a follower's may be off.
+constexpr HeadingWindow heading_window{0.0F, 0.8F};
+// Smallest distance between snapshots along the path.
+constexpr double min_snapshot_spacing_m = 0.5;
+// Largest distance of the path from the legs between way points.
+constexpr double corner_tolerance_m = 0.15;
+// Further views are tested over this part of the way to the farthest one that can be reached.
+constexpr double tested_beyond = 0.3;
+constexpr std::size_t packed_leg_bytes = 3;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double point_to_chord_m(Point2 p, Point2 from, Point2 to) {
+  const double length_m = distance(from, to);
+  if (length_m == 0.0) return distance(p, from);
+  const double x = (to.x_m - from.x_m) / length_m;
+  const double y = (to.y_m - from.y_m) / length_m;
+  const double along = std::clamp((p.x_m - from.x_m) * x + (p.y_m - from.y_m) * y, 0.0, length_m);
+  return distance(p, {from.x_m + along * x, from.y_m + along * y});
+}
+
+// Appends the indices of the way points between two positions, both excluded [Douglas, Peucker
+// 1973].
+void find_way_points(const std::vector<Point2>& path, std::size_t begin, std::size_t end,
+                     std::vector<std::size_t>& found) {
+  double max_m = 0.0;
+  std::size_t farthest = begin;
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    const double from_chord_m = point_to_chord_m(path[i], path[begin], path[end]);
+    if (from_chord_m > max_m) max_m = from_chord_m, farthest = i;
+  }
+  if (max_m <= corner_tolerance_m) return;
+  find_way_points(path, begin, farthest, found);
+  found.push_back(farthest);
+  find_way_points(path, farthest, end, found);
+}
+
+/// A normal distribution of logarithms.
+struct LogNormal {
+  double mean = 0.0;
+  double deviation = 1.0;
+
+  static LogNormal fit(const std::vector<double>& values) {
+    constexpr double min_value = 1e-4;
+    constexpr double min_deviation = 0.1;
+    LogNormal fitted;
+    for (const double v : values) fitted.mean += std::log(std::max(v, min_value));
+    fitted.mean /= static_cast<double>(values.size());
+    double squares = 0.0;
+    for (const double v : values) {
+      const double off = std::log(std::max(v, min_value)) - fitted.mean;
+      squares += off * off;
+    }
+    fitted.deviation =
+        std::max(min_deviation, std::sqrt(squares / static_cast<double>(values.size())));
+    return fitted;
+  }
+  [[nodiscard]] double log_density(double log_value) const {
+    const double z = (log_value - mean) / deviation;
+    return -0.5 * z * z - std::log(deviation);
+  }
+};
+
+// The value at which both are equally probable, between their means.
+double find_equal_density(const LogNormal& low, const LogNormal& high) {
+  double below = low.mean;
+  double above = std::max(high.mean, low.mean);
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (below + above);
+    (low.log_density(middle) > high.log_density(middle) ? below : above) = middle;
+  }
+  return std::exp(below);
+}
+
+}  // namespace
+
+void visit_options(ChainSpacing& spacing, OptionVisitor& visitor) {
+  using T = ChainSpacing;
+  constexpr OptionTable table{
+      option<&T::max_spacing_m>("largest distance between snapshots along the path", 0.1, 20),
+      option<&T::bytes_per_100_m>("bytes that 100 m of a route may take; 0: as many as homing "
+                                  "needs",
+                                  0, 1e6),
+  };
+  table.visit(spacing, visitor);
+}
+
+ChainRecorder::ChainRecorder(const SnapshotShape& shape, const ChainSpacing& spacing,
+                             const ChainOdometry& odometry)
+    : spacing_(spacing), odometry_(odometry), chain_(shape) {
+  validate(spacing_);
+  validate(odometry_);
+}
+
+double ChainRecorder::min_spacing_m() const noexcept {
+  if (spacing_.bytes_per_100_m == 0.0) return min_snapshot_spacing_m;
+  const auto bytes = static_cast<double>(chain_.shape().bytes() + packed_leg_bytes);
+  return std::clamp(100.0 * bytes / spacing_.bytes_per_100_m, min_snapshot_spacing_m,
+                    spacing_.max_spacing_m);
+}
+
+bool ChainRecorder::can_home(const StoredView& from, const StoredView& to) const {
+  const HomeVector vector = home_vector(to.view, from.view, {}, heading_window);
+  if (vector.length() == 0.0) return false;
+  const double true_rad =
+      std::atan2(to.position.y_m - from.position.y_m, to.position.x_m - from.position.x_m);
+  return std::abs(wrap_angle(vector.direction_rad() - true_rad)) <= right_direction_rad;
+}
+
+// True if homing bridges the error of odometry over the way between the last snapshot and a view,
+// in both directions.
+bool ChainRecorder::can_be_reached(std::size_t index) const {
+  const StoredView& view = views_[index];
+  const double error_m = odometry_.position_error_m(view.path_m);
+  for (std::size_t i = 1; i < index; ++i) {
+    const StoredView& other = views_[i];
+    const auto must_reach = [&](const StoredView& to) {
+      const double between_m = distance(other.position, to.position);
+      return between_m >= min_compared_m && between_m <= error_m;
+    };
+    if (must_reach(view) && !can_home(other, view)) return false;
+    if (must_reach(views_.front()) && !can_home(other, views_.front())) return false;
+  }
+  return true;
+}
+
+std::size_t ChainRecorder::add(const HomingView& view, const Pose2& moved) {
+  require(is_finite(moved), "motion between views", moved.x_m, "finite");
+  if (views_.empty()) {
+    chain_ = SnapshotChain(chain_.shape(), view.elevations());
+    const HomingView reduced = reduce_view(view, chain_.shape().rows, chain_.shape().components);
+    chain_.append({}, reduced);
+    views_.push_back({chain_.view(0), {}, 0.0});
+    return 1;
+  }
+  odometry_from_robot_ = odometry_from_robot_ * moved;
+  path_m_ += std::hypot(moved.x_m, moved.y_m);
+  if (path_m_ - views_.back().path_m < kept_view_spacing_m) return chain_.snapshots();
+  const HomingView reduced = reduce_view(view, chain_.shape().rows, chain_.shape().components);
+  views_.push_back({rotate(reduced, -odometry_from_robot_.heading_rad),
+                    odometry_from_robot_.position(), path_m_});
+  const std::size_t last = views_.size() - 1;
+  if (path_m_ >= min_spacing_m() && path_m_ <= spacing_.max_spacing_m && can_be_reached(last)) {
+    reachable_ = last;
+  }
+  const double reachable_m = views_[reachable_].path_m;
+  const double tested_m = std::max(2.0 * min_spacing_m(), (1.0 + tested_beyond) * reachable_m);
+  if (path_m_ < std::min(tested_m, spacing_.max_spacing_m)) return chain_.snapshots();
+  std::size_t next = reachable_;
+  for (std::size_t i = 1; next == 0 && i < views_.size(); ++i) {
+    if (views_[i].path_m >= min_spacing_m() || i == last) next = i;
+  }
+  take_snapshot(next);
+  return chain_.snapshots();
+}
+
+void ChainRecorder::take_snapshot(std::size_t index) {
+  std::vector<Point2> path;
+  for (std::size_t i = 0; i <= index; ++i) path.push_back(views_[i].position);
+  std::vector<std::size_t> way_points;
+  find_way_points(path, 0, index, way_points);
+  for (const std::size_t i : way_points) chain_.append(path[i], std::nullopt);
+  chain_.append(path[index], views_[index].view);
+  compare_with_snapshot(index);
+  const double path_m = views_[index].path_m;
+  views_.erase(views_.begin(), views_.begin() + static_cast<std::ptrdiff_t>(index));
+  for (StoredView& view : views_) view.path_m -= path_m;
+  path_m_ -= path_m;
+  reachable_ = 0;
+}
+
+// Compares a view, as the snapshot that it becomes, with the views before it and with the other
+// snapshots.
+void ChainRecorder::compare_with_snapshot(std::size_t index) {
+  const HomingView snapshot = chain_.view(chain_.nodes().size() - 1);
+  const Point2 place = views_[index].position;
+  double reach_m = 0.0;
+  bool is_reached = true;
+  const auto compare = [&](const HomingView& view, Point2 from) {
+    const SnapshotSight sight = look_at_snapshot(snapshot, view, heading_window);
+    const HomeVector& vector = sight.vector;
+    const double true_rad = std::atan2(place.y_m - from.y_m, place.x_m - from.x_m);
+    const double error_rad = wrap_angle(vector.direction_rad() - true_rad);
+    pairs_.push_back({distance(from, place), vector.length(), sight.difference, sight.confidence,
+                      vector.length() > 0.0 && std::abs(error_rad) <= right_direction_rad});
+  };
+  for (std::size_t i = index; i-- > 0;) {
+    const double away_m = distance(views_[i].position, place);
+    if (away_m > max_compared_m) continue;
+    compare(views_[i].view, views_[i].position);
+    if (away_m < min_compared_m) continue;
+    is_reached = is_reached && pairs_.back().is_right;
+    if (is_reached) reach_m = std::max(reach_m, away_m);
+  }
+  reaches_m_.push_back(reach_m);
+  for (std::size_t node = 0; node + 1 < chain_.nodes().size(); ++node) {
+    if (chain_.nodes()[node].has_snapshot()) {
+      compare(chain_.view(node), chain_.nodes()[node].position);
+    }
+  }
+}
+
+ChainModel ChainRecorder::learn_model() const {
+  ChainModel model;
+  std::vector<double> scales_m;
+  for (const ComparedPair& pair : pairs_) {
+    if (pair.is_right && pair.distance_m >= min_compared_m && pair.distance_m <= max_compared_m) {
+      scales_m.push_back(pair.distance_m / pair.length);
+    }
+  }
+  if (scales_m.empty()) return model;
+  model.typical_distance_m = static_cast<float>(std::clamp(median(scales_m), 1e-3, 1e4));
+  model.reach_m = static_cast<float>(std::max(min_compared_m, median(reaches_m_)));
+  std::vector<double> beside;
+  std::vector<double> elsewhere;
+  std::vector<std::pair<double, bool>> by_confidence;
+  constexpr double beside_share = 0.1;  // of R
+  for (const ComparedPair& pair : pairs_) {
+    const auto r_m = static_cast<double>(model.typical_distance_m);
+    if (pair.distance_m <= std::max(beside_share * r_m, 1.5 * kept_view_spacing_m)) {
+      beside.push_back(pair.difference);
+    } else if (!pair.is_right) {
+      elsewhere.push_back(pair.difference);
+    }
+    if (pair.distance_m >= min_compared_m)
+      by_confidence.emplace_back(-pair.confidence, pair.is_right);
+  }
+  constexpr std::size_t min_values = 5;
+  if (beside.size() >= min_values && elsewhere.size() >= min_values) {
+    const LogNormal near = LogNormal::fit(beside);
+    const double equal = find_equal_density(near, LogNormal::fit(elsewhere));
+    constexpr double quantile_95 = 1.645;
+    model.arrived_difference = static_cast<float>(
+        std::min({2.0, equal, std::exp(near.mean + quantile_95 * near.deviation)}));
+  }
+  std::sort(by_confidence.begin(), by_confidence.end());
+  constexpr double right_share = 0.9;
+  double right = 0.0;
+  double all = 0.0;
+  for (const auto& [negative_confidence, is_right] : by_confidence) {
+    all += 1.0;
+    right += is_right ? 1.0 : 0.0;
+    if (right >= right_share * all)
+      model.homing_confidence = static_cast<float>(-negative_confidence);
+  }
+  return model;
+}
+
+SnapshotChain ChainRecorder::finish() const {
+  ChainRecorder ended = *this;
+  if (reachable_ > 0 && reachable_ + 1 < views_.size()) ended.take_snapshot(reachable_);
+  if (ended.views_.size() > 1) ended.take_snapshot(ended.views_.size() - 1);
+  ended.chain_.set_model(ended.learn_model());
+  return ended.chain_;
+}
+
+}  // namespace panonav

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/route/packed_snapshot.hpp"
+
+namespace panonav {
+
+/// Largest errors of an odometry on which a chain of snapshots relies between two snapshots.
+struct ChainOdometry {
+  double distance_error = 0.05;                   ///< of the travelled distance, 0 .. 1
+  double heading_error_rad_per_m = 0.0349065850;  ///< >= 0; 2 degrees a metre
+  /// Drift that odometry does not see, as by wind, as a part of the travelled distance, 0 .. 1.
+  double drift = 0.1;
+
+  /// Returns by how much the position may be off after travelling straight on from a snapshot, by
+  /// the errors of both drives, the recorded and the repeated one: the root of the sum of squares.
+  [[nodiscard]] double position_error_m(double travelled_m) const noexcept;
+  /// Returns by how much the heading may be off, likewise.
+  [[nodiscard]] double heading_error_rad(double travelled_m) const noexcept;
+  friend bool operator==(const ChainOdometry&, const ChainOdometry&) = default;
+};
+void visit_options(ChainOdometry& odometry, OptionVisitor& visitor);
+
+/// Values that a recorder learns from the surroundings of a route.
+struct ChainModel {
+  float typical_distance_m = 3.0F;  ///< metres of a home vector of length 1, > 0
+  float reach_m = 0.5F;  ///< distance up to which home vectors to most snapshots are right, > 0
+  /// Image difference below which are 95 % of the views from beside a snapshot, if these are more
+  /// probable there than views from elsewhere along the route; 0 .. 2.
+  float arrived_difference = 0.08F;
+  /// Confidence of home vectors from which on nine of ten were right within 0.6 rad, -1 .. 1: the
+  /// mean of the correlation of the views and of the cosine of the angle between the home vectors
+  /// there and back.
+  float homing_confidence = 0.8F;
+  friend bool operator==(const ChainModel&, const ChainModel&) = default;
+};
+
+/// A node of a chain: a way point, or the place of a snapshot.
+struct ChainNode {
+  Point2 position;                     ///< in the frame of the recording's odometry
+  std::vector<std::uint8_t> snapshot;  ///< as from `pack_snapshot`; empty: way point
+
+  /// True for the place of a snapshot, false for a way point.
+  [[nodiscard]] bool has_snapshot() const noexcept { return !snapshot.empty(); }
+  friend bool operator==(const ChainNode&, const ChainNode&) = default;
+};
+
+/// A route as a few small snapshots, with straight legs by odometry between them. All snapshots are
+/// rotated to the heading 0 of the recording's odometry, so a leg needs no heading: distance,
+/// direction and the kind of its end take 3 bytes. Holds what the packed form says, to the bit.
+/// The first and the last node have a snapshot.
+class SnapshotChain {
+ public:
+  /// Longest leg, in metres: the distance has 11 bits and steps of 1 cm, the direction 12 bits.
+  static constexpr double max_leg_m = 20.47;
+
+  /// Makes an empty chain. Throws OptionError.
+  explicit SnapshotChain(const SnapshotShape& shape = {},
+                         const std::optional<ElevationBand>& elevations = std::nullopt);
+
+  /// Appends a node at a position in the frame of the odometry; rounding errors of legs do not add
+  /// up. `view`: at heading 0, reduced to the shape of snapshots; nullopt: a way point. Throws
+  /// ContractError if the leg is longer than `max_leg_m` or not finite, for a first node that is a
+  /// way point, and as `pack_snapshot`.
+  void append(Point2 position, const std::optional<HomingView>& view);
+
+  /// Sets what was learnt. Throws ContractError on values out of range.
+  void set_model(const ChainModel& model);
+
+  /// Size of all snapshots.
+  [[nodiscard]] const SnapshotShape& shape() const noexcept { return shape_; }
+  /// Elevations of the rows of the views; nullopt: unknown.
+  [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
+    return elevations_;
+  }
+  /// Values learnt while recording.
+  [[nodiscard]] const ChainModel& model() const noexcept { return model_; }
+  /// All nodes in the order of the recording.
+  [[nodiscard]] std::span<const ChainNode> nodes() const& noexcept { return nodes_; }
+  std::span<const ChainNode> nodes() const&& = delete;  // would dangle
+  /// The view of a node with a snapshot. Throws ContractError for another node.
+  [[nodiscard]] HomingView view(std::size_t node) const;
+
+  [[nodiscard]] std::size_t snapshots() const noexcept;  ///< Number of snapshots.
+  [[nodiscard]] double length_m() const noexcept;        ///< Sum of all legs.
+  /// Number of bytes of the packed form over the length; 0 if the length is 0.
+  [[nodiscard]] double bytes_per_100_m() const;
+
+  /// Returns the packed form: a header of 32 bytes, the first snapshot, then for each leg 3 bytes
+  /// and the snapshot at its end, if there is one. Throws ContractError on a chain that is empty
+  /// or ends with a way point.
+  [[nodiscard]] std::vector<std::uint8_t> pack() const;
+  /// Unpacks a chain. Throws ContractError on bytes that `pack` does not write.
+  [[nodiscard]] static SnapshotChain unpack(std::span<const std::uint8_t> bytes);
+
+  friend bool operator==(const SnapshotChain&, const SnapshotChain&) = default;
+
+ private:
+  SnapshotShape shape_;
+  std::optional<ElevationBand> elevations_;
+  ChainModel model_;
+  std::vector<ChainNode> nodes_;
+};
+
+}  // namespace panonav

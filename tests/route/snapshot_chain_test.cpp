@@ -1,0 +1,281 @@
+// Chains of snapshots: the packed form, recording, and following by an odometry with errors, in a
+// round room without a simulator.
+
+#include "panonav/route/snapshot_chain.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/route/chain_follower.hpp"
+#include "panonav/route/chain_recorder.hpp"
+#include "support/remembered_worlds.hpp"
+
+namespace panonav::testing {
+namespace {
+
+constexpr SnapshotShape chain_shape{.rows = 1, .components = 12, .bits = 6};
+
+HomingView chain_view(const ToyWorld& world, const Pose2& pose) {
+  return homing_view(striped_signature(world, pose, 14));
+}
+
+// A bend of 4.2 m within a room of 6 m radius.
+std::vector<Pose2> bend() {
+  std::vector<Pose2> poses;
+  for (int i = 0; i <= 42; ++i) {
+    const double angle = -1.0 + 0.1 * i / 2.0;
+    poses.push_back(
+        {2.0 * std::cos(angle), 2.0 * std::sin(angle), wrap_angle(angle + std::numbers::pi / 2.0)});
+  }
+  return poses;
+}
+
+SnapshotChain record_chain(const ToyWorld& world, const std::vector<Pose2>& route,
+                           const ChainSpacing& spacing = {.max_spacing_m = 1.5}) {
+  ChainRecorder recorder(chain_shape, spacing);
+  std::size_t snapshots = 0;
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    const Pose2 moved = i == 0 ? Pose2{} : inverse(route[i - 1]) * route[i];
+    const std::size_t now = recorder.add(chain_view(world, route[i]), moved);
+    EXPECT_GE(now, snapshots);
+    EXPECT_LE(now, snapshots + 1);
+    snapshots = now;
+  }
+  return recorder.finish();
+}
+
+TEST(SnapshotChain, PacksAndUnpacksToTheBit) {
+  const SnapshotChain chain = record_chain(striped_round_room(6.0, 1), bend());
+  ASSERT_GE(chain.snapshots(), 3U);
+  const auto bytes = chain.pack();
+  // A header, snapshots, and three bytes for each leg.
+  EXPECT_EQ(bytes.size(),
+            32 + chain.snapshots() * chain_shape.bytes() + 3 * (chain.nodes().size() - 1));
+  EXPECT_NEAR(chain.bytes_per_100_m(), 100.0 * static_cast<double>(bytes.size()) / chain.length_m(),
+              1e-9);
+  const SnapshotChain unpacked = SnapshotChain::unpack(bytes);
+  EXPECT_EQ(unpacked, chain);
+  EXPECT_EQ(unpacked.pack(), bytes);
+}
+
+TEST(SnapshotChain, HoldsElevationsAsItsPackedFormDoes) {
+  const ElevationBand band{radians(-30.0), radians(40.0)};
+  SnapshotChain chain({}, band);
+  chain.append({}, HomingView(8, 6, std::vector<float>(48), std::vector<float>(48), band));
+  ASSERT_TRUE(chain.elevations().has_value());
+  EXPECT_NEAR(chain.elevations()->bottom_rad, band.bottom_rad, 1e-7);
+  EXPECT_NEAR(chain.elevations()->top_rad, band.top_rad, 1e-7);
+  EXPECT_EQ(SnapshotChain::unpack(chain.pack()), chain);
+}
+
+TEST(SnapshotChain, RoundingErrorsOfLegsDoNotAddUp) {
+  SnapshotChain chain;
+  const HomingView view(8, 6, std::vector<float>(48), std::vector<float>(48));
+  Random random(4);
+  Point2 place;
+  chain.append(place, view);
+  for (int i = 0; i < 200; ++i) {
+    place.x_m += random.uniform(-1.0, 5.0);
+    place.y_m += random.uniform(-4.0, 4.0);
+    chain.append(place, i % 3 == 0 ? std::optional(view) : std::nullopt);
+    // Half a centimetre along the leg, and half of 2 pi / 4096 of at most 6.5 m across.
+    EXPECT_LT(distance(chain.nodes().back().position, place), 0.0071);
+  }
+  chain.append(place, view);
+  EXPECT_EQ(SnapshotChain::unpack(chain.pack()), chain);
+  EXPECT_THROW(chain.append({place.x_m + 20.5, place.y_m}, view), ContractError);
+}
+
+TEST(SnapshotChain, RefusesBytesThatAreNotWritten) {
+  const auto bytes = record_chain(striped_round_room(6.0, 1), bend()).pack();
+  EXPECT_NO_THROW((void)SnapshotChain::unpack(bytes));
+  const auto expect_refused = [&](std::size_t index, std::uint8_t value) {
+    auto changed = bytes;
+    changed[index] = value;
+    EXPECT_THROW((void)SnapshotChain::unpack(changed), ContractError) << "byte " << index;
+  };
+  expect_refused(0, 0);      // magic number
+  expect_refused(4, 0);      // rows
+  expect_refused(5, 1);      // components
+  expect_refused(6, 9);      // bits
+  expect_refused(19, 0xBF);  // typical distance: negative
+  expect_refused(23, 0x7F);  // reach
+  expect_refused(27, 0x7F);  // arrived difference
+  expect_refused(31, 0x7F);  // homing confidence
+  expect_refused(32, 0);     // a snapshot without scale
+  const std::vector<std::size_t> sizes{0, 31, 32, 32 + chain_shape.bytes() + 2, bytes.size() - 1};
+  for (const std::size_t size : sizes) {
+    EXPECT_THROW((void)SnapshotChain::unpack(std::span(bytes).first(size)), ContractError) << size;
+  }
+  // A chain ends with a snapshot.
+  SnapshotChain chain;
+  const HomingView view(8, 6, std::vector<float>(48), std::vector<float>(48));
+  EXPECT_THROW((void)chain.pack(), ContractError);
+  EXPECT_THROW(chain.append({}, std::nullopt), ContractError);
+  chain.append({}, view);
+  chain.append({1.0, 0.0}, std::nullopt);
+  EXPECT_THROW((void)chain.pack(), ContractError);
+  EXPECT_THROW((void)chain.view(1), ContractError);
+  EXPECT_THROW(chain.set_model({.typical_distance_m = 0.0F}), ContractError);
+}
+
+TEST(ChainRecorder, SnapshotsLieOnTheRouteAtTheHeadingOfTheStart) {
+  const ToyWorld world = striped_round_room(6.0, 3);
+  const auto route = bend();
+  const SnapshotChain chain = record_chain(world, route);
+  EXPECT_NEAR(chain.length_m(), 4.2, 0.1);
+  double previous_m = 0.0;
+  for (std::size_t i = 0; i < chain.nodes().size(); ++i) {
+    const Point2 place = route.front() * chain.nodes()[i].position;
+    double from_route_m = 10.0;
+    for (const Pose2& pose : route) {
+      from_route_m = std::min(from_route_m, distance(pose.position(), place));
+    }
+    EXPECT_LT(from_route_m, 0.02) << "node " << i;
+    if (!chain.nodes()[i].has_snapshot()) continue;
+    const Pose2 from{place.x_m, place.y_m, route.front().heading_rad};
+    const HomingView there = reduce_view(chain_view(world, from), 1, 12);
+    EXPECT_LT(image_difference(chain.view(i), there), 0.02) << "node " << i;
+    EXPECT_NEAR(home_vector(chain.view(i), there).heading_rad, 0.0, 0.03) << "node " << i;
+    const double path_m = distance(route.front().position(), place);
+    EXPECT_GE(path_m, previous_m);
+    previous_m = path_m;
+  }
+}
+
+TEST(ChainRecorder, TakesMoreSnapshotsWhereViewsChangeFasterAndFewerForABudget) {
+  std::vector<Pose2> straight;
+  for (int i = 0; i <= 30; ++i) straight.push_back({-1.5 + 0.1 * i, 0.2, 0.0});
+  std::size_t small = 0;
+  std::size_t large = 0;
+  std::size_t cheap = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    small += record_chain(striped_round_room(1.8, seed), straight, {}).snapshots();
+    large += record_chain(striped_round_room(18.0, seed), straight, {}).snapshots();
+    cheap += record_chain(striped_round_room(1.8, seed), straight, {.bytes_per_100_m = 1000.0})
+                 .snapshots();
+  }
+  EXPECT_GT(small, large);
+  EXPECT_GT(small, cheap);
+}
+
+TEST(ChainRecorder, AViewIsAChain) {
+  const ToyWorld world = striped_round_room(3.0, 1);
+  ChainRecorder recorder(chain_shape);
+  EXPECT_EQ(recorder.finish(), SnapshotChain(chain_shape));
+  EXPECT_EQ(recorder.add(chain_view(world, {}), {}), 1U);
+  EXPECT_EQ(recorder.finish().snapshots(), 1U);
+  EXPECT_THROW(recorder.add(chain_view(world, {}), {std::nan(""), 0.0, 0.0}), ContractError);
+  EXPECT_THROW(ChainRecorder({}, {.max_spacing_m = 21.0}), OptionError);
+}
+
+struct Drive {
+  ChainState state = ChainState::travelling;
+  double end_m = 0.0;  // from the last snapshot
+  bool has_searched = false;
+};
+
+// Drives along the chain by an odometry with constant errors; the robot stays in the room.
+Drive drive(const ToyWorld& world, const SnapshotChain& chain, const std::vector<Pose2>& route,
+            ChainDirection direction, Pose2 start, double scale, double turn_rad_per_m) {
+  const Pose2& end = direction == ChainDirection::forward ? route.back() : route.front();
+  ChainFollower follower(chain, direction);
+  Drive driven;
+  Pose2 moved;
+  for (int step = 0; step < 400; ++step) {
+    const ChainDecision decision = follower.decide(chain_view(world, start), moved);
+    driven.state = decision.state;
+    driven.has_searched = driven.has_searched || decision.state == ChainState::searching;
+    if (decision.state == ChainState::arrived || decision.state == ChainState::lost) break;
+    const Pose2 command = Pose2{0.0, 0.0, decision.turn_rad} * Pose2{decision.advance_m, 0.0, 0.0};
+    const Pose2 next = start * command;
+    moved = {};
+    if (std::hypot(next.x_m, next.y_m) > 5.0) continue;  // a wall
+    start = next;
+    moved = {scale * command.x_m, scale * command.y_m,
+             wrap_angle(command.heading_rad + turn_rad_per_m * decision.advance_m)};
+  }
+  driven.end_m = distance(start.position(), end.position());
+  return driven;
+}
+
+TEST(ChainFollower, RepeatsARouteInBothDirectionsWithErrorsOfOdometry) {
+  const auto route = bend();
+  int arrived = 0;
+  int runs = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const ToyWorld world = striped_round_room(6.0, seed);
+    const SnapshotChain chain = record_chain(world, route);
+    for (const ChainDirection direction : {ChainDirection::forward, ChainDirection::back}) {
+      Pose2 start = direction == ChainDirection::forward ? route.front() : route.back();
+      start.heading_rad = wrap_angle(static_cast<double>(seed) * 1.3);
+      const double sign = seed % 2 == 0 ? 1.0 : -1.0;
+      const Drive driven =
+          drive(world, chain, route, direction, start, 1.0 + 0.05 * sign, -0.03 * sign);
+      ++runs;
+      if (driven.state != ChainState::arrived) continue;
+      ++arrived;
+      EXPECT_LT(driven.end_m, 0.2);
+    }
+  }
+  EXPECT_EQ(runs, 10);
+  EXPECT_GE(arrived, 9);
+}
+
+TEST(ChainFollower, SearchesForASnapshotThatOdometryHasMissed) {
+  const auto route = bend();
+  int searched = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const ToyWorld world = striped_round_room(6.0, seed);
+    const SnapshotChain chain =
+        record_chain(world, route, {.max_spacing_m = 4.0, .bytes_per_100_m = 500.0});
+    // The errors are larger than assumed.
+    const Drive driven =
+        drive(world, chain, route, ChainDirection::forward, route.front(), 0.8, 0.2);
+    searched += driven.has_searched ? 1 : 0;
+    if (driven.state != ChainState::arrived) continue;
+    EXPECT_LT(driven.end_m, 0.5);
+  }
+  EXPECT_GE(searched, 1);
+}
+
+TEST(ChainFollower, IsLostInAnotherPlace) {
+  const SnapshotChain chain = record_chain(striped_round_room(6.0, 1), bend());
+  for (std::uint64_t seed = 50; seed < 60; ++seed) {
+    const Drive driven = drive(striped_round_room(6.0, seed), chain, bend(),
+                               ChainDirection::forward, {0.0, 0.0, 0.0}, 1.0, 0.0);
+    EXPECT_EQ(driven.state, ChainState::lost) << "seed " << seed;
+  }
+}
+
+TEST(ChainFollower, ChecksItsInputs) {
+  EXPECT_THROW(ChainFollower(SnapshotChain{}, ChainDirection::forward), ContractError);
+  const ToyWorld world = striped_round_room(3.0, 1);
+  ChainRecorder recorder(chain_shape);
+  recorder.add(chain_view(world, {}), {});
+  EXPECT_THROW(ChainFollower(recorder.finish(), ChainDirection::back, {.max_step_m = 0.0}),
+               OptionError);
+  ChainFollower follower(recorder.finish(), ChainDirection::back);
+  EXPECT_THROW((void)follower.decide(chain_view(world, {}), {0.0, std::nan(""), 0.0}),
+               ContractError);
+  EXPECT_EQ(follower.decide(chain_view(world, {}), {}).state, ChainState::arrived);
+  EXPECT_EQ(follower.decide(chain_view(world, {1.0, 0.0, 0.0}), {}).state, ChainState::arrived);
+}
+
+TEST(ChainOdometry, ErrorsGrowWithTheDistance) {
+  const ChainOdometry exact{.distance_error = 0.0, .heading_error_rad_per_m = 0.0, .drift = 0.0};
+  EXPECT_EQ(exact.position_error_m(10.0), 0.0);
+  EXPECT_EQ(exact.heading_error_rad(10.0), 0.0);
+  // Both drives: the square root of 2 times 10 % of the distance.
+  const ChainOdometry windy{.distance_error = 0.0, .heading_error_rad_per_m = 0.0, .drift = 0.1};
+  EXPECT_NEAR(windy.position_error_m(10.0), std::sqrt(2.0), 1e-12);
+  EXPECT_GT(ChainOdometry{}.position_error_m(10.0), 2.0 * ChainOdometry{}.position_error_m(5.0));
+}
+
+}  // namespace
+}  // namespace panonav::testing
