@@ -36,6 +36,8 @@ constexpr int coarse_frequency = 2;
 // The path to a target may be this much longer than expected, with detours around obstacles.
 constexpr double max_path_factor = 3.0;
 constexpr int max_steps_to_spiral_point = 4;
+// Largest number of steps of a search, approaches included.
+constexpr std::size_t max_steps_per_spiral_point = 3;
 
 }  // namespace
 
@@ -100,9 +102,11 @@ SnapshotSight ChainFollower::look_at(std::size_t node, const HomingView& view,
   return look_at_snapshot(chain_.view(node), view, window);
 }
 
-// True if nine of ten home vectors like this one are right.
+// True if the view is from beside the snapshot, where vectors have no direction, or if nine of ten
+// home vectors like this one are right.
 bool ChainFollower::is_confident(const SnapshotSight& sight) const {
-  return sight.confidence >= static_cast<double>(chain_.model().homing_confidence);
+  return sight.difference <= static_cast<double>(chain_.model().arrived_difference) ||
+         sight.confidence >= static_cast<double>(chain_.model().homing_confidence);
 }
 
 // True if the home vector ends where the error of odometry allows the target to be.
@@ -208,7 +212,7 @@ void ChainFollower::begin_search() {
   state_ = ChainState::searching;
   steps_to_point_ = 0;
   if (continues) return;
-  since_search_m_ = 0.0;
+  search_steps_ = 0;
   fix_to_search_m_ = since_fix_m_;
   const auto turn_m = 0.5 * static_cast<double>(chain_.model().reach_m);
   const double radius_m = options_.error_factor * error_m();
@@ -331,11 +335,7 @@ ChainDecision ChainFollower::search(const HomingView& view) {
     ++spiral_point_;
     steps_to_point_ = 0;
   }
-  const double max_search_m =
-      max_path_factor * options_.max_step_m * static_cast<double>(spiral_.size());
-  if (spiral_point_ >= spiral_.size() || since_search_m_ > max_search_m) {
-    return end_with(ChainState::lost);
-  }
+  if (spiral_point_ >= spiral_.size()) return end_with(ChainState::lost);
   ++steps_to_point_;
   return move_to(spiral_[spiral_point_]);
 }
@@ -358,8 +358,10 @@ ChainDecision ChainFollower::decide(const HomingView& view, const Pose2& moved) 
     since_fix_m_ += step_m;
     since_target_m_ += step_m;
     since_approach_m_ += step_m;
-    since_search_m_ += step_m;
   }
+  // Obstacles and approaches that fail may delay a search without end.
+  const std::size_t max_search_steps = max_steps_per_spiral_point * spiral_.size();
+  if (!spiral_.empty() && ++search_steps_ > max_search_steps) return end_with(ChainState::lost);
   switch (state_) {
     case ChainState::travelling:
       return travel(reduced);

@@ -123,7 +123,7 @@ class ChainFollower {
   int steps_since_min_ = 0;
   // The present search.
   std::vector<Point2> spiral_;
-  double since_search_m_ = 0.0;   // distance driven since the search began
+  std::size_t search_steps_ = 0;
   double fix_to_search_m_ = 0.0;  // distance driven from the last snapshot until then
   std::size_t spiral_point_ = 0;
   int steps_to_point_ = 0;
