@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -9,6 +10,8 @@
 
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/relative_pose/internal/displacement.hpp"
+#include "panonav/relative_pose/internal/turn_bound.hpp"
 #include "panonav/signature/correlation_point.hpp"
 
 namespace panonav {
@@ -60,6 +63,71 @@ TEST(TurnCorrelation, ATurnThatAllComponentsTellIsFoundByBothRules) {
     std::array<float, 1> highest{};
     ASSERT_EQ(find_highest_peaks(correlation, highest), 1);
     EXPECT_LT(error_of(highest[0], turned), 1e-4);
+  }
+}
+
+TEST(TurnCorrelation, BoundsItsMaximum) {
+  Random random(12);
+  for (int trial = 0; trial < 100; ++trial) {
+    TurnCorrelation correlation;
+    float all = 0.0F;
+    for (int k = 1; k <= 1 + trial % 20; ++k) {
+      const double size = random.uniform(0.0, 1.0);
+      add(correlation, size, random.uniform(-3.1, 3.1));
+      all += static_cast<float>(size);
+    }
+    float maximum = correlation.at(0.0F);
+    for (float turn = 0.0F; turn < 6.3F; turn += 0.002F)
+      maximum = std::max(maximum, correlation.at(turn));
+    const float bound = bound_maximum(correlation);
+    EXPECT_GE(bound, maximum - 1e-4F * all);
+    EXPECT_LE(bound, maximum + 0.08F * all);
+  }
+}
+
+// The search skips turns of displacements that cannot win; it must find what a full search finds.
+TEST(Displacement, IsTheOneWithTheSmallestDifferenceOfAll) {
+  Random random(13);
+  constexpr std::size_t rows = 4;
+  constexpr std::size_t frequencies = 14;
+  constexpr std::size_t compared = max_searched_frequency;
+  constexpr std::size_t stride = frequencies + 1;
+  for (int trial = 0; trial < 60; ++trial) {
+    std::vector<float> home_a, home_b, current_a, current_b;
+    for (std::size_t i = 0; i < rows * stride; ++i) {
+      const double size = 1.0 / static_cast<double>(1 + i % stride);
+      for (auto* const values : {&home_a, &home_b, &current_a, &current_b})
+        values->push_back(static_cast<float>(size * random.uniform(-1.0, 1.0)));
+    }
+    const HeadingWindow window{1.0F, trial % 2 == 0 ? 4.0F : 0.7F};
+    const BestDisplacement found =
+        find_displacement(home_a, home_b, current_a, current_b, rows, frequencies, window);
+    const auto difference = [&](Displacement displacement) {
+      TurnCorrelation correlation{.highest = compared};
+      std::array<float, compared + 1> a;
+      std::array<float, compared + 1> b;
+      float energy = 0.0F;
+      for (std::size_t first = 0; first < rows * stride; first += stride) {
+        displace(displacement, std::span(current_a).subspan(first, stride),
+                 std::span(current_b).subspan(first, stride), a, b);
+        for (std::size_t k = 1; k <= compared; ++k) {
+          const float ha = home_a[first + k];
+          const float hb = home_b[first + k];
+          correlation.real[k] += ha * a[k] + hb * b[k];
+          correlation.imaginary[k] += ha * b[k] - hb * a[k];
+          energy += ha * ha + hb * hb + a[k] * a[k] + b[k] * b[k];
+        }
+      }
+      std::array<float, 1> turn{};
+      if (find_highest_peaks(correlation, turn, window) == 0) return 1e9F;
+      const auto ring = static_cast<float>(displacement.ring);
+      return (energy - 2.0F * correlation.at(turn[0])) * (1.0F + 0.01F * ring * ring);
+    };
+    const float smallest = difference(found.displacement);
+    for (int ring = 0; ring <= Displacement::rings; ++ring) {
+      for (int direction = 0; direction < Displacement::directions; ++direction)
+        EXPECT_LE(smallest, difference({ring, direction}) * 1.00001F);
+    }
   }
 }
 

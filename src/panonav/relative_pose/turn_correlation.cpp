@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <numbers>
 
+#include "panonav/relative_pose/internal/turn_bound.hpp"
 #include "panonav/signature/correlation_point.hpp"
 
 namespace panonav {
@@ -53,6 +54,34 @@ const CircleTable& unit_circle() {
   return made;
 }
 
+// Computes the correlation at turns from 0 on, and returns their number: at least 8 for each period
+// of the highest frequency.
+std::size_t evaluate_on_grid(const TurnCorrelation& correlation,
+                             std::array<float, max_points>& values) noexcept {
+  std::size_t count = 16;
+  while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
+  const std::size_t stride = max_points / count;
+  const CircleTable& table = unit_circle();
+  std::array<float, max_points> cosine, sine, imaginary;
+  for (std::size_t i = 0; i < count; ++i) {
+    cosine[i] = table.cosine[i * stride];
+    sine[i] = table.sine[i * stride];
+    values[i] = imaginary[i] = 0.0F;
+  }
+  // Horner's rule for all points at once: (sum + term) exp(-j sigma).
+  for (int k = correlation.highest; k >= 1; --k) {
+    const float term_real = correlation.real[static_cast<std::size_t>(k)];
+    const float term_imaginary = correlation.imaginary[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < count; ++i) {
+      const float a = values[i] + term_real;
+      const float b = imaginary[i] + term_imaginary;
+      values[i] = a * cosine[i] + b * sine[i];
+      imaginary[i] = b * cosine[i] - a * sine[i];
+    }
+  }
+  return count;
+}
+
 }  // namespace
 
 float TurnCorrelation::at(float turn_rad) const noexcept {
@@ -94,29 +123,27 @@ float sequential_heading(const TurnCorrelation& correlation) noexcept {
   return correlation.at(opposite) > correlation.at(first) ? opposite : first;
 }
 
+float bound_maximum(const TurnCorrelation& correlation) noexcept {
+  std::array<float, max_points> values;
+  const std::size_t count = evaluate_on_grid(correlation, values);
+  const float highest =
+      *std::max_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count));
+  float max_curvature = 0.0F;
+  for (int k = 1; k <= correlation.highest; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    max_curvature +=
+        static_cast<float>(k * k) * std::sqrt(correlation.real[i] * correlation.real[i] +
+                                              correlation.imaginary[i] * correlation.imaginary[i]);
+  }
+  // The slope is 0 at the maximum, which is at most half a step from a point of the grid.
+  const float half_step_rad = std::numbers::pi_v<float> / static_cast<float>(count);
+  return highest + 0.5F * half_step_rad * half_step_rad * max_curvature;
+}
+
 int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turns,
                        const HeadingWindow& window) noexcept {
-  std::size_t count = 16;
-  while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
-  const std::size_t stride = max_points / count;
-  const CircleTable& table = unit_circle();
-  std::array<float, max_points> cosine, sine, real, imaginary;
-  for (std::size_t i = 0; i < count; ++i) {
-    cosine[i] = table.cosine[i * stride];
-    sine[i] = table.sine[i * stride];
-    real[i] = imaginary[i] = 0.0F;
-  }
-  // Horner's rule for all points at once: (sum + term) exp(-j sigma).
-  for (int k = correlation.highest; k >= 1; --k) {
-    const float term_real = correlation.real[static_cast<std::size_t>(k)];
-    const float term_imaginary = correlation.imaginary[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < count; ++i) {
-      const float a = real[i] + term_real;
-      const float b = imaginary[i] + term_imaginary;
-      real[i] = a * cosine[i] + b * sine[i];
-      imaginary[i] = b * cosine[i] - a * sine[i];
-    }
-  }
+  std::array<float, max_points> values;
+  const std::size_t count = evaluate_on_grid(correlation, values);
   struct Peak {
     float value;
     float turn_rad;
@@ -125,8 +152,8 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
   std::array<Peak, max_points / 2> peaks;
   std::size_t found = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const float value = real[i];
-    if (!(value > real[(i + count - 1) % count] && value >= real[(i + 1) % count])) continue;
+    const float value = values[i];
+    if (!(value > values[(i + count - 1) % count] && value >= values[(i + 1) % count])) continue;
     const float turn_rad =
         2.0F * std::numbers::pi_v<float> * static_cast<float>(i) / static_cast<float>(count);
     if (window.contains(turn_rad)) peaks[found++] = {value, turn_rad};

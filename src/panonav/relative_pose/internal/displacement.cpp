@@ -6,8 +6,10 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <utility>
 #include <vector>
 
+#include "panonav/relative_pose/internal/turn_bound.hpp"
 #include "panonav/relative_pose/internal/turn_coefficients.hpp"
 
 namespace panonav {
@@ -28,7 +30,7 @@ double ring_radius(int ring) {
 
 /// The effect of a displacement straight ahead on the cosine and on the sine coefficients. As the
 /// expected image is symmetric about the direction of the displacement, cosines and sines do not
-/// mix. Row m, column k: the part of frequency k of the view in frequency m of the expected image.
+/// mix. Row k, column m: the part of frequency k of the view in frequency m of the expected image.
 struct DisplacementMatrix {
   std::array<float, size * size> cosines{};
   std::array<float, size * size> sines{};
@@ -60,15 +62,15 @@ void fill_matrix(DisplacementMatrix& matrix, double rho) {
   }
   const float share = 2.0F / static_cast<float>(points);
   for (std::size_t i = 0; i < points; ++i) {
-    for (std::size_t m = 1; m < size; ++m) {
-      const float c = share * to_cosine[i * size + m];
-      const float s = share * to_sine[i * size + m];
-      float* const cosines = matrix.cosines.data() + m * size;
-      float* const sines = matrix.sines.data() + m * size;
-      // Frequency 0 of a view shows no structure.
-      for (std::size_t k = 1; k < size; ++k) {
-        cosines[k] += c * from_cosine[i * size + k];
-        sines[k] += s * from_sine[i * size + k];
+    // Frequency 0 of a view shows no structure.
+    for (std::size_t k = 1; k < size; ++k) {
+      const float c = from_cosine[i * size + k];
+      const float s = from_sine[i * size + k];
+      float* const cosines = matrix.cosines.data() + k * size;
+      float* const sines = matrix.sines.data() + k * size;
+      for (std::size_t m = 1; m < size; ++m) {
+        cosines[m] += share * to_cosine[i * size + m] * c;
+        sines[m] += share * to_sine[i * size + m] * s;
       }
     }
   }
@@ -93,6 +95,96 @@ const Tables& tables() {
   return *made;
 }
 
+/// Coefficients of one row in the frame of a robot that faces a direction.
+struct RowCoefficients {
+  std::array<float, size> a, b;
+};
+
+void face(int direction, std::span<const float> from_a, std::span<const float> from_b,
+          RowCoefficients& ahead) noexcept {
+  const auto& cosine = tables().cosines[static_cast<std::size_t>(direction)];
+  const auto& sine = tables().sines[static_cast<std::size_t>(direction)];
+  for (std::size_t k = 0; k < std::min(from_a.size(), size); ++k) {
+    ahead.a[k] = from_a[k] * cosine[k] + from_b[k] * sine[k];
+    ahead.b[k] = from_b[k] * cosine[k] - from_a[k] * sine[k];
+  }
+}
+
+/// Computes the expected image from the first `from` frequencies of `ahead`, which faces the
+/// direction of the displacement, and turns it back. Leaves frequency 0 as it is.
+void move_ahead(Displacement displacement, const RowCoefficients& ahead, std::size_t from,
+                std::span<float> to_a, std::span<float> to_b) noexcept {
+  const DisplacementMatrix& matrix =
+      tables().matrices[static_cast<std::size_t>(displacement.ring - 1)];
+  const auto& cosine = tables().cosines[static_cast<std::size_t>(displacement.direction)];
+  const auto& sine = tables().sines[static_cast<std::size_t>(displacement.direction)];
+  std::array<float, size> moved_a;
+  std::array<float, size> moved_b;
+  const std::size_t to = to_a.size();
+  for (std::size_t m = 1; m < to; ++m) moved_a[m] = moved_b[m] = 0.0F;
+  for (std::size_t k = 1; k < from; ++k) {
+    const float* const cosines = matrix.cosines.data() + k * size;
+    const float* const sines = matrix.sines.data() + k * size;
+    for (std::size_t m = 1; m < to; ++m) {
+      moved_a[m] += cosines[m] * ahead.a[k];
+      moved_b[m] += sines[m] * ahead.b[k];
+    }
+  }
+  for (std::size_t m = 1; m < to; ++m) {
+    to_a[m] = moved_a[m] * cosine[m] - moved_b[m] * sine[m];
+    to_b[m] = moved_b[m] * cosine[m] + moved_a[m] * sine[m];
+  }
+}
+
+/// The expected image of one displacement, compared with the home view.
+struct ExpectedImage {
+  Displacement displacement;
+  TurnCorrelation correlation;
+  float energy = 0.0F;
+
+  void add_row(std::span<const float> home_a, std::span<const float> home_b,
+               std::span<const float> a, std::span<const float> b) noexcept {
+    for (std::size_t k = 1; k < home_a.size(); ++k) {
+      correlation.real[k] += home_a[k] * a[k] + home_b[k] * b[k];
+      correlation.imaginary[k] += home_a[k] * b[k] - home_b[k] * a[k];
+      energy += a[k] * a[k] + b[k] * b[k];
+    }
+  }
+  /// Returns the difference from the home view for a correlation. If two displacements explain the
+  /// views equally, the nearer is more likely.
+  [[nodiscard]] float difference(float home_energy, float value) const noexcept {
+    const auto ring_square = static_cast<float>(displacement.ring * displacement.ring);
+    return (home_energy + energy - 2.0F * value) * (1.0F + far_penalty * ring_square);
+  }
+};
+
+/// Returns the displacement of the smallest difference, the first of equal ones. Searches turns
+/// only of images that may differ least.
+BestDisplacement choose_displacement(std::span<const ExpectedImage> images, float home_energy,
+                                     const HeadingWindow& window) {
+  constexpr float rounding = 1e-5F;                    // relative error of sums of single precision
+  std::vector<std::pair<float, std::size_t>> pending;  // lower bounds of the differences
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const float bound =
+        bound_maximum(images[i].correlation) + rounding * (home_energy + images[i].energy);
+    pending.emplace_back(images[i].difference(home_energy, bound), i);
+  }
+  std::ranges::sort(pending);
+  BestDisplacement best;
+  std::pair smallest(std::numeric_limits<float>::infinity(), images.size());
+  for (const auto& [bound, i] : pending) {
+    if (bound > smallest.first) break;
+    std::array<float, 1> turn{};
+    if (find_highest_peaks(images[i].correlation, turn, window) == 0) continue;
+    const float value = images[i].correlation.at(turn[0]);
+    const std::pair found(images[i].difference(home_energy, value), i);
+    if (!(found < smallest)) continue;
+    smallest = found;
+    best = {images[i].displacement, turn[0]};
+  }
+  return best;
+}
+
 }  // namespace
 
 double Displacement::length() const noexcept {
@@ -115,32 +207,12 @@ void displace(Displacement displacement, std::span<const float> from_a,
     }
     return;
   }
-  const Tables& all = tables();
-  const DisplacementMatrix& matrix = all.matrices[static_cast<std::size_t>(displacement.ring - 1)];
-  const auto& cosine = all.cosines[static_cast<std::size_t>(displacement.direction)];
-  const auto& sine = all.sines[static_cast<std::size_t>(displacement.direction)];
-  // Coefficients in the frame of a robot that faces the direction.
-  std::array<float, size> a;
-  std::array<float, size> b;
-  for (std::size_t k = 0; k < from; ++k) {
-    a[k] = from_a[k] * cosine[k] + from_b[k] * sine[k];
-    b[k] = from_b[k] * cosine[k] - from_a[k] * sine[k];
-  }
+  RowCoefficients ahead;
+  face(displacement.direction, from_a, from_b, ahead);
+  move_ahead(displacement, ahead, from, to_a.first(to), to_b.first(to));
   if (to > 0) {
     to_a[0] = from > 0 ? from_a[0] : 0.0F;
     to_b[0] = 0.0F;
-  }
-  for (std::size_t m = 1; m < to; ++m) {
-    const float* const cosines = matrix.cosines.data() + m * size;
-    const float* const sines = matrix.sines.data() + m * size;
-    float moved_a = 0.0F;
-    float moved_b = 0.0F;
-    for (std::size_t k = 1; k < from; ++k) {
-      moved_a += cosines[k] * a[k];
-      moved_b += sines[k] * b[k];
-    }
-    to_a[m] = moved_a * cosine[m] - moved_b * sine[m];
-    to_b[m] = moved_b * cosine[m] + moved_a * sine[m];
   }
 }
 
@@ -149,10 +221,6 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
                                    std::span<const float> current_b, int rows, int frequencies,
                                    const HeadingWindow& window) {
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
-  BestDisplacement best;
-  float min_difference = std::numeric_limits<float>::infinity();
-  std::array<float, size> a;
-  std::array<float, size> b;
   const auto compared = static_cast<std::size_t>(std::min(frequencies, max_searched_frequency)) + 1;
   float home_energy = 0.0F;
   for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row) {
@@ -162,37 +230,34 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
       home_energy += ha * ha + hb * hb;
     }
   }
-  for (int ring = 0; ring <= Displacement::rings; ++ring) {
-    for (int direction = 0; direction < (ring == 0 ? 1 : Displacement::directions); ++direction) {
-      const Displacement displacement{ring, direction};
-      TurnCorrelation correlation;
-      correlation.highest = static_cast<int>(compared) - 1;
-      float energy = 0.0F;
-      for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row) {
-        displace(displacement, current_a.subspan(row * stride, stride),
-                 current_b.subspan(row * stride, stride), std::span(a).first(compared),
-                 std::span(b).first(compared));
-        for (std::size_t k = 1; k < compared; ++k) {
-          const float ha = home_a[row * stride + k];
-          const float hb = home_b[row * stride + k];
-          correlation.real[k] += ha * a[k] + hb * b[k];
-          correlation.imaginary[k] += ha * b[k] - hb * a[k];
-          energy += a[k] * a[k] + b[k] * b[k];
-        }
-      }
-      std::array<float, 1> turn{};
-      if (find_highest_peaks(correlation, turn, window) == 0) continue;
-      // If two displacements explain the views equally, the nearer is more likely.
-      const auto ring_square = static_cast<float>(ring * ring);
-      const float difference = (home_energy + energy - 2.0F * correlation.at(turn[0])) *
-                               (1.0F + far_penalty * ring_square);
-      if (difference < min_difference) {
-        min_difference = difference;
-        best = {displacement, turn[0]};
+  std::array<ExpectedImage, Displacement::rings * Displacement::directions + 1> images;
+  for (ExpectedImage& image : images) image.correlation.highest = static_cast<int>(compared) - 1;
+  RowCoefficients ahead;
+  std::array<float, size> a;
+  std::array<float, size> b;
+  for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row) {
+    const auto row_a = current_a.subspan(row * stride, stride);
+    const auto row_b = current_b.subspan(row * stride, stride);
+    const auto add_row = [&](ExpectedImage& image) {
+      image.add_row(home_a.subspan(row * stride, compared), home_b.subspan(row * stride, compared),
+                    a, b);
+    };
+    displace({}, row_a, row_b, std::span(a).first(compared), std::span(b).first(compared));
+    add_row(images[0]);
+    for (int direction = 0; direction < Displacement::directions; ++direction) {
+      face(direction, row_a, row_b, ahead);
+      for (int ring = 1; ring <= Displacement::rings; ++ring) {
+        const Displacement displacement{ring, direction};
+        move_ahead(displacement, ahead, std::min(stride, size), std::span(a).first(compared),
+                   std::span(b).first(compared));
+        ExpectedImage& image =
+            images[static_cast<std::size_t>((ring - 1) * Displacement::directions + direction + 1)];
+        image.displacement = displacement;
+        add_row(image);
       }
     }
   }
-  return best;
+  return choose_displacement(images, home_energy, window);
 }
 
 DisplacementStart find_displacement_start(const HomingView& home, const HomingView& current,

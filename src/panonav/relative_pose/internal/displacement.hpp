@@ -45,8 +45,8 @@ struct BestDisplacement {
 /// Finds the displacement whose expected image differs least from the home view at its best turn
 /// within the window: hs_ei [S06 section 2.2] in the Fourier domain. Far displacements must differ
 /// a little less than near ones to be chosen. The views are `rows` rows of `frequencies` + 1
-/// coefficients each, row after row. Cost: for one row 49 expected images of 8 frequencies, about
-/// 15 microseconds; a fifth of that for each further row.
+/// coefficients each, row after row. Cost: for each row 49 expected images of 8 frequencies; turns
+/// are refined only of the few images that may win.
 [[nodiscard]] BestDisplacement find_displacement(std::span<const float> home_a,
                                                  std::span<const float> home_b,
                                                  std::span<const float> current_a,
