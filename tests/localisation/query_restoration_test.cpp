@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "panonav/core/error.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/skips.hpp"
@@ -200,6 +201,32 @@ TEST(QueryRestoration, BlursSignaturesAsALensBlursPanoramas) {
       }
     }
     EXPECT_LT(error, 1e-3 * energy);
+  }
+}
+
+TEST(QueryRestoration, BlursProfilesAsItBlursSignatures) {
+  const DisturbedRoom room(87);
+  Random random(2);
+  for (int i = 0; i < 5; ++i) {
+    const FourierSignature sharp = compute_signature(room.see(room.draw_pose(random)));
+    const PackedSignature view = pack(sharp, *std::ranges::max_element(sharp.magnitudes()));
+    for (const double blur_rad : {radians(1.0), radians(4.0)}) {
+      const ColumnProfiles expected(blur(view, blur_rad, band));
+      const ColumnProfiles found(view, ProfileBlur(rows, band, blur_rad));
+      const ColumnProfiles unblurred(view);
+      EXPECT_EQ(found.used_bands(), expected.used_bands());
+      double error = 0.0;
+      double change = 0.0;
+      for (std::size_t j = 0; j < expected.values().size(); ++j) {
+        error += std::abs(found.values()[j] - expected.values()[j]);
+        change += std::abs(unblurred.values()[j] - expected.values()[j]);
+      }
+      // Signatures are rounded once more: less than a step of the profiles on average.
+      EXPECT_LT(error, static_cast<double>(expected.values().size())) << blur_rad;
+      EXPECT_LT(error, 0.7 * change) << blur_rad;
+    }
+    const ProfileBlur other_rows(rows / 2, band, radians(1.0));
+    EXPECT_THROW(ColumnProfiles(view, other_rows), ContractError);
   }
 }
 

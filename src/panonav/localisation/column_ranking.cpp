@@ -26,11 +26,18 @@ ColumnRanking::ColumnRanking(const VisualMemory& memory, int components,
           "0 (all) or 1 .. " + to_text(memory.shape().components));
 }
 
+ColumnRanking::ColumnRanking(const VisualMemory& memory, double blur_rad,
+                             std::size_t max_cached_profiles)
+    : ColumnRanking(memory, 0, max_cached_profiles) {
+  if (blur_rad > 0.0) blur_.emplace(memory.shape().rows, memory.elevations().value(), blur_rad);
+}
+
 ColumnRanking::~ColumnRanking() = default;
 
 std::shared_ptr<const ColumnProfiles> ColumnRanking::profiles(ViewId view) const {
   if (auto found = cache_->find(view)) return found;
-  auto made = std::make_shared<const ColumnProfiles>(memory_->packed(view), components_);
+  auto made = blur_ ? std::make_shared<const ColumnProfiles>(memory_->packed(view), *blur_)
+                    : std::make_shared<const ColumnProfiles>(memory_->packed(view), components_);
   cache_->insert(view, made);
   return made;
 }

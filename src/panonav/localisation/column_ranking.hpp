@@ -44,6 +44,9 @@ class ColumnRanking {
   /// the memory has fewer components.
   explicit ColumnRanking(const VisualMemory& memory, int components = 0,
                          std::size_t max_cached_profiles = default_max_cached_profiles);
+  /// Compares queries with the views as a camera out of focus sees them. `blur_rad`: deviation of
+  /// the Gaussian; 0: sharp views. The elevations of a memory that is blurred must be known.
+  ColumnRanking(const VisualMemory& memory, double blur_rad, std::size_t max_cached_profiles);
   ~ColumnRanking();
   ColumnRanking(const ColumnRanking&) = delete;
   ColumnRanking& operator=(const ColumnRanking&) = delete;
@@ -67,6 +70,7 @@ class ColumnRanking {
  private:
   const VisualMemory* memory_;
   int components_;
+  std::optional<ProfileBlur> blur_;  // nullopt: sharp views
   std::unique_ptr<ProfileCache> cache_;
 };
 

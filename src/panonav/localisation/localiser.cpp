@@ -47,6 +47,8 @@ std::optional<LocalFeatures> mask_rows(std::optional<LocalFeatures> features,
 /// Largest number of matches that are blurred and compared with a query out of focus.
 constexpr std::size_t blurred_candidates = 64;
 
+/// Smallest probability with which a place is known.
+constexpr double min_known_probability = 0.5;
 /// Half width of the compass's search window: the rotation by columns is exact to one column.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
@@ -93,6 +95,12 @@ struct Localiser::ComparedViews {
                          static_cast<std::size_t>(options.reranked_views))),
         support(ranking, spacing_m),
         criterion(ranking, views) {}
+  /// The views of a part of a memory of `views` views, as a camera out of focus sees them.
+  ComparedViews(const VisualMemory& memory_, double blur_rad, double spacing_m, std::size_t views)
+      : memory(&memory_),
+        ranking(memory_, blur_rad, ColumnRanking::default_max_cached_profiles),
+        support(ranking, spacing_m),
+        criterion(ranking, views) {}
   ComparedViews(const ComparedViews&) = delete;
   ComparedViews& operator=(const ComparedViews&) = delete;
 
@@ -125,9 +133,9 @@ class Localiser::Query {
   }
 
   Place answer() {
-    find_candidates();  // [M04 section 2.2]
+    if (ranked_.empty()) find_candidates();  // [M04 section 2.2]
     if (ranked_.empty()) return std::move(place_);
-    load_compared_views();
+    if (!load_compared_views()) return std::move(place_);
     collect_column_evidence();          // evidence of whether the place is known
     rank_by_support();                  // places that look similar
     rank_by_features();                 // memories with far references
@@ -137,6 +145,11 @@ class Localiser::Query {
     list_matches();                     // headings by the visual compass
     if (place_.known) estimate_pose();  // [M04 footnote 1]
     return std::move(place_);
+  }
+
+  /// Before `answer`: compares the candidates of another query of the same signature.
+  void use_candidates(const Query& other) {
+    if (compared_ != nullptr) ranked_ = other.ranked_;
   }
 
   /// After `answer`: returns the query with its tilt removed, or to be compared with blurred views
@@ -185,36 +198,51 @@ class Localiser::Query {
                   .rank(view_, found.matches, mask_.allowed_rows);
   }
 
-  /// Loads the views that this query needs from a memory that is not held in RAM, or blurs those of
-  /// one that is: the candidates, the references that may support them, and the sampled views for
-  /// chance.
-  void load_compared_views() {
+  /// Loads the views that this query needs from a memory that is not held in RAM, or those of one
+  /// that is if they are blurred: the candidates, the references that may support them, and the
+  /// sampled views for chance. Returns false if blurred views do not know the place.
+  bool load_compared_views() {
     const bool is_blurred = restored_.blur_rad > 0.0;
-    if (compared_ != nullptr && !is_blurred) return;
+    if (compared_ != nullptr && !is_blurred) return true;
+    if (is_blurred && !is_known_when_blurred()) return false;
     const VisualMemory& found = compared_ != nullptr ? *compared_->memory : *loaded_;
     const double spacing_m =
         compared_ != nullptr ? compared_->support.spacing_m() : localiser_.spacing_m_;
-    if (is_blurred) {
-      const auto kept =
-          std::max<std::size_t>(static_cast<std::size_t>(options_.top), blurred_candidates);
-      if (ranked_.size() > kept) ranked_.resize(kept);
-    }
     std::vector<ViewId> views = to_ids(ranked_);
     views.insert(views.end(), mask_.excluded_views.begin(), mask_.excluded_views.end());
     const auto around = index_.views_within(
         bound_neighbours(found, ranked_, spacing_m, localiser_.position_model_.spacing_m));
     views.insert(views.end(), around.begin(), around.end());
-    std::optional<VisualMemory> drawn;
-    if (!localiser_.sampled_) drawn = index_.load(sample_reference_views(found.views()));
-    loaded_.emplace(join_memories(index_.load(views), drawn ? *drawn : *localiser_.sampled_));
-    if (is_blurred) loaded_.emplace(blur_views(*loaded_, restored_.blur_rad));
-    loaded_views_.emplace(*loaded_, options_, std::optional(spacing_m), index_.size());
+    const auto sampled = localiser_.sampled_ ? localiser_.sampled_
+                                             : std::make_shared<const VisualMemory>(index_.load(
+                                                   sample_reference_views(found.views())));
+    loaded_.emplace(join_memories(index_.load(views), *sampled));
+    if (is_blurred) {
+      loaded_views_.emplace(*loaded_, restored_.blur_rad, spacing_m, index_.size());
+    } else {
+      loaded_views_.emplace(*loaded_, options_, std::optional(spacing_m), index_.size());
+    }
     loaded_views_->layout.emplace(*loaded_, localiser_.position_model_.spacing_m);
     compared_ = &*loaded_views_;
-    if (!is_blurred) return;
+    return true;
+  }
+
+  /// Ranks the best candidates again, with their views and those for chance blurred. Returns true
+  /// if their columns know the place: features do not add to them (`estimate_known_probability`).
+  bool is_known_when_blurred() {
+    ranked_.resize(std::min(
+        ranked_.size(),
+        std::max<std::size_t>(static_cast<std::size_t>(options_.top), blurred_candidates)));
     std::vector<Match> matches;
     for (const RankedMatch& match : ranked_) matches.push_back(match.match);
-    ranked_ = compared_->ranking.rank(view_, matches);
+    if (compared_ == nullptr) loaded_.emplace(join_memories(*loaded_, *localiser_.sampled_));
+    const VisualMemory& memory = compared_ != nullptr ? *compared_->memory : *loaded_;
+    const ColumnRanking ranking(memory, restored_.blur_rad, matches.size());
+    ranked_ = ranking.rank(view_, matches);
+    const PlaceCriterion criterion = compared_ != nullptr
+                                         ? PlaceCriterion(ranking, compared_->criterion)
+                                         : PlaceCriterion(ranking, index_.size());
+    return place_probability(criterion.evidence(view_, ranked_, mask_)) >= min_known_probability;
   }
 
   void collect_column_evidence() {
@@ -253,7 +281,7 @@ class Localiser::Query {
     is_known_without_doubt_ = place_.known_probability >= min_certain_probability;
     place_.probability = place_.known_probability;
   }
-  [[nodiscard]] bool is_known() const { return place_.known_probability >= 0.5; }
+  [[nodiscard]] bool is_known() const { return place_.known_probability >= min_known_probability; }
 
   void sort_if_not_reranked() {
     if (options_.reranked_views > 0) return;
@@ -307,9 +335,11 @@ class Localiser::Query {
     const VisualMemory& memory = *compared_->memory;
     std::optional<CompassReading> reading;
     if (place_.components >= 2) {
+      PackedSignature there = memory.packed(r.match.view);
+      if (restored_.blur_rad > 0.0) there = blur(there, restored_.blur_rad, *memory.elevations());
       reading = compass_near(mask_rows(view_, mask_.allowed_rows),
-                             mask_rows(memory.packed(r.match.view), mask_.allowed_rows),
-                             r.columns.heading_rad, compass_window_rad, options_.components);
+                             mask_rows(std::move(there), mask_.allowed_rows), r.columns.heading_rad,
+                             compass_window_rad, options_.components);
     }
     return {memory.info(r.match.view).name,
             r.match.view,
@@ -463,6 +493,7 @@ Place Localiser::localise(ViewIndex& index, const PackedSignature& query, const 
   for (std::size_t i = 0; i < std::min(pending.size(), max_attempts); ++i) {
     const RestoredQuery restored = pending[i];
     Query attempt(*this, index, restored, mask, features);
+    if (restored.tilt == Tilt{}) attempt.use_candidates(as_taken);
     Place found = attempt.answer();
     found.bytes_read += place.bytes_read;
     found.views_compared += place.views_compared;

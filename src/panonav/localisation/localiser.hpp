@@ -60,7 +60,7 @@ class Localiser {
   ///
   /// `features` computes local features of the query on demand; empty: none. Throws ContractError
   /// on a query of another shape, and if the memory is not held. Cost: a search and 0.2 ms; without
-  /// near match 3 ms for 1000 views; in doubt 5 ms and 20 ms an attempt.
+  /// near match 3 ms for 1000 views; in doubt 3 ms and 1 ms an attempt.
   [[nodiscard]] Place localise(const PackedSignature& query, const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
   /// Localises by searching `index`. If the memory is not held in RAM, loads only the views found

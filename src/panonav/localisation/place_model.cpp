@@ -209,6 +209,11 @@ PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking, std::size_t views)
   for (const ViewId view : sample_) profiles_.push_back(profiles(view, {}));
 }
 
+PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking, const PlaceCriterion& sampled)
+    : ranking_(&ranking), views_(sampled.views_), sample_(sampled.sample_) {
+  for (const ViewId view : sample_) profiles_.push_back(profiles(view, {}));
+}
+
 PlaceCriterion::PlaceCriterion(const ViewSource& source)
     : views_(static_cast<int>(source.views().size())),
       sample_(sample_reference_views(source.views())) {

@@ -102,6 +102,9 @@ class PlaceCriterion {
   /// outlive *this. `views`: number of views of the whole memory if the ranking's memory is a
   /// part of it that includes these views; 0 if the ranking's memory is the whole.
   explicit PlaceCriterion(const ColumnRanking& ranking, std::size_t views = 0);
+  /// Compares the same views for chance as `sampled`, with the profiles of another ranking of the
+  /// same memory.
+  PlaceCriterion(const ColumnRanking& ranking, const PlaceCriterion& sampled);
   /// Loads the sampled views from a memory that is not held in RAM; loads no others later.
   explicit PlaceCriterion(const ViewSource& source);
 

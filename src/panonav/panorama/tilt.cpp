@@ -20,6 +20,11 @@ struct Shift {
   float columns = 0.0F;
 };
 
+/// An azimuth with its cosine and sine.
+struct Azimuth {
+  double azimuth_rad, cosine, sine;
+};
+
 class TiltedPositions {
  public:
   TiltedPositions(const Panorama& seen, const Tilt& tilt)
@@ -31,17 +36,16 @@ class TiltedPositions {
         rows_per_rad_(seen.rows() / (top_rad_ - seen.elevations()->bottom_rad)),
         columns_per_rad_(seen.columns() / (2.0 * std::numbers::pi)) {}
 
-  [[nodiscard]] Shift at(double elevation_rad, double azimuth_rad) const {
-    const double flat = std::cos(elevation_rad);
-    const double x = flat * std::cos(azimuth_rad);
-    const double y = flat * std::sin(azimuth_rad);
-    const double z = std::sin(elevation_rad);
+  /// Returns the position of a direction; `flat`, `z`: cosine and sine of its elevation.
+  [[nodiscard]] Shift at(double flat, double z, const Azimuth& azimuth) const {
+    const double x = flat * azimuth.cosine;
+    const double y = flat * azimuth.sine;
     const double x_robot = cos_pitch_ * x - sin_pitch_ * z;
     const double z_rolled = sin_pitch_ * x + cos_pitch_ * z;
     const double y_robot = cos_roll_ * y + sin_roll_ * z_rolled;
     const double z_robot = cos_roll_ * z_rolled - sin_roll_ * y;
     const double elevation = std::atan2(z_robot, std::hypot(x_robot, y_robot));
-    const double turned = wrap_angle(std::atan2(y_robot, x_robot) - azimuth_rad);
+    const double turned = wrap_angle(std::atan2(y_robot, x_robot) - azimuth.azimuth_rad);
     return {static_cast<float>((top_rad_ - elevation) * rows_per_rad_ - 0.5),
             static_cast<float>(turned * columns_per_rad_)};
   }
@@ -57,12 +61,16 @@ class TiltedPositions {
 constexpr double node_spacing_rad = 5.0 * std::numbers::pi / 180.0;
 constexpr double polar_elevation_rad = std::numbers::pi / 3.0;
 
-/// Computes the nodes of one row, with one node beyond its last column.
-void compute_row_nodes(const TiltedPositions& positions, double elevation_rad, int columns,
-                       int step, std::vector<Shift>& nodes) {
+/// Computes the nodes of one row, with one node beyond its last column. `azimuths`: of all nodes
+/// of step 1.
+void compute_row_nodes(const TiltedPositions& positions, double elevation_rad,
+                       std::span<const Azimuth> azimuths, int columns, int step,
+                       std::vector<Shift>& nodes) {
+  const double flat = std::cos(elevation_rad);
+  const double z = std::sin(elevation_rad);
   nodes.clear();
   for (int c = 0; c < columns + step; c += step)
-    nodes.push_back(positions.at(elevation_rad, 2.0 * std::numbers::pi * c / columns));
+    nodes.push_back(positions.at(flat, z, azimuths[static_cast<std::size_t>(c)]));
 }
 
 Shift interpolate_shift(const Shift& a, const Shift& b, float share) {
@@ -129,6 +137,11 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
   const int column_step = std::max(1, static_cast<int>(node_spacing_rad / column_rad));
   const int row_step = std::max(1, static_cast<int>(node_spacing_rad / row_rad));
   const double tilt_rad = std::hypot(tilt.roll_rad, tilt.pitch_rad);
+  std::vector<Azimuth> azimuths;
+  for (int c = 0; c < columns + column_step; ++c) {
+    const double azimuth_rad = 2.0 * std::numbers::pi * c / columns;
+    azimuths.push_back({azimuth_rad, std::cos(azimuth_rad), std::sin(azimuth_rad)});
+  }
   std::vector<Shift> nodes;
   std::vector<Shift> upper;
   std::vector<Shift> lower;
@@ -137,17 +150,19 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
     const bool is_polar = std::abs(level.elevation_rad(y)) + tilt_rad > polar_elevation_rad;
     const int step = is_polar ? 1 : column_step;
     if (is_polar) {
-      compute_row_nodes(positions, level.elevation_rad(y), columns, step, nodes);
+      compute_row_nodes(positions, level.elevation_rad(y), azimuths, columns, step, nodes);
     } else {
       const int upper_row = y / row_step * row_step;
       if (lower_row != upper_row + row_step) {
         if (lower_row == upper_row) {
           std::swap(upper, lower);
         } else {
-          compute_row_nodes(positions, level.elevation_rad(upper_row), columns, step, upper);
+          compute_row_nodes(positions, level.elevation_rad(upper_row), azimuths, columns, step,
+                            upper);
         }
         lower_row = upper_row + row_step;
-        compute_row_nodes(positions, level.elevation_rad(lower_row), columns, step, lower);
+        compute_row_nodes(positions, level.elevation_rad(lower_row), azimuths, columns, step,
+                          lower);
       }
       const auto share = static_cast<float>(y - upper_row) / static_cast<float>(row_step);
       nodes.resize(upper.size());

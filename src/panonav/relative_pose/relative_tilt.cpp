@@ -23,8 +23,8 @@ struct TiltStage {
   double smoothing_rad;  // of the Gaussian over rows
 };
 constexpr std::array<TiltStage, 2> tilt_stages{{{6, radians(5.0)}, {12, radians(2.0)}}};
-constexpr int tilt_iterations = 3;  ///< Gauss-Newton steps at each stage
-constexpr int tilt_columns = 48;    ///< four for each period of the highest frequency
+constexpr int tilt_iterations = 3;     ///< Gauss-Newton steps at each stage
+constexpr int columns_per_period = 4;  ///< of the highest frequency
 /// Margin at the top and bottom, of which a levelled view shows only parts.
 constexpr double tilt_margin_rad = radians(5.0);
 // Standard deviations of the prior.
@@ -32,16 +32,36 @@ constexpr double tilt_deviation_rad = 0.06;     ///< two views tilted by some 3 
 constexpr double displacement_deviation = 0.3;  ///< in units of the distance of things
 constexpr double turn_deviation_rad = 0.2;      ///< headings known to 10 degrees
 
+/// Cosine and sine of the azimuth of each column.
+struct ColumnDirections {
+  explicit ColumnDirections(int columns) {
+    for (int c = 0; c < columns; ++c) {
+      const double azimuth = 2.0 * std::numbers::pi * c / columns;
+      cosines.push_back(static_cast<float>(std::cos(azimuth)));
+      sines.push_back(static_cast<float>(std::sin(azimuth)));
+    }
+  }
+  std::vector<float> cosines, sines;
+};
+
 /// Makes the panorama of the first frequencies.
 Panorama synthesise(const HomingView& view, int frequencies, int columns) {
   Panorama panorama(view.rows(), columns, view.elevations());
+  const auto width = static_cast<std::size_t>(columns);
+  const ColumnDirections directions(columns);
+  std::vector<float> cosines(width);
+  std::vector<float> sines(width);
   for (int k = 0; k < std::min(frequencies, view.components()); ++k) {
-    for (int c = 0; c < columns; ++c) {
-      const double phase = 2.0 * std::numbers::pi * k * c / columns;
-      const auto cosine = static_cast<float>(k == 0 ? 0.5 : std::cos(phase));
-      const auto sine = static_cast<float>(std::sin(phase));
-      for (int y = 0; y < view.rows(); ++y)
-        panorama.at(y, c) += view.a(y, k) * cosine + view.b(y, k) * sine;
+    for (std::size_t c = 0; c < width; ++c) {
+      const std::size_t at = static_cast<std::size_t>(k) * c % width;
+      cosines[c] = k == 0 ? 0.5F : directions.cosines[at];
+      sines[c] = directions.sines[at];
+    }
+    for (int y = 0; y < view.rows(); ++y) {
+      const float a = view.a(y, k);
+      const float b = view.b(y, k);
+      float* const row = &panorama.at(y, 0);
+      for (std::size_t c = 0; c < width; ++c) row[c] += a * cosines[c] + b * sines[c];
     }
   }
   return panorama;
@@ -50,12 +70,16 @@ Panorama synthesise(const HomingView& view, int frequencies, int columns) {
 Panorama smooth_rows(const Panorama& panorama, double sigma_rows) {
   const std::vector<float> weights = gaussian_weights(sigma_rows);
   const int reach = static_cast<int>(weights.size()) / 2;
-  Panorama result(panorama.rows(), panorama.columns(), panorama.elevations());
+  const int columns = panorama.columns();
+  Panorama result(panorama.rows(), columns, panorama.elevations());
   for (int y = 0; y < panorama.rows(); ++y) {
+    float* const to = &result.at(y, 0);
     for (int d = -reach; d <= reach; ++d) {
-      const int from = std::clamp(y + d, 0, panorama.rows() - 1);
       const float weight = weights[static_cast<std::size_t>(d + reach)];
-      for (int c = 0; c < panorama.columns(); ++c) result.at(y, c) += weight * panorama.at(from, c);
+      const float* const from =
+          panorama.values().data() +
+          static_cast<std::ptrdiff_t>(std::clamp(y + d, 0, panorama.rows() - 1)) * columns;
+      for (int c = 0; c < columns; ++c) to[c] += weight * from[c];
     }
   }
   return result;
@@ -68,7 +92,11 @@ class TiltProblem {
   using Equations = DenseEquations<5>;
 
   TiltProblem(const Panorama& home, const Panorama& current, int margin, Tilt& tilt)
-      : home_(home), current_(current), margin_(margin), tilt_(tilt) {}
+      : home_(home),
+        current_(current),
+        directions_(current.columns()),
+        margin_(margin),
+        tilt_(tilt) {}
 
   /// False where no residual is left.
   bool linearise(Equations& equations) const {
@@ -101,34 +129,52 @@ class TiltProblem {
   double add_residuals(const Panorama& level, Equations& equations) const {
     const int columns = level.columns();
     const auto& band = *level.elevations();
-    const double across = columns / (4.0 * std::numbers::pi);
-    const double down = level.rows() / (2.0 * (band.top_rad - band.bottom_rad));
+    const auto across = static_cast<float>(columns / (4.0 * std::numbers::pi));
+    const auto down = static_cast<float>(level.rows() / (2.0 * (band.top_rad - band.bottom_rad)));
+    // The derivatives of one row by the unknowns, and its residuals.
+    using Row = Eigen::Array<float, 1, Eigen::Dynamic>;
+    std::array<Row, 6> values;
+    for (Row& row : values) row.resize(columns);
+    const Eigen::Map<const Row> cosines(directions_.cosines.data(), columns);
+    const Eigen::Map<const Row> sines(directions_.sines.data(), columns);
+    const auto row_of = [&](const Panorama& view, int y) {
+      return Eigen::Map<const Row>(view.values().data() + static_cast<std::ptrdiff_t>(y) * columns,
+                                   columns);
+    };
+    Row aside(columns);
+    Row up(columns);
     double energy = 0.0;
     for (int y = margin_; y < level.rows() - margin_; ++y) {
-      const double elevation = level.elevation_rad(y);
-      const double tangent = std::tan(elevation);
-      const double approach = std::sin(elevation) * std::cos(elevation);
-      for (int c = 0; c < columns; ++c) {
-        const int left = c == 0 ? columns - 1 : c - 1;
-        const int right = c + 1 == columns ? 0 : c + 1;
-        const double cosine = std::cos(2.0 * std::numbers::pi * c / columns);
-        const double sine = std::sin(2.0 * std::numbers::pi * c / columns);
-        const double aside = across * static_cast<double>(level.at(y, right) - level.at(y, left));
-        const double up = down * static_cast<double>(level.at(y - 1, c) - level.at(y + 1, c));
-        const Equations::Vector slopes(
-            aside, aside * sine + up * approach * cosine, -aside * cosine + up * approach * sine,
-            up * cosine + aside * tangent * sine, -up * sine + aside * tangent * cosine);
-        const auto residual = static_cast<double>(home_.at(y, c) - level.at(y, c));
-        equations.matrix += slopes * slopes.transpose();
-        equations.right += residual * slopes;
-        energy += residual * residual;
+      const auto elevation = static_cast<float>(level.elevation_rad(y));
+      const float tangent = std::tan(elevation);
+      const float approach = std::sin(elevation) * std::cos(elevation);
+      const auto middle = row_of(level, y);
+      aside[0] = across * (middle[1] - middle[columns - 1]);
+      aside.segment(1, columns - 2) =
+          across * (middle.tail(columns - 2) - middle.head(columns - 2));
+      aside[columns - 1] = across * (middle[0] - middle[columns - 2]);
+      up = down * (row_of(level, y - 1) - row_of(level, y + 1));
+      values[0] = aside;
+      values[1] = aside * sines + approach * up * cosines;
+      values[2] = approach * up * sines - aside * cosines;
+      values[3] = up * cosines + tangent * aside * sines;
+      values[4] = tangent * aside * cosines - up * sines;
+      values[5] = row_of(home_, y) - middle;
+      for (int i = 0; i < 5; ++i) {
+        for (int j = 0; j <= i; ++j)
+          equations.matrix(i, j) += static_cast<double>((values[i] * values[j]).sum());
+        equations.right[i] += static_cast<double>((values[i] * values[5]).sum());
       }
+      energy += static_cast<double>(values[5].square().sum());
     }
+    const Equations::Matrix full = equations.matrix.selfadjointView<Eigen::Lower>();
+    equations.matrix = full;
     return energy;
   }
 
   const Panorama& home_;
   const Panorama& current_;
+  ColumnDirections directions_;
   int margin_;  // ignored rows at the top and the bottom
   Tilt& tilt_;
 };
@@ -149,10 +195,11 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
   const HomingView aligned = rotate(home, -heading_rad);
   for (const TiltStage& stage : tilt_stages) {
     const double sigma_rows = stage.smoothing_rad / row_rad;
+    const int columns = columns_per_period * stage.frequencies;
     const Panorama smooth_home =
-        smooth_rows(synthesise(aligned, stage.frequencies, tilt_columns), sigma_rows);
+        smooth_rows(synthesise(aligned, stage.frequencies, columns), sigma_rows);
     const Panorama smooth_current =
-        smooth_rows(synthesise(current, stage.frequencies, tilt_columns), sigma_rows);
+        smooth_rows(synthesise(current, stage.frequencies, columns), sigma_rows);
     TiltProblem problem(smooth_home, smooth_current, margin, tilt);
     TiltProblem::Equations equations;
     if (!minimise(problem, equations, {.max_steps = tilt_iterations}).solvable) return tilt;
@@ -161,8 +208,8 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
 }
 
 HomingView level_view(const HomingView& view, const Tilt& tilt) {
-  // At least four columns per period, so that interpolation hardly damps the highest frequency.
-  const int columns = 4 * view.components();
+  // Enough that interpolation hardly damps the highest frequency.
+  const int columns = columns_per_period * view.components();
   return homing_view(compute_signature(
       level_panorama(synthesise(view, view.components(), columns), tilt), view.components()));
 }

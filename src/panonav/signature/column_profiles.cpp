@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/kernels/column_match.hpp"
 #include "panonav/kernels/column_profiles.hpp"
@@ -18,6 +20,7 @@ namespace {
 constexpr int columns = ColumnProfiles::columns;
 constexpr int bands = ColumnProfiles::bands;
 static_assert(columns == kernels::matched_reference_columns && bands == kernels::matched_bands);
+constexpr std::size_t group = 4;         // bands that are added up together, of one vector
 constexpr std::uint8_t mean_byte = 128;  // byte of a value as high as the column's mean
 // Byte steps for a deviation of one column contrast; 127 / 40 = 3.2 contrasts fit, and larger
 // deviations are rare.
@@ -30,6 +33,7 @@ constexpr int min_bands_for_shape = 4;
 
 // Finer components than this would need more columns.
 constexpr int max_components = columns / 2;
+static_assert(max_components == ProfileBlur::max_components);
 
 // Number of columns of a quarter turn, both ends included; the others follow by symmetry.
 constexpr std::size_t quarter_columns = columns / 4 + 1;
@@ -124,8 +128,47 @@ class Bands {
     }
   }
 
-  /// Number of bands.
-  [[nodiscard]] int used() const noexcept { return used_; }
+  /// Components of the bands of a blurred view. `weights`: of each row, for each band.
+  Bands(const PackedSignature& signature, std::span<const float> weights,
+        std::span<const float> damping)
+      : components_(std::min(signature.shape.components, max_components)),
+        used_(std::min(bands, signature.shape.rows)) {
+    const auto rows = static_cast<std::size_t>(signature.shape.rows);
+    const auto& directions = phase_table();
+    // A row contributes to few bands, which are added up in groups of one vector.
+    std::vector<std::pair<std::size_t, std::size_t>> used_groups;
+    for (std::size_t y = 0; y < rows; ++y) {
+      const std::span row = weights.subspan(y * bands, bands);
+      const auto is_used = [](float weight) { return weight > 0.0F; };
+      const auto first = std::ranges::find_if(row, is_used) - row.begin();
+      const auto end = std::find_if(row.rbegin(), row.rend(), is_used).base() - row.begin();
+      used_groups.emplace_back(static_cast<std::size_t>(first) / group,
+                               (static_cast<std::size_t>(end) + group - 1) / group);
+    }
+    for (std::size_t k = 0; k < static_cast<std::size_t>(components_); ++k) {
+      std::array<float, bands> real{};
+      std::array<float, bands> imaginary{};
+      for (std::size_t y = 0; y < rows; ++y) {
+        const auto magnitude = static_cast<float>(signature.magnitudes[k * rows + y]);
+        const Direction direction = directions[signature.phases[k * rows + y]];
+        const float row_real = magnitude * direction.cosine;
+        const float row_imaginary = magnitude * direction.sine;
+        for (std::size_t g = used_groups[y].first; g < used_groups[y].second; ++g) {
+          const float* const row_weights = weights.data() + y * bands + g * group;
+          for (std::size_t i = 0; i < group; ++i) {
+            real[g * group + i] += row_weights[i] * row_real;
+            imaginary[g * group + i] += row_weights[i] * row_imaginary;
+          }
+        }
+      }
+      const float scale = (k == 0 ? 0.5F : 1.0F) * damping[k];
+      for (std::size_t band = 0; band < bands; ++band) {
+        real_[k * bands + band] = real[band] * scale;
+        imaginary_[k * bands + band] = imaginary[band] * scale;
+      }
+    }
+  }
+
   [[nodiscard]] kernels::BandWaves waves() const noexcept {
     const Waves& table = cosine_and_sine_table();
     return {real_.data(),       imaginary_.data(), table.cosines.data(),
@@ -184,6 +227,29 @@ ColumnMatch make_column_match(const ColumnProfiles& query, const Costs& costs, s
 
 }  // namespace
 
+ProfileBlur::ProfileBlur(int rows, const ElevationBand& elevations, double blur_rad)
+    : weights_(static_cast<std::size_t>(rows) * std::size_t{bands}) {
+  const std::vector<float> kernel =
+      gaussian_weights(blur_rad * rows / (elevations.top_rad - elevations.bottom_rad));
+  const int reach = static_cast<int>(kernel.size()) / 2;
+  const int used = std::min(bands, rows);
+  for (int band = 0; band < used; ++band) {
+    const int first = band * rows / used;
+    const int end = (band + 1) * rows / used;
+    for (int y = first; y < end; ++y) {
+      for (int d = -reach; d <= reach; ++d) {
+        const int from = std::clamp(y + d, 0, rows - 1);
+        weights_[static_cast<std::size_t>(from * bands + band)] +=
+            kernel[static_cast<std::size_t>(d + reach)] / static_cast<float>(end - first);
+      }
+    }
+  }
+  for (std::size_t k = 0; k < damping_.size(); ++k) {
+    const double deviations = static_cast<double>(k) * blur_rad;
+    damping_[k] = static_cast<float>(std::exp(-0.5 * deviations * deviations));
+  }
+}
+
 ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
                                std::span<const std::uint8_t> allowed_rows) {
   require(components >= 0 && components <= signature.shape.components, "components", components,
@@ -192,15 +258,23 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
       allowed_rows.empty() || allowed_rows.size() == static_cast<std::size_t>(signature.shape.rows),
       "allowed rows", static_cast<double>(allowed_rows.size()), to_text(signature.shape.rows));
   if (components == 0) components = signature.shape.components;
-  components = std::min(components, max_components);
+  fill(Bands(signature, std::min(components, max_components), allowed_rows).waves());
+}
 
+ColumnProfiles::ColumnProfiles(const PackedSignature& signature, const ProfileBlur& blur) {
+  const auto rows = static_cast<int>(blur.weights_.size()) / bands;
+  require(signature.shape.rows == rows, "rows of a blurred view", signature.shape.rows,
+          to_text(rows));
+  fill(Bands(signature, blur.weights_, blur.damping_).waves());
+}
+
+void ColumnProfiles::fill(const kernels::BandWaves& waves) {
   values_.fill(mean_byte);
   compared_values_.fill(mean_byte);
   const kernels::Instructions instructions = kernels::chosen_instructions();
-  const Bands components_of_bands(signature, components, allowed_rows);
-  used_bands_ = components_of_bands.used();
+  used_bands_ = waves.bands;
   BandView view;
-  kernels::reconstruct_bands(components_of_bands.waves(), view, instructions);
+  kernels::reconstruct_bands(waves, view, instructions);
   const bool has_shape = used_bands_ >= min_bands_for_shape;
   if (has_shape) {
     kernels::subtract_column_means(view, used_bands_, instructions);

@@ -4,10 +4,30 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "panonav/signature/fourier_signature.hpp"
 
 namespace panonav {
+
+namespace kernels {
+struct BandWaves;
+}
+
+/// The Gaussian blur of a camera out of focus over azimuth and elevation, for the column profiles
+/// of many views.
+class ProfileBlur {
+ public:
+  static constexpr int max_components = 64;  ///< number of components that profiles use at most
+
+  /// `rows`, `elevations`: of the views. `blur_rad`: deviation of the Gaussian.
+  ProfileBlur(int rows, const ElevationBand& elevations, double blur_rad);
+
+ private:
+  friend class ColumnProfiles;
+  std::vector<float> weights_;  // of each row its share in each band of `ColumnProfiles`
+  std::array<float, max_components> damping_;  // of each component
+};
 
 /// Brightness profiles, from top to bottom, of 128 directions around the robot, by which two views
 /// are compared column by column. The view is reconstructed from the signature, its rows are
@@ -26,6 +46,9 @@ class ColumnProfiles {
   /// components or rows that the signature does not have. Cost: about 3 microseconds for 80 x 15.
   explicit ColumnProfiles(const PackedSignature& signature, int components = 0,
                           std::span<const std::uint8_t> allowed_rows = {});
+  /// Makes the profiles of the view as a camera out of focus sees it. Throws ContractError if the
+  /// blur is of views with other rows. Cost: twice that of sharp profiles.
+  ColumnProfiles(const PackedSignature& signature, const ProfileBlur& blur);
 
   /// Number of bands to which rows were averaged: at most 16.
   [[nodiscard]] int used_bands() const noexcept { return used_bands_; }
@@ -38,6 +61,7 @@ class ColumnProfiles {
   friend bool operator==(const ColumnProfiles&, const ColumnProfiles&) = default;
 
  private:
+  void fill(const kernels::BandWaves& waves);
   int used_bands_ = 0;
   std::array<std::uint8_t, static_cast<std::size_t>(columns* bands)> values_;
   std::array<std::uint8_t, static_cast<std::size_t>(compared_columns* bands)> compared_values_;

@@ -94,8 +94,8 @@ void try_tilts(const RestoredQuery& query, const VisualMemory& memory,
   const HomingView coarse = average_rows(current);
   const ColumnProfiles profiles(query.signature);
   for (const RankedMatch& match : ranked) {
-    const Tilt tilt =
-        relative_tilt(homing_view(memory, match.match.view), current, -match.columns.heading_rad);
+    const HomingView home = average_rows(homing_view(memory, match.match.view));
+    const Tilt tilt = relative_tilt(home, coarse, -match.columns.heading_rad);
     PackedSignature level = to_packed(level_view(current, tilt), memory.full_scale());
     const ColumnProfiles levelled(level);
     const ColumnProfiles reference(memory.packed(match.match.view));
@@ -110,15 +110,18 @@ void try_tilts(const RestoredQuery& query, const VisualMemory& memory,
 void try_blurs(const RestoredQuery& query, const VisualMemory& memory,
                std::span<const RankedMatch> ranked, Attempt& best) {
   const ColumnProfiles profiles(query.signature);
-  for (const RankedMatch& match : ranked) {
-    const PackedSignature sharp = memory.packed(match.match.view);
-    for (const double blur_rad : compared_blurs_rad) {
-      const ColumnProfiles blurred(blur(sharp, blur_rad, *memory.elevations()));
+  std::vector<PackedSignature> sharp;
+  for (const RankedMatch& match : ranked) sharp.push_back(memory.packed(match.match.view));
+  for (const double blur_rad : compared_blurs_rad) {
+    const ProfileBlur blur(memory.shape().rows, *memory.elevations(), blur_rad);
+    for (std::size_t i = 0; i < ranked.size(); ++i) {
+      const ColumnProfiles blurred(sharp[i], blur);
       const ColumnMatch found = match_columns(profiles, blurred);
       if (found.difference >= best.difference) continue;
-      best = {RestoredQuery{query.signature, query.tilt, blur_rad}, found.difference,
-              is_significantly_better(profiles, ColumnProfiles(sharp), match.columns.heading_rad,
-                                      profiles, blurred, found.heading_rad)};
+      best = {
+          RestoredQuery{query.signature, query.tilt, blur_rad}, found.difference,
+          is_significantly_better(profiles, ColumnProfiles(sharp[i]), ranked[i].columns.heading_rad,
+                                  profiles, blurred, found.heading_rad)};
     }
   }
 }
@@ -184,15 +187,6 @@ PackedSignature blur(const PackedSignature& view, double blur_rad, const Elevati
                          : static_cast<std::uint8_t>(
                                std::lround(std::atan2(b, a) * 128.0F / std::numbers::pi_v<float>));
     }
-  }
-  return blurred;
-}
-
-VisualMemory blur_views(const VisualMemory& sharp, double blur_rad) {
-  VisualMemory blurred(sharp.shape(), sharp.full_scale(), sharp.elevations());
-  for (const ViewId view : sharp.views()) {
-    blurred.append_with_id(view, blur(sharp.packed(view), blur_rad, *sharp.elevations()),
-                           sharp.info(view));
   }
   return blurred;
 }
