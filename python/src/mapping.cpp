@@ -150,10 +150,23 @@ void bind_lattices(py::module_& m) {
       .field("views", &Lattice::Component::views, "Number of its nodes.")
       .field("handedness_known", &Lattice::Component::handedness_known,
              "False if the component may be mirrored.");
+  Record<Lattice::Join>(m, "LatticeJoin", "Two components that were joined after the last round.")
+      .field("views", &Lattice::Join::views, "Number of nodes of the smaller one.")
+      .field("pairs", &Lattice::Join::pairs, "Number of pairs of views that agree on its pose.");
+  Record<Lattice::Crossing>(m, "LatticeCrossing",
+                            "Two views of different components between which a robot can cross by "
+                            "homing.")
+      .field("a", &Lattice::Crossing::a, "Index of a node.")
+      .field("b", &Lattice::Crossing::b, "Index of the other node, larger than a.")
+      .field("phases", &Lattice::Crossing::phases, "Relative pose of the two views.")
+      .field("probability", &Lattice::Crossing::probability,
+             "Probability that the direction is right.");
   Record<Lattice>(m, "Lattice", "Views and the poses computed from their springs.")
       .field("nodes", &Lattice::nodes, "One for each view, in the order of ids.")
       .field("springs", &Lattice::springs, "Ascending (a, b).")
       .field("components", &Lattice::components, "The largest first.")
+      .field("joins", &Lattice::joins, "Components that were joined, in their order.")
+      .field("crossings", &Lattice::crossings, "Between components; ascending (a, b).")
       .field("candidates", &Lattice::candidates,
              "Number of pairs of views that were compared; those that are no "
              "springs were rejected.")

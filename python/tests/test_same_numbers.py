@@ -271,7 +271,8 @@ def same_arrangement(memory, **odometry):
             for node in printed["nodes"]] == [(node.view, node.component, *node.pose) for node in lattice.nodes]
     for key in ("candidates", "metric", "iterations", "energy"):
         assert printed[key] == getattr(lattice, key)
-    assert printed["springs"] == len(lattice.springs)
+    assert (printed["springs"], printed["crossings"]) == (len(lattice.springs), len(lattice.crossings))
+    assert printed["joined_pieces"] == [{"views": join.views, "pairs": join.pairs} for join in lattice.joins]
     return lattice
 
 
@@ -300,6 +301,23 @@ def test_arrange_office(office, tmp_path):
     panonav.arrange(memory, neighbours=8)
     stored = panonav.read_map(panonav.MemoryFile(memory), "lattice")
     assert numpy.array_equal(stored.poses(), lattice.poses())
+
+
+def test_arrange_in_pieces(tmp_path):
+    memory = tmp_path / "corridor.panonav"
+    world = panonav.SimulatedWorld("corridor", kind="panorama", rays_per_axis=1)
+    panonav.memorise(memory, world.record(tmp_path / "corridor", spacing_m=0.6))
+    lattice = same_arrangement(memory)
+    assert len(lattice.components) > 1 and lattice.crossings
+    component = [node.component for node in lattice.nodes]
+    for crossing in lattice.crossings:
+        assert crossing.a < crossing.b and component[crossing.a] != component[crossing.b]
+        assert crossing.phases.has_direction and 0.0 < crossing.probability <= 1.0
+    panonav.arrange(memory, neighbours=8)
+    edges = panonav.read_map(panonav.MemoryFile(memory), "lattice").edges
+    assert [(edge.a, edge.b, edge.weight) for edge in edges[len(lattice.springs):]] == [
+        (lattice.nodes[crossing.a].view, lattice.nodes[crossing.b].view, crossing.probability)
+        for crossing in lattice.crossings]
 
 
 def same_catchment(recording, flags, **options):
