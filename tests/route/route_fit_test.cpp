@@ -275,6 +275,36 @@ TEST(RouteFit, CovarianceIsThatOfTheNoise) {
   EXPECT_LT(spread, 2.5 * expected);
 }
 
+// Lines differ in whole surfaces: a fit from noise that is the same over some degrees is as much
+// less certain as it has fewer independent values.
+TEST(RouteFit, CovarianceAllowsForNoiseThatIsCorrelatedFromColumnToColumn) {
+  const ToyWorld room = pillared_room(14);
+  const RouteLines lines(record(room, straight_path(5.0, 0.02)));
+  const Pose2 truth{0.3, 0.25, 0.2};
+  const auto clean = room.line(truth);
+  const auto middle = lines.fit(clean, truth);
+  ASSERT_TRUE(middle.has_value());
+  Random random(22);
+  double spread = 0.0;
+  double expected = 0.0;
+  constexpr int trials = 60;
+  constexpr std::size_t same = 6;  // columns of a degree
+  for (int trial = 0; trial < trials; ++trial) {
+    auto line = clean;
+    double off = 0.0;
+    for (std::size_t c = 0; c < line.size(); ++c) {
+      if (c % same == 0) off = 0.03 * random.normal();
+      line[c] += static_cast<float>(off);
+    }
+    const auto fix = lines.fit(line, truth);
+    ASSERT_TRUE(fix.has_value());
+    spread += std::pow(fix->pose.x_m - middle->pose.x_m, 2) / trials;
+    expected += fix->covariance[0] / trials;
+  }
+  EXPECT_GT(spread, 0.2 * expected);
+  EXPECT_LT(spread, expected);
+}
+
 TEST(RouteFit, SynthesisShowsWhatIsSeen) {
   const ToyWorld room = pillared_room(15);
   const RouteLines lines(record(room, straight_path(5.0, 0.02)));

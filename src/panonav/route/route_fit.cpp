@@ -14,6 +14,7 @@
 #include "panonav/geometry/least_squares.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/horizon_scanline.hpp"
+#include "panonav/route/internal/autocorrelation.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
 
 namespace panonav {
@@ -37,6 +38,8 @@ constexpr double fit_damping = 1e-3;
 /// Longest step, beyond which smoothed lines are no longer linear.
 constexpr double max_step_m = 0.25;
 constexpr double max_step_rad = 0.2;
+/// Residuals farther apart are taken as independent; 5 and 20 degrees do as well (decisions.md).
+constexpr double correlated_deg = 10.0;
 
 }  // namespace
 
@@ -60,6 +63,9 @@ struct RouteLines::Linearised {
   double deviation = 0.0;  // of the expected values
   double correlation = 0.0;
 
+  /// Returns the `autocorrelation_factor` of the residuals: lines differ in whole surfaces.
+  [[nodiscard]] double correlation_factor(const std::vector<Term>& terms,
+                                          std::size_t columns) const;
   /// Returns the equations of these terms; nullopt where a line has no structure.
   static std::optional<Linearised> make(const std::vector<Term>& terms, bool robust);
 
@@ -303,6 +309,16 @@ void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool 
   variance = std::max(left / weights, rounding_variance);
 }
 
+double RouteLines::Linearised::correlation_factor(const std::vector<Term>& terms,
+                                                  std::size_t columns) const {
+  std::vector<double> bounded(columns, 0.0);  // residuals by column; 0 where there is none
+  for (const Term& term : terms) {
+    const double off = residual(term);  // bounded as by the weights of the equations
+    bounded[term.direction] = off / (1.0 + std::pow(off / (3.0 * noise), 2.0));
+  }
+  return autocorrelation_factor(bounded, correlated_deg / 360.0);
+}
+
 std::optional<RouteLines::Linearised> RouteLines::Linearised::make(const std::vector<Term>& terms,
                                                                    bool robust) {
   Linearised result;
@@ -441,10 +457,11 @@ std::optional<RouteFix> RouteLines::make_fix(std::span<const float> line, const 
   fix.correlation = fitted.correlation;
   fix.detail_correlations = correlate_details(terms, line.size());
   fix.residual = std::sqrt(fitted.variance) / fitted.deviation;
+  const double variance = fitted.variance * fitted.correlation_factor(terms, line.size());
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       fix.covariance[3 * i + j] =
-          fitted.variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+          variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
   fix.noise = fitted.noise;

@@ -36,7 +36,8 @@ struct RouteFix {
   };
   Pose2 pose;  ///< in the route's frame
   /// Covariance of x, y and heading in metres and radians, row-major: of `RouteLines::fit` by the
-  /// noise of the lines alone; of `RouteTracker` with the errors learnt from the route.
+  /// residuals, which are correlated from column to column; of `RouteTracker` with the errors
+  /// learnt from the route.
   std::array<double, 9> covariance{};
   /// Robust root mean square of the residuals over the standard deviation of the expected line.
   double residual = 1.0;
