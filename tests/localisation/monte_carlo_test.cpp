@@ -75,6 +75,8 @@ TEST(MonteCarlo, FindsItselfFromNothingAndStaysThere) {
     for (std::size_t k = 0; k < run.poses.size(); ++k) {
       if (k > 0) filter.move(run.step(k));
       const MonteCarloEstimate found = filter.observe(run.views[k]);
+      EXPECT_GE(found.probability, 0.0);
+      EXPECT_LE(found.probability, 1.0);
       if (k < 5) continue;
       ++images;
       localised += found.state == LocalisationState::localised ? 1 : 0;

@@ -291,7 +291,7 @@ struct MonteCarloLocaliser::Implementation {
     // It may have been carried to any place; the image fits the best one of them also by chance.
     const double log_ratio =
         share_exponent * std::log(*here / anywhere) - std::log(static_cast<double>(count_places()));
-    // The weights of the particles account for the prior.
+    if (log_ratio <= 0.0) return;  // the weights of the particles account for the prior
     p_explained_here = (1.0 - kidnap_probability(p_kidnap, log_ratio, 0.0)) / (1.0 - p_kidnap);
   }
 

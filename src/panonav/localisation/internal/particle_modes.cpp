@@ -220,7 +220,7 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
   }
   for (const Moments& m : moments) {
     result.modes.push_back(m.mode());
-    result.modes.back().weight /= sum;
+    result.modes.back().weight = std::min(1.0, result.modes.back().weight / sum);  // rounding
   }
   return result;
 }
