@@ -85,8 +85,10 @@ ReproductionPlan plan_elsewhere(const Experiments& context) {
     plan.push_back({10.0, [=] { elsewhere->record_ground(name); }});
   }
   plan.push_back({100.0, [=] { elsewhere->reproduce_known_places(); }});
+  plan.push_back({40.0, [=] { elsewhere->reproduce_stated_places(); }});
   plan.push_back({20.0, [=] { elsewhere->reproduce_buildings(); }});
   plan.push_back({40.0, [=] { elsewhere->reproduce_tracked_poses(); }});
+  plan.push_back({50.0, [=] { elsewhere->reproduce_shuffled_walks(); }});
   plan.push_back({80.0, [=] { elsewhere->reproduce_drives(); }});
   plan.push_back({60.0, [=] { elsewhere->reproduce_home_vectors(); }});
   plan.push_back({60.0, [=] {

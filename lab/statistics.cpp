@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 
 namespace panonav::lab {
 
@@ -85,6 +87,44 @@ double rank_correlation(std::span<const double> a, std::span<const double> b) {
   }
   // A set of equal values has no rank order to correlate.
   return aa > 0.0 && bb > 0.0 ? ab / std::sqrt(aa * bb) : 0.0;
+}
+
+Calibration::Calibration(std::vector<double> bin_starts) {
+  for (const double start : bin_starts) bins_.push_back({.start = start});
+  require(!bins_.empty() && bins_.front().start == 0.0, "bins", static_cast<double>(bins_.size()),
+          ">= 1, the first from 0");
+}
+
+void Calibration::add(double probability, bool is_right) {
+  require(probability >= 0.0 && probability <= 1.0, "probability", probability, "0 .. 1");
+  Bin& bin = *(std::ranges::upper_bound(bins_, probability, {}, &Bin::start) - 1);
+  bin.stated += probability;
+  bin.right += is_right ? 1.0 : 0.0;
+  ++bin.count;
+}
+
+std::size_t Calibration::count() const {
+  std::size_t sum = 0;
+  for (const Bin& bin : bins_) sum += bin.count;
+  return sum;
+}
+
+double Calibration::error() const {
+  if (count() == 0) return 0.0;
+  double sum = 0.0;
+  for (const Bin& bin : bins_) sum += std::abs(bin.stated - bin.right);
+  return sum / static_cast<double>(count());
+}
+
+std::string Calibration::describe() const {
+  std::string text;
+  for (const Bin& bin : bins_) {
+    if (bin.count == 0) continue;
+    const auto answers = static_cast<double>(bin.count);
+    text += (text.empty() ? "stated " : ", ") + format_fixed(bin.stated / answers, 2) + ": " +
+            format_fixed(bin.right / answers, 2) + " right of " + std::to_string(bin.count);
+  }
+  return text;
 }
 
 }  // namespace panonav::lab

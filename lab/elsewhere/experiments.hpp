@@ -20,7 +20,7 @@ struct RecordedGround {
 
 /// Experiments in scenes, worlds and recordings that were not used for development.
 struct ElsewhereExperiments : Experiments {
-  std::vector<RecordedGround> grounds{};  ///< compared by the next three experiments
+  std::vector<RecordedGround> grounds{};  ///< compared by the next five experiments
 
   /// Returns the built-in scenes of the options and the worlds that exist in `options.data`.
   [[nodiscard]] std::vector<std::string> list_ground_names() const;
@@ -29,6 +29,12 @@ struct ElsewhereExperiments : Experiments {
   /// Measures how many own places are recognised, how many foreign places are mistaken for own
   /// ones, and how many positions are within the stated 95 % radius.
   void reproduce_known_places();
+  /// Measures how often the place that an answer states with a probability is right, and how often
+  /// an answer that is wrong names the true place as another possibility.
+  void reproduce_stated_places();
+  /// Measures the same of tracked poses on walks of which pieces were put into another order, so
+  /// that the robot is kidnapped again and again.
+  void reproduce_shuffled_walks();
   /// Memorises two variants of each built-in scene as floors of one building, in the same
   /// coordinates, and measures how often the floor is right.
   void reproduce_buildings();

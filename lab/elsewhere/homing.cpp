@@ -12,6 +12,7 @@
 
 #include "lab/elsewhere/experiments.hpp"
 #include "lab/runs/homing_run.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -118,47 +119,6 @@ void add_direction_rate(Reproduction& result, const std::string& id, const std::
            count_where(answers, [](const Answer& answer) { return has_direction(answer); }),
            answers.size(), target);
 }
-
-/// Compares stated probabilities with the share of answers that are right, in bins.
-class Calibration {
- public:
-  void add(double probability, bool is_right) {
-    Bin& bin = bins_[std::min(static_cast<std::size_t>(probability * bin_count), bin_count - 1)];
-    bin.stated += probability;
-    bin.right += is_right ? 1.0 : 0.0;
-    ++bin.count;
-  }
-  [[nodiscard]] std::size_t count() const {
-    std::size_t sum = 0;
-    for (const Bin& bin : bins_) sum += bin.count;
-    return sum;
-  }
-  /// Returns the mean difference between stated and right, weighted by the answers of each bin.
-  [[nodiscard]] double error() const {
-    double sum = 0.0;
-    for (const Bin& bin : bins_) sum += std::abs(bin.stated - bin.right);
-    return sum / static_cast<double>(count());
-  }
-  [[nodiscard]] std::string describe() const {
-    std::string text;
-    for (const Bin& bin : bins_) {
-      if (bin.count == 0) continue;
-      const auto answers = static_cast<double>(bin.count);
-      text += (text.empty() ? "stated " : ", ") + format_fixed(bin.stated / answers, 2) + ": " +
-              format_fixed(bin.right / answers, 2) + " right of " + std::to_string(bin.count);
-    }
-    return text;
-  }
-
- private:
-  static constexpr std::size_t bin_count = 5;
-  struct Bin {
-    double stated = 0.0;
-    double right = 0.0;
-    std::size_t count = 0;
-  };
-  std::array<Bin, bin_count> bins_;
-};
 
 /// A range of distances between two views.
 struct DistanceRange {

@@ -1,14 +1,18 @@
-// Recognition of own and foreign places, and the correctness of the stated radius and covariance.
+// Recognition of own and foreign places, and the correctness of the stated probability, radius and
+// covariance.
 
 #include <algorithm>
 #include <array>
 #include <map>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "lab/elsewhere/experiments.hpp"
 #include "lab/runs/place_experiment.hpp"
 #include "lab/runs/tracking_filter.hpp"
 #include "lab/statistics.hpp"
+#include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav_simulation/make_each.hpp"
@@ -96,6 +100,115 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
             at_most(0.98));
 }
 
+/// Starts of the bins in which stated probabilities of places are compared with what is right.
+const std::vector<double> probability_bins{0.0, 0.5, 0.7, 0.9, 0.97};
+/// An answer with at least this probability counts as sure.
+constexpr double sure_probability = 0.97;
+
+void add_calibration(Reproduction& result, const std::string& id, const std::string& what,
+                     const Calibration& calibration) {
+  ResultRow& row = add_row(result, id,
+                           what +
+                               ": mean difference of stated probability and share "
+                               "that is right, over five bins",
+                           calibration.error(), "", at_most(0.05));
+  row.over = std::to_string(calibration.count()) + " answers: " + calibration.describe();
+}
+
+/// Statements of a tracker whose robot is kidnapped again and again.
+struct KidnapStatements {
+  static constexpr double right_radius_m = 1.0;
+  static constexpr std::size_t early_images = 3;  ///< after a kidnapping
+
+  Calibration calibration{probability_bins};  ///< of poses that are reported as localised
+  Rates sure;                                 ///< share of sure poses that are right
+  std::size_t early_sure = 0;                 ///< sure poses among the first images
+  std::size_t early_right = 0;                ///< of these, right
+  std::size_t kidnappings = 0;
+  std::vector<double> images_until_right;  ///< after each kidnapping that a right answer follows
+
+  struct Image {
+    std::size_t since_kidnapping = 0;  ///< 1: the first image; 0: before the first kidnapping
+    bool localised = false;
+    double probability = 0.0;
+    bool right = false;
+  };
+  /// Adds the images of one walk; returns the number of sure ones, and of right ones among them.
+  std::pair<std::size_t, std::size_t> add(const std::vector<Image>& images) {
+    std::size_t sure_images = 0;
+    std::size_t right_images = 0;
+    bool is_waiting = false;
+    for (const Image& image : images) {
+      if (image.since_kidnapping == 1) {
+        is_waiting = true;
+        ++kidnappings;
+      }
+      if (!image.localised) continue;
+      calibration.add(image.probability, image.right);
+      if (is_waiting && image.right) {
+        images_until_right.push_back(static_cast<double>(image.since_kidnapping));
+        is_waiting = false;
+      }
+      if (image.probability < sure_probability) continue;
+      ++sure_images;
+      right_images += image.right ? 1 : 0;
+      if (image.since_kidnapping == 0 || image.since_kidnapping > early_images) continue;
+      ++early_sure;
+      early_right += image.right ? 1 : 0;
+    }
+    return {sure_images, right_images};
+  }
+};
+
+/// Tracks a run and compares each estimate with the truth.
+std::vector<KidnapStatements::Image> track_kidnapped_run(const TrackingPlace& place,
+                                                         const TrackingRun& run,
+                                                         std::uint64_t seed) {
+  std::vector<KidnapStatements::Image> images;
+  std::size_t since_kidnapping = 0;
+  static_cast<void>(track_run(
+      place, run, {}, seed,
+      [&](std::size_t step, const MonteCarloLocaliser&, const MonteCarloEstimate& estimate) {
+        const TrackingStep& there = run.steps[step];
+        if (step > 0 && !there.moved) {
+          since_kidnapping = 1;
+        } else if (since_kidnapping > 0) {
+          ++since_kidnapping;
+        }
+        const bool localised = estimate.state == LocalisationState::localised;
+        images.push_back(
+            {.since_kidnapping = since_kidnapping,
+             .localised = localised,
+             .probability = estimate.probability,
+             .right = localised && distance(*estimate.position, there.truth.position()) <=
+                                       KidnapStatements::right_radius_m});
+      }));
+  return images;
+}
+
+void report_kidnappings(const KidnapStatements& found, Reproduction& result) {
+  const std::string id = "elsewhere.kidnapped.";
+  const std::string what = "walks in pieces that were put into another order: ";
+  const std::string sure = what + "poses stated with at least 0.97 that are right within 1 m";
+  add_calibration(result, id + "calibration", what + "poses reported as localised",
+                  found.calibration);
+  if (found.sure.trials > 0) {
+    add_rate(result, id + "sure", sure, found.sure.successes, found.sure.trials, at_least(0.97));
+    result.rows.back().over += "; " + found.sure.describe_extreme(false);
+  }
+  if (found.early_sure > 0) {
+    add_rate(result, id + "sure_early", sure + ", of the first three images after a kidnapping",
+             found.early_right, found.early_sure, at_least(0.97));
+  }
+  if (found.kidnappings == 0) return;
+  add_rate(result, id + "again", what + "kidnappings after which the robot is localised again",
+           found.images_until_right.size(), found.kidnappings, at_least(0.9));
+  if (found.images_until_right.empty()) return;
+  add_row(result, id + "images", what + "images until then",
+          median_figure(found.images_until_right), "images", at_most(3.0))
+      .over = "median of " + std::to_string(found.images_until_right.size());
+}
+
 }  // namespace
 
 std::vector<std::string> ElsewhereExperiments::list_ground_names() const {
@@ -148,6 +261,78 @@ void ElsewhereExperiments::reproduce_known_places() {
   add_foreign("other", "places of other scenes and worlds recognised as own", other, 0.01);
   add_foreign("variant", "places of another variant of the same scene recognised as own", variant,
               0.05);
+}
+
+void ElsewhereExperiments::reproduce_stated_places() {
+  const auto all_conditions = place_conditions();
+  const std::vector<PlaceCondition> conditions(all_conditions.begin(), all_conditions.begin() + 2);
+  Calibration calibration(probability_bins);
+  Rates sure;
+  std::size_t wrong = 0;
+  std::size_t named = 0;
+  for (const RecordedGround& ground : grounds) {
+    std::size_t sure_answers = 0;
+    std::size_t right_answers = 0;
+    for (const simulation::PlaceRecording& place : ground.variants) {
+      for (const StatedPlace& answer : collect_stated_places(place, conditions, executor)) {
+        if (!answer.known) continue;
+        calibration.add(answer.probability, answer.right);
+        if (answer.probability >= sure_probability) {
+          ++sure_answers;
+          right_answers += answer.right ? 1 : 0;
+        }
+        if (answer.right) continue;
+        ++wrong;
+        named += answer.right_is_named ? 1 : 0;
+      }
+    }
+    if (sure_answers > 0)
+      sure.add(ground.name, success_rate(right_answers, sure_answers), sure_answers);
+  }
+  if (calibration.count() == 0) return;
+  const std::string id = "elsewhere.stated.";
+  const std::string what = "known places, as memorised and with columns hidden: ";
+  add_calibration(result, id + "calibration", what + "nearest reference or beside it", calibration);
+  if (sure.trials > 0) {
+    add_rate(result, id + "sure", what + "right of those stated with at least 0.97", sure.successes,
+             sure.trials, at_least(0.97));
+    result.rows.back().over += "; " + sure.describe_extreme(false);
+  }
+  if (wrong == 0) return;
+  add_rate(result, id + "named",
+           what + "wrong ones that name the right place as another possibility", named, wrong,
+           at_least(0.9));
+}
+
+void ElsewhereExperiments::reproduce_shuffled_walks() {
+  constexpr std::size_t piece = 10;  // images; 2.5 m
+  constexpr int pieces = 6;
+  KidnapStatements statements;
+  for (const RecordedGround& ground : grounds) {
+    const simulation::PlaceRecording& place = ground.variants.front();
+    const auto remembered = make_tracking_place(place, executor);
+    const auto walks = record_walks(place, *remembered, make_clean_condition(),
+                                    {.variants = 1,
+                                     .runs_each = std::max(1, options.runs / 4),
+                                     .images = pieces * static_cast<int>(piece),
+                                     .seed = options.seed + 1},
+                                    executor);
+    const auto tracked = simulation::make_each(executor, walks.size(), [&](std::size_t i) {
+      if (walks[i].steps.size() < 3 * piece) return std::vector<KidnapStatements::Image>{};
+      Random random(options.seed + 1, i);
+      return track_kidnapped_run(*remembered, shuffle_pieces(walks[i], piece, random),
+                                 options.seed + i);
+    });
+    std::size_t sure = 0;
+    std::size_t right = 0;
+    for (const auto& images : tracked) {
+      const auto [sure_images, right_images] = statements.add(images);
+      sure += sure_images;
+      right += right_images;
+    }
+    if (sure > 0) statements.sure.add(ground.name, success_rate(right, sure), sure);
+  }
+  if (statements.calibration.count() > 0) report_kidnappings(statements, result);
 }
 
 void ElsewhereExperiments::reproduce_buildings() {

@@ -48,6 +48,28 @@ bool is_neighbour(Point2 a, Point2 b, double spacing_m) {
          std::abs(std::lround((a.y_m - b.y_m) / spacing_m)) <= 1;
 }
 
+// Localises all queries of the place under a condition; `seed`: of the noise of the first one.
+std::vector<Place> localise_queries(const MemorisedPlace& memorised,
+                                    const simulation::PlaceRecording& place,
+                                    const PlaceCondition& condition, std::uint64_t seed,
+                                    Executor& executor) {
+  return simulation::make_each(executor, place.queries.size(), [&](std::size_t i) {
+    Executor here(1);
+    const simulation::FrameOptions frame{.camera_height_m = place.scene.camera_height_m,
+                                         .tilt_rad = condition.tilt_rad};
+    const Panorama seen =
+        simulation::capture_panorama(*place.renderer, place.queries[i].pose, place.rendering, frame,
+                                     condition.sensor, seed + i, here);
+    const Tilt measured = condition.levelled ? sample_tilt(frame, seed + i) : Tilt{};
+    return memorised.localise(level_panorama(seen, measured));
+  });
+}
+
+// Seed of the noise of the first query under the first condition.
+std::uint64_t make_noise_seed(const simulation::PlaceRecording& place) {
+  return place.seed * 1000003U;
+}
+
 }  // namespace
 
 std::vector<PlaceCondition> place_conditions() {
@@ -69,20 +91,10 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
                                               Executor& executor) {
   const MemorisedPlace memorised(place, executor);
   std::vector<PlaceResult> results;
-  std::uint64_t seed = place.seed * 1000003U;
+  std::uint64_t seed = make_noise_seed(place);
   for (const PlaceCondition& condition : conditions) {
     const std::size_t query_count = place.queries.size();
-    std::vector<Place> answers(query_count);
-    executor.for_each_chunk(query_count, 1, [&](std::size_t begin, std::size_t, std::size_t) {
-      Executor here(1);
-      const simulation::FrameOptions frame{.camera_height_m = place.scene.camera_height_m,
-                                           .tilt_rad = condition.tilt_rad};
-      const Panorama seen =
-          simulation::capture_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
-                                       frame, condition.sensor, seed + begin, here);
-      const Tilt measured = condition.levelled ? sample_tilt(frame, seed + begin) : Tilt{};
-      answers[begin] = memorised.localise(level_panorama(seen, measured));
-    });
+    const auto answers = localise_queries(memorised, place, condition, seed, executor);
     seed += query_count;
     std::size_t nearest = 0;
     std::size_t nearest_or_neighbour = 0;
@@ -120,6 +132,32 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
                        success_rate(inside, stated)});
   }
   return results;
+}
+
+std::vector<StatedPlace> collect_stated_places(const simulation::PlaceRecording& place,
+                                               const std::vector<PlaceCondition>& conditions,
+                                               Executor& executor) {
+  const MemorisedPlace memorised(place, executor);
+  std::vector<StatedPlace> stated;
+  std::uint64_t seed = make_noise_seed(place);
+  for (const PlaceCondition& condition : conditions) {
+    const auto answers = localise_queries(memorised, place, condition, seed, executor);
+    seed += answers.size();
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      const Point2 truth = place.queries[i].pose.position();
+      const Point2 nearest = place.references[place.nearest_reference(truth)].pose.position();
+      const auto is_right = [&](const PlaceMatch& match) {
+        return is_neighbour(memorised.memory().info(match.view).pose->position(), nearest,
+                            place.spacing_m);
+      };
+      stated.push_back({.known = answers[i].known,
+                        .probability = answers[i].probability,
+                        .right = is_right(answers[i].matches.at(0)),
+                        .right_is_named = std::ranges::any_of(answers[i].alternatives, is_right,
+                                                              &AlternativePlace::match)});
+    }
+  }
+  return stated;
 }
 
 BuildingResult run_building_experiment(std::span<const simulation::PlaceRecording* const> floors,

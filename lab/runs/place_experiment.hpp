@@ -42,6 +42,22 @@ struct PlaceResult {
     const simulation::PlaceRecording& place, const std::vector<PlaceCondition>& conditions,
     Executor& executor);
 
+/// An answer to a query whose place is in the memory, and whether its statement is right.
+struct StatedPlace {
+  bool known = false;        ///< recognised as a place of the memory
+  double probability = 0.0;  ///< stated, of the place that was chosen
+  bool right = false;        ///< the best match is the nearest reference or a grid neighbour of it
+  /// The best match of a place named as another possibility is the nearest reference or a grid
+  /// neighbour of it.
+  bool right_is_named = false;
+};
+
+/// Memorises the references of the place and localises the queries in all conditions, as
+/// `run_place_experiment`.
+[[nodiscard]] std::vector<StatedPlace> collect_stated_places(
+    const simulation::PlaceRecording& place, const std::vector<PlaceCondition>& conditions,
+    Executor& executor);
+
 /// Results of localisation in one memory of a building with several floors.
 struct BuildingResult {
   std::size_t queries = 0;

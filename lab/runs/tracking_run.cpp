@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/random.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav_simulation/make_each.hpp"
@@ -143,6 +143,22 @@ std::optional<TrackingRun> make_kidnapped_run(const TrackingRun& before, const T
   run.steps.insert(run.steps.end(), found, after.steps.end());
   run.steps[images].moved.reset();
   return run;
+}
+
+TrackingRun shuffle_pieces(const TrackingRun& run, std::size_t piece, Random& random) {
+  const std::size_t pieces = piece == 0 ? 0 : run.steps.size() / piece;
+  require(pieces >= 3, "pieces of the run", static_cast<double>(pieces), ">= 3");
+  std::vector<std::size_t> order(pieces);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  for (std::size_t i = pieces - 1; i > 0; --i) std::swap(order[i], order[random.index(i + 1)]);
+  TrackingRun shuffled;
+  for (std::size_t i = 0; i < pieces; ++i) {
+    const auto first = run.steps.begin() + static_cast<std::ptrdiff_t>(order[i] * piece);
+    shuffled.steps.insert(shuffled.steps.end(), first, first + static_cast<std::ptrdiff_t>(piece));
+    const bool continues = i > 0 && order[i] == order[i - 1] + 1;
+    if (!continues) shuffled.steps[i * piece].moved.reset();
+  }
+  return shuffled;
 }
 
 TrackingRun drop_images(TrackingRun run, std::size_t first, std::size_t count) {

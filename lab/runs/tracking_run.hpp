@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panonav/core/executor.hpp"
+#include "panonav/core/random.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/localisation/column_ranking.hpp"
 #include "panonav/localisation/localiser.hpp"
@@ -106,6 +107,11 @@ struct TrackingRun {
                                                             const TrackingRun& after,
                                                             std::size_t images, double distance_m,
                                                             std::size_t min_images);
+
+/// Cuts a run into pieces of `piece` steps and puts them into another order; the robot is kidnapped
+/// at the start of each piece whose former predecessor is not before it. Fewer steps at the end are
+/// dropped. Throws ContractError unless the run has at least three pieces.
+[[nodiscard]] TrackingRun shuffle_pieces(const TrackingRun& run, std::size_t piece, Random& random);
 
 /// Returns the run without the images of steps first .. first + count - 1.
 [[nodiscard]] TrackingRun drop_images(TrackingRun run, std::size_t first, std::size_t count);

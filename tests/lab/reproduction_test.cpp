@@ -91,6 +91,7 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
   for (const char* const id :
        {"elsewhere.places.office.clean.known", "elsewhere.places.lab.radius",
         "elsewhere.places.other", "elsewhere.places.variant", "elsewhere.home.foreign",
+        "elsewhere.stated.calibration", "elsewhere.stated.sure", "elsewhere.kidnapped.calibration",
         "elsewhere.home.noise_16", "elsewhere.tilt.lab.3", "elsewhere.tracks.office.ellipse",
         "elsewhere.days.office.with", "elsewhere.days.office.rerecorded",
         "elsewhere.days.office.with.views", "elsewhere.days.office.rounds"}) {

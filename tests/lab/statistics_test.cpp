@@ -53,5 +53,19 @@ TEST(RankCorrelation, DependsOnOrderAlone) {
   EXPECT_DOUBLE_EQ(rank_correlation(a, constant), 0.0);
 }
 
+TEST(Calibration, ComparesStatedWithRightInEachBin) {
+  Calibration calibration({0.0, 0.5, 0.9});
+  EXPECT_EQ(calibration.error(), 0.0);
+  for (int i = 0; i < 10; ++i) calibration.add(0.7, i < 7);  // exactly so
+  EXPECT_NEAR(calibration.error(), 0.0, 1e-12);
+  for (int i = 0; i < 10; ++i) calibration.add(0.9, i < 4);  // too sure by 0.5
+  EXPECT_EQ(calibration.count(), 20U);
+  EXPECT_NEAR(calibration.error(), 0.25, 1e-12);
+  EXPECT_EQ(calibration.describe(), "stated 0.70: 0.70 right of 10, 0.90: 0.40 right of 10");
+  calibration.add(1.0, true);
+  EXPECT_THROW(calibration.add(1.1, true), ContractError);
+  EXPECT_THROW(Calibration({0.5}), ContractError);
+}
+
 }  // namespace
 }  // namespace panonav::lab

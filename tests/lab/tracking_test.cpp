@@ -88,6 +88,27 @@ TEST(TrackingRun, IsCarriedAwayUnnoticedAndFarEnough) {
   EXPECT_FALSE(make_kidnapped_run(before, after, 11, 0.1, 1));
 }
 
+TEST(TrackingRun, IsKidnappedBetweenPiecesThatWereReordered) {
+  const TrackingRun run = straight_run({0.0, 0.0}, 22);
+  Random random(5);
+  const TrackingRun shuffled = shuffle_pieces(run, 4, random);
+  ASSERT_EQ(shuffled.steps.size(), 20U) << "the last two are no whole piece";
+  std::size_t kidnapped = 0;
+  std::vector<double> positions;
+  for (std::size_t i = 0; i < shuffled.steps.size(); ++i) {
+    positions.push_back(shuffled.steps[i].truth.x_m);
+    const bool continues = i > 0 && positions[i] - positions[i - 1] == run.steps[1].truth.x_m;
+    EXPECT_EQ(shuffled.steps[i].moved.has_value(), continues) << i;
+    kidnapped += i > 0 && !continues ? 1 : 0;
+  }
+  EXPECT_GE(kidnapped, 2U);
+  std::ranges::sort(positions);
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    EXPECT_EQ(positions[i], run.steps[i].truth.x_m) << "each once";
+  EXPECT_THROW((void)shuffle_pieces(run, 8, random), ContractError);
+  EXPECT_THROW((void)shuffle_pieces(run, 0, random), ContractError);
+}
+
 TEST(TrackingRun, GoesBlindForAStretch) {
   const TrackingRun run = drop_images(straight_run({0.0, 0.0}, 6), 2, 3);
   for (std::size_t i = 0; i < 6; ++i) {
