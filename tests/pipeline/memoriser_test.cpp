@@ -84,6 +84,43 @@ TEST_F(Memorising, InBatchesOfAnySizeTheSameViewsAreStored) {
   }
 }
 
+TEST_F(Memorising, LargeImagesWaitAsPanoramasAndGiveTheSameViews) {
+  constexpr int views = 33;  // one more than the full scale is computed from
+  const auto see = [](int number) {
+    Image image(2048, 1024);
+    for (int v = 0; v < 1024; ++v) {
+      for (int u = 0; u < 2048; ++u) {
+        image.at(u, v) =
+            static_cast<std::uint8_t>(((u + 37 * number) / 64 * 90 + v / 32 * 40) % 256);
+      }
+    }
+    Observation observation(std::move(image));
+    observation.name = "view_" + std::to_string(number);
+    if (number % 5 == 0) observation.tilt = Tilt{0.05, -0.02};
+    return observation;
+  };
+  MemoriserOptions spheres = options();
+  spheres.source = PictureSource{.kind = PictureKind::equirectangular};
+  std::vector<VisualMemory> memories;
+  std::vector<double> full_scales;
+  for (const int batch : {1, views}) {
+    Executor executor(2);
+    Memoriser memoriser(path(std::to_string(batch)), spheres);
+    for (int first = 0; first < views; first += batch) {
+      std::vector<Observation> seen;
+      for (int i = first; i < first + batch; ++i) seen.push_back(see(i));
+      memoriser.add(std::move(seen), executor);
+    }
+    full_scales.push_back(memoriser.file()->header().full_scale);
+    memories.push_back(memoriser.file()->load());
+  }
+  EXPECT_EQ(full_scales[0], full_scales[1]);
+  ASSERT_EQ(memories[0].size(), 33U);
+  for (const ViewId view : memories[0].views()) {
+    EXPECT_EQ(memories[0].packed(view), memories[1].packed(view));
+  }
+}
+
 TEST_F(Memorising, OneMoreViewReadsNoSignatureButItsNeighbours) {
   constexpr int views = 1000;  // from there on models stay when one view is added
   {

@@ -2,6 +2,9 @@
 
 #include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/memory_map.hpp"
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace panonav::command {
 
@@ -36,6 +39,12 @@ void print_views_without_position(const MemoryFile& memory, Session& session) {
                 (without == 1 ? "this image" : "these images") +
                 " came without one. localise can name such a view, but gives no position near it; "
                 "track and drawn maps leave it out.");
+}
+
+void return_freed_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 }  // namespace panonav::command

@@ -15,4 +15,7 @@ void require_stored_options(const Arguments& arguments, const SignatureOptions& 
 /// means; prints nothing for other memories.
 void print_views_without_position(const MemoryFile& memory, Session& session);
 
+/// Returns the memory of decoded images to the system, before models are learnt with other memory.
+void return_freed_memory();
+
 }  // namespace panonav::command

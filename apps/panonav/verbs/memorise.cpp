@@ -302,6 +302,7 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
   const bool is_strict = arguments.strict || recording.entries.size() == 1;
   memorise_missing(missing, recording, known, is_strict, memoriser, skipped, session);
   Progress mapping(session, "mapping", known_before + missing.entries.size());
+  return_freed_memory();
   const auto counts = memoriser.finish(session.executor(), [&] { mapping.advance(); });
   mapping.clear();
   print_result(arguments, *memoriser.file(), counts, known_before, skipped, &recording, session);

@@ -179,13 +179,13 @@ LearntModels learn_from(const ColumnRanking& ranking, const FeatureSource& featu
           features && evaluate_features(ranking, support, features).is_significantly_better()};
 }
 
-/// Returns a source that keeps the features of up to a thousand views, about 10 MB, so that few are
-/// read twice; empty if `source` is.
+/// Returns a source that keeps the features of up to 250 views, about 4 MB, so that few are read
+/// twice; empty if `source` is.
 FeatureSource keep_read_features(const FeatureSource& source) {
   if (!source) return {};
   using Kept = std::map<ViewId, std::optional<LocalFeatures>>;
   return [source, kept = std::make_shared<Kept>()](ViewId view) {
-    constexpr std::size_t max_kept = 1000;
+    constexpr std::size_t max_kept = 250;
     const auto found = kept->find(view);
     if (found != kept->end()) return found->second;
     if (kept->size() == max_kept) kept->clear();
@@ -196,7 +196,7 @@ FeatureSource keep_read_features(const FeatureSource& source) {
 LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& features) {
   constexpr std::size_t max_cached_profiles = 4000;  // 11 MB
   const ColumnRanking ranking(memory, 0, max_cached_profiles);
-  LearntModels models = learn_from(ranking, features);
+  LearntModels models = learn_from(ranking, keep_read_features(features));
   try {
     models.observation = learn_observation_model_with_places(ranking, models.place);
   } catch (const ContractError&) {  // nothing to learn from
@@ -242,8 +242,8 @@ void learn_and_store_models(MemoryFile& file) {
   if (places.empty()) return;
   const std::string fingerprint = compute_fingerprint(file.header().shape, places);
   if (read_models(file, fingerprint)) return;
-  const LearntModels models = learn_all_from(load_learnt_views(file, places),
-                                             keep_read_features(make_feature_source(file)));
+  const LearntModels models =
+      learn_all_from(load_learnt_views(file, places), make_feature_source(file));
   Writer writer;
   writer.word(learning_version);
   writer.word(fingerprint);

@@ -124,7 +124,32 @@ void Memoriser::add(Observation observation) {
 void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
   if (file_) return store(observations, executor);
   std::ranges::move(observations, std::back_inserter(waiting_));
-  if (waiting_.size() >= scale_views) make_file(executor);
+  if (waiting_.size() >= scale_views) return make_file(executor);
+  convert_large_waiting(executor);
+}
+
+// Replaces images that wait by their panoramas if they are large: the signatures are the same.
+void Memoriser::convert_large_waiting(Executor& executor) {
+  constexpr std::size_t max_image_bytes = std::size_t{16} << 20U;
+  if (options_.source->kind == PictureKind::panorama) return;  // whose size the header states
+  std::size_t bytes = 0;
+  for (const Observation& observation : waiting_) {
+    if (const auto* image = std::get_if<Image>(&observation.picture))
+      bytes += image->pixels().size();
+  }
+  if (bytes <= max_image_bytes) return;
+  const PanoramaReader reader(*options_.source,
+                              choose_panorama_shape(*options_.source, options_.signature));
+  parallel_for(executor, waiting_.size(), [&](std::size_t i) {
+    Observation& observation = waiting_[i];
+    const auto* image = std::get_if<Image>(&observation.picture);
+    if (image == nullptr) return;
+    try {
+      observation.picture = reader.convert(image->view(), observation.tilt.value_or(Tilt{}));
+      observation.tilt.reset();
+    } catch (const ContractError&) {  // named when it is stored
+    }
+  });
 }
 
 // Makes the header; if the first images differ in size, uses only those of the most frequent size
@@ -143,6 +168,9 @@ MemoryHeader Memoriser::make_header_from_waiting(Executor& executor) const {
     for (const Observation& observation : first) {
       if (const auto* image = std::get_if<Image>(&observation.picture)) {
         by_size[{image->width(), image->height()}].push_back(observation);
+      } else {
+        const auto& panorama = std::get<Panorama>(observation.picture);
+        by_size[{panorama.columns(), panorama.rows()}].push_back(observation);
       }
     }
     if (by_size.size() < 2) throw;

@@ -111,6 +111,7 @@ class Memoriser {
   }
 
  private:
+  void convert_large_waiting(Executor& executor);
   void make_file(Executor& executor);
   [[nodiscard]] MemoryHeader make_header_from_waiting(Executor& executor) const;
   void store(std::span<const Observation> observations, Executor& executor);
