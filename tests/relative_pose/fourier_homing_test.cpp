@@ -371,6 +371,38 @@ TEST(FourierHoming, ATurnWithinBoundsMayCorrelateNegatively) {
   EXPECT_GE(negative, 3);
 }
 
+// Solving is left out only where it cannot change the correlation.
+TEST(FourierHoming, TheCorrelationAloneIsThatOfTheVectorToTheBit) {
+  std::vector<FourierHomingOptions> rules(5);
+  rules[1].displacement_search = false;
+  rules[2].displacement_search = false;
+  rules[2].starting_estimates = max_starting_estimates;
+  rules[3].iterations = 2;
+  rules[4] = published_homing_options(5);
+  std::vector<int> different(rules.size(), 0);
+  for (int trial = 0; trial < 20; ++trial) {
+    const int rows = trial % 2 == 0 ? 1 : 12;
+    const ToyWorld world = random_surroundings(trial, 1.0);
+    const HomingView home = view_of(seen_from(world, 0, 0, 0, rows));
+    const HomingView near = view_of(seen_from(world, 0.2, 0.1, 1.0, rows));
+    const HomingView other = view_of(seen_from(random_surroundings(trial + 50), 0, 0, 0, rows));
+    for (const HomingView& current : {near, other}) {
+      for (std::size_t i = 0; i < rules.size(); ++i) {
+        const double alone = home_vector_correlation(home, current, rules[i]);
+        EXPECT_EQ(alone, home_vector(home, current, rules[i]).correlation) << trial << " " << i;
+        different[i] += alone != home_vector_correlation(home, current, rules[0]) ? 1 : 0;
+        if (i == 4) continue;  // takes no window
+        const auto window = heading_window(0.5, 0.4);
+        EXPECT_EQ(home_vector_correlation(home, current, rules[i], window),
+                  home_vector(home, current, rules[i], window).correlation);
+      }
+    }
+  }
+  for (std::size_t i = 1; i < rules.size(); ++i) EXPECT_GE(different[i], 5) << i;  // guard
+  const HomingView flat(1, 4, std::vector<float>(4), std::vector<float>(4), std::nullopt);
+  EXPECT_EQ(home_vector_correlation(flat, flat), 0.0);
+}
+
 TEST(FourierHoming, RefusesViewsThatDoNotFit) {
   const HomingView one = view_of(seen_from(random_surroundings(1), 0, 0, 0, 1));
   const HomingView four = view_of(seen_from(random_surroundings(1), 0, 0, 0, 4));

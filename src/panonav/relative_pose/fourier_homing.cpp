@@ -44,17 +44,10 @@ class PairOfViews {
       std::copy_n(current.cosines(k).data(), rows_, c_.current_a(k));
       std::copy_n(current.sines(k).data(), rows_, c_.current_b(k));
     }
-    if (!uses_rows()) return;
-    const auto& band = home.elevations();
-    const double row_rad = (band->top_rad - band->bottom_rad) / static_cast<double>(rows_);
-    for (std::size_t y = 0; y < rows_; ++y) {
-      const double elevation = band->top_rad - (static_cast<double>(y) + 0.5) * row_rad;
-      approach_.push_back(static_cast<float>(std::sin(elevation) * std::cos(elevation)));
-      tangent_.push_back(static_cast<float>(std::tan(elevation)));
-    }
   }
 
   HomeVector find_vector();
+  [[nodiscard]] double find_correlation();
   [[nodiscard]] double compute_difference();
 
  private:
@@ -69,6 +62,7 @@ class PairOfViews {
   void correlate();
   [[nodiscard]] bool has_structure() const;
   [[nodiscard]] std::span<const float> find_headings(int iteration);
+  [[nodiscard]] std::span<const float> drop_weak_headings(std::span<const float> headings) const;
   void solve_at_best_heading(std::span<const float> headings);
   void move_current(const PairSolution& solution);
 
@@ -77,9 +71,11 @@ class PairOfViews {
   [[nodiscard]] double correlation_at(float turn_rad) const {
     return static_cast<double>(correlation_.at(turn_rad));
   }
+  [[nodiscard]] double normalised_correlation_at(float turn_rad) const;
   void rotate_home(double turn_rad);
   void set_weights();
   [[nodiscard]] double sum_component_weights() const;
+  void set_row_geometry_if_needed();
   void average_views();
   void differentiate_rows();
   void sum_equations();
@@ -118,10 +114,24 @@ HomeVector PairOfViews::find_vector() {
     if (!has_structure()) return {};
     const auto headings = find_headings(iteration);  // eq. 33-43, footnote 10
     if (headings.empty()) return {};
-    solve_at_best_heading(headings);  // eq. 17-20, 29-30
+    solve_at_best_heading(drop_weak_headings(headings));  // eq. 17-20, 29-30
     if (iteration >= options_.iterations) return vector_;
     move_current(best_);  // eq. 23-26
   }
+}
+
+// Returns the correlation of `find_vector`. Solves only to choose between several headings.
+double PairOfViews::find_correlation() {
+  if (options_.iterations > 0) return find_vector().correlation;
+  if (options_.displacement_search) search_displacement();
+  set_highest_frequency(0);
+  correlate();
+  if (!has_structure()) return 0.0;
+  const auto headings = drop_weak_headings(find_headings(0));
+  if (headings.empty()) return 0.0;
+  if (headings.size() == 1) return normalised_correlation_at(headings[0]);
+  solve_at_best_heading(headings);
+  return vector_.correlation;
 }
 
 void PairOfViews::search_displacement() {
@@ -184,17 +194,24 @@ std::span<const float> PairOfViews::find_headings(int iteration) {
   return std::span(headings_).first(static_cast<std::size_t>(count));
 }
 
+// Drops the headings from the first one on at which the views correlate less than half as well as
+// at the best one, as these do not explain the views better.
+std::span<const float> PairOfViews::drop_weak_headings(std::span<const float> headings) const {
+  constexpr double min_share = 0.5;
+  std::size_t count = std::min<std::size_t>(1, headings.size());
+  while (count < headings.size() &&
+         !(correlation_at(headings[count]) < min_share * correlation_at(headings[0]))) {
+    ++count;
+  }
+  return headings.first(count);
+}
+
 void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
   best_ = {};
   vector_.heading_rad = 0.0;
   vector_.residual = 1.0;
   double best_likelihood = -1.0;  // below all
-  for (std::size_t i = 0; i < headings.size(); ++i) {
-    const float turn = headings[i];
-    // Skips headings at which the views correlate less than half as well, as these do not explain
-    // the views better.
-    constexpr double min_share = 0.5;
-    if (i > 0 && correlation_at(turn) < min_share * correlation_at(headings[0])) break;
+  for (const float turn : headings) {
     const PairSolution solution = solve_at(static_cast<double>(turn));
     const double unexplained = std::max(0.0, normal_.energy - solution.explained);
     const double residual =
@@ -206,6 +223,11 @@ void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
   }
   vector_.xi += best_.xi;
   vector_.eta += best_.eta;
+}
+
+double PairOfViews::normalised_correlation_at(float turn_rad) const {
+  const double max_correlation = std::sqrt(home_energy_) * std::sqrt(current_energy_);
+  return std::clamp(correlation_at(turn_rad) / max_correlation, -1.0, 1.0);
 }
 
 void PairOfViews::rotate_home(double turn_rad) {
@@ -235,6 +257,17 @@ double PairOfViews::sum_component_weights() const {
   double sum = 0.0;
   for (int k = 1; k <= highest_; ++k) sum += component_weights_[static_cast<std::size_t>(k)];
   return sum;
+}
+
+void PairOfViews::set_row_geometry_if_needed() {
+  if (!uses_rows() || !tangent_.empty()) return;
+  const auto& band = home_.elevations();
+  const double row_rad = (band->top_rad - band->bottom_rad) / static_cast<double>(rows_);
+  for (std::size_t y = 0; y < rows_; ++y) {
+    const double elevation = band->top_rad - (static_cast<double>(y) + 0.5) * row_rad;
+    approach_.push_back(static_cast<float>(std::sin(elevation) * std::cos(elevation)));
+    tangent_.push_back(static_cast<float>(std::tan(elevation)));
+  }
 }
 
 // Sets the view whose derivatives are used: the mean of both views, or the current one [S06 eq.
@@ -275,6 +308,7 @@ void PairOfViews::differentiate_rows() {
 
 // Sums the normal equations at the present heading and weights [S06 eq. 30].
 void PairOfViews::sum_equations() {
+  set_row_geometry_if_needed();
   average_views();
   if (uses_rows()) differentiate_rows();
   RowTerms terms{.weights = row_weights_, .tangent = tangent_};
@@ -314,8 +348,7 @@ void PairOfViews::set_best(float turn_rad, const PairSolution& solution, double 
   best_ = solution;
   vector_.heading_rad = wrap_angle(static_cast<double>(turn_rad) + solution.turn);
   vector_.residual = std::min(1.0, residual);
-  const double max_correlation = std::sqrt(home_energy_) * std::sqrt(current_energy_);
-  vector_.correlation = std::clamp(correlation_at(turn_rad) / max_correlation, -1.0, 1.0);
+  vector_.correlation = normalised_correlation_at(turn_rad);
   vector_.frequencies = sum_component_weights();
   // Coefficients have four digits at best, by the noise of pixels and the rounding of phases.
   constexpr double min_noise = 1e-8;
@@ -400,78 +433,37 @@ void check_pair(const HomingView& home, const HomingView& current, int highest) 
           "0 (all) or 1 .. " + to_text(max_highest));
 }
 
-}  // namespace
-
-double HomeVector::length() const noexcept {
-  return std::hypot(xi, eta);
-}
-
-double HomeVector::direction_rad() const noexcept {
-  return std::atan2(eta, xi);
-}
-
-double HomeVector::direction_deviation_rad() const noexcept {
-  const double square = xi * xi + eta * eta;
-  if (!(square > 0.0)) return std::numbers::pi;
-  const double across =
-      eta * eta * covariance[0] - 2.0 * xi * eta * covariance[1] + xi * xi * covariance[4];
-  return std::min(std::sqrt(std::max(0.0, across)) / square, std::numbers::pi);
-}
-
-double HomeVector::log_likelihood() const noexcept {
-  return compute_log_likelihood(frequencies, residual);
-}
-
-bool HomeVector::has_direction() const noexcept {
-  return xi * xi + eta * eta > covariance[0] + covariance[4];
-}
-
-void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
-  using T = FourierHomingOptions;
-  constexpr OptionTable table{
-      option<&T::highest>("highest compared frequency; 0: all", 0, 62),
-      option<&T::iterations>("number of refinements of the solution", 0, 20),
-      option<&T::rising>("compare higher frequencies with each iteration"),
-      choice<&T::turn>("method for the first estimate of the heading", "sequential", "global"),
-      choice<&T::gradient>("views whose gradients are used", "current", "both"),
-      choice<&T::weights>("weights of components and rows", "equal", "coherence"),
-      option<&T::starting_estimates>("number of headings with which the solution is started", 1,
-                                     static_cast<double>(max_starting_estimates)),
-      option<&T::displacement_search>(
-          "first test displacements up to two thirds of R, the typical distance of objects"),
-      option<&T::vertical_motion>(
-          "also model the vertical motion of rows above and below the horizon"),
-      option<&T::tilt>("allow a small tilt of the robot"),
-  };
-  table.visit(options, visitor);
-}
-
-FourierHomingOptions published_homing_options(int highest, int iterations) {
-  return {.highest = highest,
-          .iterations = iterations,
-          .turn = FourierHomingOptions::TurnEstimate::sequential,
-          .gradient = FourierHomingOptions::Gradient::current,
-          .weights = FourierHomingOptions::Weights::equal,
-          .starting_estimates = 1,
-          .displacement_search = false,
-          .vertical_motion = false,
-          .tilt = false};
-}
-
-HomeVector home_vector(const HomingView& home, const HomingView& current,
-                       const FourierHomingOptions& options,
-                       const std::optional<HeadingWindow>& window) {
+PairOfViews make_checked_pair(const HomingView& home, const HomingView& current,
+                              const FourierHomingOptions& options,
+                              const std::optional<HeadingWindow>& window) {
   validate(options);
   check_pair(home, current, options.highest);
-  if (!window) return home_vector_unchecked(home, current, options);
+  const int highest = choose_highest_frequency(home, current, options.highest);
+  if (!window) return {home, current, options, highest};
   require(std::isfinite(window->middle_rad), "heading", window->middle_rad, "finite");
   require(window->half_width_rad > 0.0F && window->half_width_rad <= std::numbers::pi_v<float>,
           "within", window->half_width_rad, "> 0 and <= pi");
   require(options.turn == FourierHomingOptions::TurnEstimate::global, "turn estimate",
           static_cast<double>(options.turn), "global");
-  return PairOfViews(home, current, options,
-                     choose_highest_frequency(home, current, options.highest), *window)
-      .find_vector();
+  return {home, current, options, highest, *window};
+}
+
+}  // namespace
+
+double HomeVector::log_likelihood() const noexcept {
+  return compute_log_likelihood(frequencies, residual);
+}
+
+HomeVector home_vector(const HomingView& home, const HomingView& current,
+                       const FourierHomingOptions& options,
+                       const std::optional<HeadingWindow>& window) {
+  return make_checked_pair(home, current, options, window).find_vector();
+}
+
+double home_vector_correlation(const HomingView& home, const HomingView& current,
+                               const FourierHomingOptions& options,
+                               const std::optional<HeadingWindow>& window) {
+  return make_checked_pair(home, current, options, window).find_correlation();
 }
 
 HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,

@@ -107,6 +107,12 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
                                      const FourierHomingOptions& options = {},
                                      const std::optional<HeadingWindow>& window = std::nullopt);
 
+/// Computes the correlation of `home_vector` alone, to the bit; throws as it. Solves for the
+/// displacement only if several headings compete or the options ask for iterations.
+[[nodiscard]] double home_vector_correlation(
+    const HomingView& home, const HomingView& current, const FourierHomingOptions& options = {},
+    const std::optional<HeadingWindow>& window = std::nullopt);
+
 /// Computes the home vector without checks of options and views, for inner loops.
 [[nodiscard]] HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,
                                                const FourierHomingOptions& options);

@@ -34,12 +34,24 @@ struct VectorPair {
   [[nodiscard]] double match() const noexcept { return vector.correlation + reverse.correlation; }
 };
 
+std::optional<HeadingWindow> reverse_window(std::optional<HeadingWindow> window) {
+  if (window) window->middle_rad = -window->middle_rad;
+  return window;
+}
+
 VectorPair compute_both_ways(const HomingView& home, const HomingView& current,
                              const FourierHomingOptions& options,
                              const std::optional<HeadingWindow>& window) {
-  std::optional<HeadingWindow> back = window;
-  if (back) back->middle_rad = -back->middle_rad;
-  return {home_vector(home, current, options, window), home_vector(current, home, options, back)};
+  return {home_vector(home, current, options, window),
+          home_vector(current, home, options, reverse_window(window))};
+}
+
+/// Returns the sum of the correlations of both vectors, as `VectorPair::match`.
+double compute_match(const HomingView& home, const HomingView& current,
+                     const FourierHomingOptions& options,
+                     const std::optional<HeadingWindow>& window) {
+  return home_vector_correlation(home, current, options, window) +
+         home_vector_correlation(current, home, options, reverse_window(window));
 }
 
 double compute_deviations_over_noise(const HomingView& home, const HomingView& current,
@@ -53,7 +65,7 @@ double compute_deviations_over_noise(const HomingView& home, const HomingView& c
   double mean = 0.0;
   for (std::uint64_t i = 0; i < noise_view_count; ++i) {
     const HomingView sample = noise.sample_view(Random(seed, i));
-    matches.push_back(compute_both_ways(goal, sample, options, window).match());
+    matches.push_back(compute_match(goal, sample, options, window));
     mean += matches.back() / noise_view_count;
   }
   double square = 0.0;
@@ -61,7 +73,7 @@ double compute_deviations_over_noise(const HomingView& home, const HomingView& c
   const double deviation = std::sqrt(square / (noise_view_count - 1));
   constexpr double rounding = 1e-6;
   if (deviation <= rounding) return min_deviations;
-  const double match = compute_both_ways(goal, here, options, window).match();
+  const double match = compute_match(goal, here, options, window);
   return std::clamp((match - mean) / deviation, min_deviations, max_deviations);
 }
 
@@ -136,9 +148,8 @@ PairFeatures compute_pair_features(const HomingView& home, const HomingView& cur
   if (!(pair.vector.correlation > 0.0)) return features;
   features.deviations_over_noise = compute_deviations_over_noise(home, current, options, window);
   features.magnitude_difference = compute_magnitude_difference(home, current);
-  features.excess_over_mirror =
-      to_unbounded(pair.match()) -
-      to_unbounded(compute_both_ways(home, mirror(current), options, window).match());
+  features.excess_over_mirror = to_unbounded(pair.match()) -
+                                to_unbounded(compute_match(home, mirror(current), options, window));
   features.band_agreement =
       compute_band_agreement(home, current, pair.vector.direction_rad(), options, window);
   features.disagreement_rad =
@@ -149,11 +160,9 @@ PairFeatures compute_pair_features(const HomingView& home, const HomingView& cur
 
 double compute_excess_over_mirror(const HomingView& home, const HomingView& current,
                                   double correlation) {
-  // The correlation comes before displacement and tilt are solved.
-  const FourierHomingOptions options{
-      .starting_estimates = 1, .displacement_search = false, .tilt = false};
+  const FourierHomingOptions options{.starting_estimates = 1, .displacement_search = false};
   return to_unbounded(2.0 * correlation) -
-         to_unbounded(2.0 * home_vector(home, mirror(current), options).correlation);
+         to_unbounded(2.0 * home_vector_correlation(home, mirror(current), options));
 }
 
 std::optional<HomeVector> find_second_vector(const HomingView& home, const HomingView& current,

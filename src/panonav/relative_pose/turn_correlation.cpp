@@ -13,7 +13,7 @@ namespace panonav {
 namespace {
 
 /// Points of the grid: 8 for each of 62 frequencies, rounded up to a power of two.
-constexpr int max_points = 512;
+constexpr std::size_t max_points = 512;
 
 CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
   const std::size_t count = static_cast<std::size_t>(correlation.highest) + 1;
@@ -37,17 +37,22 @@ float refine_peak(const TurnCorrelation& correlation, float turn_rad,
   return turn;
 }
 
+/// Cosines and sines of the grids of all sizes: that of n points, a power of two, begins at n.
 struct CircleTable {
-  std::array<float, max_points> cosine, sine;
+  std::array<float, 2 * max_points> cosine, sine;
 };
 
 const CircleTable& unit_circle() {
   static const CircleTable made = [] {
     CircleTable table{};
-    for (int i = 0; i < max_points; ++i) {
-      const double angle = 2.0 * std::numbers::pi * i / max_points;
-      table.cosine[static_cast<std::size_t>(i)] = static_cast<float>(std::cos(angle));
-      table.sine[static_cast<std::size_t>(i)] = static_cast<float>(std::sin(angle));
+    for (std::size_t count = 16; count <= max_points; count *= 2) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const double angle = 2.0 * std::numbers::pi *
+                             static_cast<double>(i * (max_points / count)) /
+                             static_cast<double>(max_points);
+        table.cosine[count + i] = static_cast<float>(std::cos(angle));
+        table.sine[count + i] = static_cast<float>(std::sin(angle));
+      }
     }
     return table;
   }();
@@ -60,14 +65,12 @@ std::size_t evaluate_on_grid(const TurnCorrelation& correlation,
                              std::array<float, max_points>& values) noexcept {
   std::size_t count = 16;
   while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
-  const std::size_t stride = max_points / count;
   const CircleTable& table = unit_circle();
-  std::array<float, max_points> cosine, sine, imaginary;
-  for (std::size_t i = 0; i < count; ++i) {
-    cosine[i] = table.cosine[i * stride];
-    sine[i] = table.sine[i * stride];
-    values[i] = imaginary[i] = 0.0F;
-  }
+  const float* const cosine = table.cosine.data() + count;
+  const float* const sine = table.sine.data() + count;
+  std::array<float, max_points> imaginary;
+  std::fill_n(values.begin(), count, 0.0F);
+  std::fill_n(imaginary.begin(), count, 0.0F);
   // Horner's rule for all points at once: (sum + term) exp(-j sigma).
   for (int k = correlation.highest; k >= 1; --k) {
     const float term_real = correlation.real[static_cast<std::size_t>(k)];
