@@ -4,7 +4,8 @@
 add_custom_target(panonav_installed)
 
 # panonav_module(NAME [APART] [SOURCES ...] [DEPENDS modules of ours ...] [LINK public libraries ...]
-#                [LINK_PRIVATE libraries that no public header shows ...] [PACKAGES that find those ...])
+#                [LINK_PRIVATE libraries that no public header shows ...] [LATE such that only some programs need ...]
+#                [PACKAGES that find those ...])
 # Makes the static library panonav_NAME with the alias panonav::NAME of the sources beside the CMake file and in its
 # folder `internal`, unless SOURCES names others. Headers are included as "panonav/NAME/x.hpp", those of a component
 # (a folder of src) as "panonav_NAME/x.hpp"; those in `internal` are the module's own and are not installed. Each module
@@ -12,7 +13,7 @@ add_custom_target(panonav_installed)
 # With BUILD_SHARED_LIBS the modules are parts of one libpanonav (panonav_one_library), and panonav::NAME is that library
 # with the headers of the module and of those before it. APART: a static library that uses libpanonav, for the command.
 function(panonav_module name)
-  cmake_parse_arguments(ARG "APART" "" "SOURCES;DEPENDS;LINK;LINK_PRIVATE;PACKAGES" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "" "SOURCES;DEPENDS;LINK;LINK_PRIVATE;LATE;PACKAGES" ${ARGN})
   set(target panonav_${name})
   cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR}/src OUTPUT_VARIABLE folder)
   if(NOT ARG_SOURCES)
@@ -28,7 +29,16 @@ function(panonav_module name)
     set(prefix panonav::)
   endif()
   list(TRANSFORM ARG_DEPENDS PREPEND ${prefix} OUTPUT_VARIABLE libraries)
-  target_link_libraries(${target} PUBLIC ${libraries} ${ARG_LINK} PRIVATE ${ARG_LINK_PRIVATE})
+  target_link_libraries(${target} PUBLIC ${libraries} ${ARG_LINK} PRIVATE ${ARG_LINK_PRIVATE} ${ARG_LATE})
+  foreach(library IN LISTS ARG_LATE)
+    if(TARGET ${library})
+      get_target_property(library ${library} LOCATION)
+    endif()
+    file(REAL_PATH ${library} library)
+    if(library MATCHES "\\.so")
+      set_property(GLOBAL APPEND PROPERTY PANONAV_LATE_${name} ${library})
+    endif()
+  endforeach()
   panonav_warnings(${target})
   panonav_precompile(${target})
   if(BUILD_SHARED_LIBS AND ARG_APART)
@@ -213,6 +223,7 @@ function(panonav_one_library)
   set_target_properties(panonav_library PROPERTIES OUTPUT_NAME panonav EXPORT_NAME library
     VERSION ${PANONAV_ABI}.${PROJECT_VERSION} SOVERSION ${PANONAV_ABI} LINK_DEPENDS ${exports}
     LINKER_LANGUAGE CXX LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
+  panonav_load_late(panonav_library ${ARGN})
   add_dependencies(panonav_installed panonav_library)
   install(TARGETS panonav_library EXPORT panonav_library
           LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)

@@ -63,14 +63,21 @@ function(panonav_package component section depends summary text)
   endforeach()
 endfunction()
 set(same_library "${library_package} (= ${PROJECT_VERSION}-1)")
+# What is loaded late (panonav_load_late) stands in no ELF file.
+foreach(target command library)
+  get_property(late_packages GLOBAL PROPERTY PANONAV_LATE_PACKAGES_panonav_${target})
+  list(JOIN late_packages ", " late_of_${target})
+endforeach()
+set(command_needs ${same_library} ${late_of_command})
+list(JOIN command_needs ", " command_needs)
 set(about "A robot with one omnidirectional camera remembers what places look like,
 and knows from that memory alone where it is, which way it faces, and when
 it is somewhere that it has never been.")
-panonav_package(command science "${same_library}" "image-based memory for robot navigation (command)" "${about}
+panonav_package(command science "${command_needs}" "image-based memory for robot navigation (command)" "${about}
 .
 This package holds the command panonav with its viewer, manual pages and
 completion for bash, zsh and fish.")
-panonav_package(library libs "" "image-based memory for robot navigation (library)" "${about}
+panonav_package(library libs "${late_of_library}" "image-based memory for robot navigation (library)" "${about}
 .
 This package holds the shared library.")
 panonav_package(development libdevel "${same_library}" "image-based memory for robot navigation (development files)"

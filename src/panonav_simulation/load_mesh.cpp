@@ -4,7 +4,6 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
-#include <assimp/DefaultIOSystem.h>
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "panonav_simulation/internal/collada_repair.hpp"
 #include "panonav_simulation/internal/gazebo_files.hpp"
 #include "panonav_simulation/internal/mesh_library.hpp"
+#include "panonav_simulation/internal/regular_files.hpp"
 
 namespace panonav::simulation {
 
@@ -125,20 +125,6 @@ struct MeshCollector {
   }
 };
 
-// Opens the files that a mesh file names (materials, buffers); reports all but regular files as
-// missing.
-class RegularFiles final : public Assimp::DefaultIOSystem {
- public:
-  Assimp::IOStream* Open(const char* file, const char* mode) override {
-    try {
-      require_scene_file(file);
-    } catch (const FileError&) {
-      return nullptr;
-    }
-    return Assimp::DefaultIOSystem::Open(file, mode);
-  }
-};
-
 // Reads a COLLADA file, repaired; as it is if it is no XML.
 const aiScene* read_collada(Assimp::Importer& importer, const fs::path& path) {
   try {
@@ -199,7 +185,7 @@ const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) 
 std::vector<FileMesh> MeshLibrary::import_file(const fs::path& path, UpAxis up) {
   require_scene_file(path);
   Assimp::Importer importer;
-  importer.SetIOHandler(new RegularFiles);  // the importer takes ownership
+  importer.SetIOHandler(make_regular_files());  // the importer takes ownership
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,

@@ -1,6 +1,7 @@
 #include "panonav_simulation/load_mesh.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -241,6 +242,13 @@ TEST_F(MeshFile, AllPrimitivesOfColladaAreRead) {
       }
     }
   }
+}
+
+TEST_F(MeshFile, PipesThatAMeshNamesAreMissingFiles) {
+  ASSERT_EQ(mkfifo((folder_ / "pipe.mtl").c_str(), 0600), 0);
+  const auto mesh =
+      folder_.write("m.obj", "mtllib pipe.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n");
+  EXPECT_EQ(load_mesh(mesh).meshes.size(), 1U);  // the program does not wait for a writer
 }
 
 TEST_F(MeshFile, BrokenFilesGiveOneClearLine) {
