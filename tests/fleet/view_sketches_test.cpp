@@ -132,6 +132,23 @@ TEST(ViewSketches, AlmostAllViewsAreRuledOutAndFewStatementsAreAsked) {
   EXPECT_LT(all.sketches.bytes(), 7000U * 1700);
 }
 
+TEST(ViewSketches, NoiseIsComparedWithFewViewsBecauseNoneHasItsMagnitudes) {
+  Sketched all({80, 15}, Kind::clustered, 42);
+  all.insert(7000);
+  ViewMaker noise({80, 15}, Kind::random, 43);
+  std::vector<std::uint8_t> rows(80, 1);
+  std::fill_n(rows.begin(), 20, 0);
+  std::uint64_t in_full = 0;
+  Executor executor;
+  for (int i = 0; i < 8; ++i) {
+    const PackedSignature query = noise.next();
+    all.expect_exact(query, 10, i % 3, {});
+    all.expect_exact(query, 10, 0, {{}, rows});
+    in_full += all.sketches.search(query, {10, 0}, {}, all.read(), executor).views_in_full;
+  }
+  EXPECT_LT(in_full, 8U * 700);
+}
+
 TEST(ViewSketches, AnEmptyOneFindsNothing) {
   Sketched none({80, 15}, Kind::random, 1);
   EXPECT_EQ(none.sketches.size(), 0U);

@@ -180,6 +180,45 @@ TEST_P(Distance, CellTablesAreLowerBounds) {
   EXPECT_GT(large, 10);
 }
 
+TEST_P(Distance, ACodeOfAQueryIsTheNearestOnTheScaleAndItsErrorLowersTheConstant) {
+  Random random(16);
+  constexpr std::size_t groups = 5;
+  std::vector<std::int32_t> sums, flags, offsets, highest;
+  std::vector<std::uint64_t> steps;
+  std::vector<float> inverse_steps;
+  std::vector<std::uint8_t> expected;
+  std::int32_t expected_constant = 0;
+  int outside_scale = 0;
+  for (std::size_t i = 0; i < 8 * groups; ++i) {
+    if (i % 8 == 0) {
+      steps.push_back(1 + random.index(60));
+      inverse_steps.push_back(1.0F / static_cast<float>(steps.back()));
+    }
+    const auto step = static_cast<std::int32_t>(steps.back());
+    offsets.push_back(static_cast<std::int32_t>(random.index(3000)));
+    highest.push_back(offsets.back() + static_cast<std::int32_t>(random.index(255 * steps.back())));
+    sums.push_back(static_cast<std::int32_t>(random.index(12000)));
+    flags.push_back(random.index(5) == 0 ? 0 : 1);
+    const std::int32_t inside = std::clamp(sums.back(), offsets.back(), highest.back());
+    const std::int32_t code = std::min(255, (2 * (inside - offsets.back()) + step) / (2 * step));
+    const std::int32_t missed = std::abs(inside - offsets.back() - code * step);
+    expected.push_back(static_cast<std::uint8_t>(flags.back() * code));
+    expected_constant += flags.back() * (std::abs(sums.back() - inside) - missed);
+    outside_scale += sums.back() != inside ? 1 : 0;
+  }
+  std::vector<std::uint8_t> values(8 * groups);
+  EXPECT_EQ(kernels.encode_query(
+                sums.data(), flags.data(),
+                {offsets.data(), highest.data(), steps.data(), inverse_steps.data(), groups},
+                values.data()),
+            expected_constant);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    // In the middle between two codes, either is the nearest.
+    EXPECT_NEAR(values[i], expected[i], (steps[i / 8] % 2 == 0) ? 1 : 0) << i;
+  }
+  EXPECT_GT(outside_scale, 10);
+}
+
 TEST_P(Distance, SketchBoundsOfPickedViewsAreThoseOfTheInterleavedOnes) {
   Random random(13);
   for (std::size_t groups = 8; groups <= 40; groups += 8) {

@@ -17,6 +17,15 @@ enum class Instructions {
   neon     ///< ARM of 64 bit
 };
 
+/// Scale by which sums become bytes, in groups of 8 sums.
+struct SumScale {
+  const int32_t *offsets,      ///< sum with code 0, one for each sum
+      *highest;                ///< largest sum within the scale, one for each sum
+  const uint64_t* steps;       ///< difference of two codes, one for each group, at least 1
+  const float* inverse_steps;  ///< 1 / step, one for each group
+  size_t groups;               ///< number of groups
+};
+
 /// Integer kernels of the search in a visual memory, for one instruction set. All sets give
 /// identical results. The kernels neither allocate nor throw.
 struct DistanceKernels {
@@ -64,6 +73,13 @@ struct DistanceKernels {
   void (*cell_tables)(const int32_t* low, const int32_t* high, const int32_t* sums,
                       const float* factors, size_t dimensions, uint8_t* tables);
 
+  /// Encodes the sums of a query for `SketchQuery`: clamps each to the scale and writes its nearest
+  /// code, or 0 where its flag is 0, to `values`. Returns the sum, over the sums with flag 1, of
+  /// the distance from the scale minus the rounding error of the code: its share of
+  /// `SketchQuery::constant`.
+  int32_t (*encode_query)(const int32_t* sums, const int32_t* flags, const SumScale& scale,
+                          uint8_t* values);
+
   /// Computes, for each view v of `blocks` blocks of `cell_block` views, bounds[v] = sum over its
   /// dimensions d of tables[16 * d + code], at most 255. Writes the indices of the views with
   /// bounds <= query.limit, ascending, to `indices`, which has room for all views, and returns
@@ -77,15 +93,6 @@ struct DistanceKernels {
   /// has room for `count` entries and 16 more.
   size_t (*collect_at_most)(const uint32_t* values, size_t count, uint32_t limit,
                             uint32_t* indices);
-};
-
-/// Scale by which sums become bytes, in groups of 8 sums.
-struct SumScale {
-  const int32_t *offsets,      ///< sum with code 0, one for each sum
-      *highest;                ///< largest sum within the scale, one for each sum
-  const uint64_t* steps;       ///< difference of two codes, one for each group, at least 1
-  const float* inverse_steps;  ///< 1 / step, one for each group
-  size_t groups;               ///< number of groups
 };
 
 /// Result of encoding sums.

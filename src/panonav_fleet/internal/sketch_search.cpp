@@ -24,15 +24,17 @@ struct SketchedView {
 
 /// Buffers of a thread, reused for one segment after the other.
 struct SegmentScratch {
-  explicit SegmentScratch(const SegmentLayout& layout)
-      : query_buffers(layout),
+  SegmentScratch(const SegmentLayout& layout, const SegmentQuery& query_)
+      : clamped(layout.shape().size()),
+        values(layout.dimensions(2)),
         tables(layout.dimensions(0) * 16),
         bounds(layout.max_rows()),
         indices(layout.max_rows()),
-        level_bounds(layout.max_rows()) {}
-  SketchSegment::QueryBuffers query_buffers;
-  AlignedVector<std::uint8_t> tables, bounds;
+        level_bounds(layout.max_rows()),
+        query(query_) {}
+  AlignedVector<std::uint8_t> clamped, values, tables, bounds;
   std::vector<std::uint32_t> indices, level_bounds;
+  SegmentQuery query;  // as it is compared with the present segment
   std::uint64_t bytes_read = 0;
 };
 
@@ -47,7 +49,8 @@ class SketchSearch {
         read_(read),
         executor_(executor),
         top_(top),
-        nearest_(top, std::numeric_limits<std::int32_t>::max()) {
+        nearest_(top, std::numeric_limits<std::int32_t>::max()),
+        query_(layout, query.magnitudes, components, mask.allowed_rows) {
     const auto rows = static_cast<std::size_t>(layout.shape().rows);
     magnitudes_.assign(query.magnitudes.begin(), query.magnitudes.end());
     compared_bytes_ = static_cast<std::size_t>(components) * rows;
@@ -58,9 +61,6 @@ class SketchSearch {
     }
     excluded_.assign(mask.excluded_views.begin(), mask.excluded_views.end());
     std::ranges::sort(excluded_);
-    query_.sums.resize(layout.total());
-    layout.sum_blocks(query.magnitudes.data(), query_.sums.data());
-    query_.sum_flags = layout.make_sum_flags(components, mask.allowed_rows);
   }
 
   SearchResult run() {
@@ -75,15 +75,18 @@ class SketchSearch {
     return !excluded_.empty() && std::ranges::binary_search(excluded_, view);
   }
 
+  [[nodiscard]] std::uint32_t compute_distance(const std::uint8_t* magnitudes) const {
+    return mask_.empty()
+               ? kernels_.l1(magnitudes, magnitudes_.data(), compared_bytes_)
+               : kernels_.masked_l1(magnitudes, magnitudes_.data(), mask_.data(), compared_bytes_);
+  }
+
   void compare(ViewId view, std::span<const std::uint8_t> magnitudes) {
     require(magnitudes.size() == layout_.shape().size(), "magnitudes of a view that was read",
             static_cast<double>(magnitudes.size()), std::to_string(layout_.shape().size()));
     ++result_.views_in_full;
     result_.bytes_read += compared_bytes_;
-    nearest_.insert_if_nearer(
-        {view, mask_.empty() ? kernels_.l1(magnitudes.data(), magnitudes_.data(), compared_bytes_)
-                             : kernels_.masked_l1(magnitudes.data(), magnitudes_.data(),
-                                                  mask_.data(), compared_bytes_)});
+    nearest_.insert_if_nearer({view, compute_distance(magnitudes.data())});
   }
 
   /// Reads and compares candidates in full, except those that were compared before.
@@ -101,7 +104,39 @@ class SketchSearch {
     const auto middle = static_cast<std::ptrdiff_t>(compared_.size());
     compared_.insert(compared_.end(), unread.begin(), unread.end());
     std::ranges::inplace_merge(compared_, compared_.begin() + middle);
-    query_.choose_unit(layout_, nearest_.limit());
+    choose_limit(nearest_.limit());
+  }
+  /// Bounds up to `limit` are distinguished from now on.
+  void choose_limit(std::uint32_t limit) {
+    distinguished_limit_ = limit;
+    query_.choose_unit(layout_, limit);
+  }
+
+  /// Clamps a query with magnitudes that no view of the segment has, such as noise, to those of
+  /// the segment, which makes its bounds much larger.
+  void clamp_query_if_needed(const SketchSegment& segment, SegmentScratch& scratch) const {
+    if (!clamps_query_) return;
+    segment.clamp(magnitudes_, scratch.clamped);
+    scratch.query.outside = compute_distance(scratch.clamped.data());
+    layout_.sum_blocks(scratch.clamped.data(), scratch.query.sums.data());
+    scratch.query.choose_unit(
+        layout_, distinguished_limit_ - std::min(distinguished_limit_, scratch.query.outside));
+  }
+  void prepare_cells(const SketchSegment& segment, SegmentScratch& scratch) const {
+    clamp_query_if_needed(segment, scratch);
+    segment.make_cell_tables(layout_, kernels_, scratch.query, scratch.tables);
+  }
+  /// True if the magnitudes of the query lie so far outside those of all of some segments that the
+  /// cells distinguish it.
+  [[nodiscard]] bool is_clamping_worthwhile() const {
+    constexpr std::size_t compared_segments = 16;
+    AlignedVector<std::uint8_t> clamped(magnitudes_.size());
+    const std::size_t step = (segments_.size() + compared_segments - 1) / compared_segments;
+    for (std::size_t i = 0; i < segments_.size(); i += step) {
+      segments_[i].sketches->clamp(magnitudes_, clamped);
+      if (compute_distance(clamped.data()) < query_.unit) return false;
+    }
+    return true;
   }
 
   static bool is_better(const SketchedView& a, const SketchedView& b) {
@@ -119,14 +154,14 @@ class SketchSearch {
                                                      std::size_t count,
                                                      SegmentScratch& scratch) const {
     scratch.bytes_read += count * kernels::cell_block * layout_.dimensions(0) / 2;
-    return segment.compute_cell_bounds(layout_, kernels_, query_, scratch.tables, limit, first,
-                                       count, scratch.bounds, scratch.indices);
+    return segment.compute_cell_bounds(layout_, kernels_, scratch.query, scratch.tables, limit,
+                                       first, count, scratch.bounds, scratch.indices);
   }
   /// Writes the lower bounds of rows at a level to scratch.level_bounds.
   void compute_level_bounds(const SketchSegment& segment, int level,
                             std::span<const std::uint32_t> rows, SegmentScratch& scratch) const {
     scratch.bytes_read += rows.size() * layout_.dimensions(level);
-    segment.compute_level_bounds(layout_, kernels_, query_, level, rows, scratch.query_buffers,
+    segment.compute_level_bounds(layout_, kernels_, scratch.query, level, rows, scratch.values,
                                  scratch.level_bounds.data());
   }
 
@@ -135,14 +170,17 @@ class SketchSearch {
   template <class Body>
   void for_each_segment(std::size_t begin, std::size_t end, std::size_t chunk, const Body& body) {
     std::vector<std::uint64_t> bytes((end - begin + chunk - 1) / chunk);
-    executor_.for_each_chunk(end - begin, chunk,
-                             [&](std::size_t from, std::size_t to, std::size_t number) {
-                               SegmentScratch scratch(layout_);
-                               for (std::size_t i = from; i < to; ++i) {
-                                 body(order_[begin + i].second, begin + i, scratch, number);
-                               }
-                               bytes[number] = scratch.bytes_read;
-                             });
+    executor_.for_each_chunk(
+        end - begin, chunk, [&](std::size_t from, std::size_t to, std::size_t number) {
+          SegmentScratch scratch(layout_, query_);
+          for (std::size_t i = from; i < to; ++i) {
+            if (i + 1 < to) {
+              segments_[order_[begin + i + 1].second].sketches->prefetch_tables();
+            }
+            body(order_[begin + i].second, begin + i, scratch, number);
+          }
+          bytes[number] = scratch.bytes_read;
+        });
     for (const std::uint64_t of_chunk : bytes) result_.bytes_read += of_chunk;
   }
 
@@ -152,7 +190,7 @@ class SketchSearch {
     std::ranges::sort(candidates, {}, [](const SketchedView& candidate) {
       return std::pair(candidate.segment, candidate.row);
     });
-    SegmentScratch scratch(layout_);
+    SegmentScratch scratch(layout_, query_);
     std::vector<std::uint32_t> rows;
     for (std::size_t begin = 0; begin < candidates.size();) {
       const std::uint32_t number = candidates[begin].segment;
@@ -161,7 +199,9 @@ class SketchSearch {
       for (; end < candidates.size() && candidates[end].segment == number; ++end) {
         rows.push_back(candidates[end].row);
       }
-      compute_level_bounds(*segments_[number].sketches, level, rows, scratch);
+      const SketchSegment& sketches = *segments_[number].sketches;
+      clamp_query_if_needed(sketches, scratch);
+      compute_level_bounds(sketches, level, rows, scratch);
       for (std::size_t i = begin; i < end; ++i) {
         candidates[i].bound = scratch.level_bounds[i - begin];
       }
@@ -177,7 +217,8 @@ class SketchSearch {
     for (std::size_t i = 0; i < segments_.size(); ++i) {
       order_.emplace_back(0U, static_cast<std::uint32_t>(i));
     }
-    query_.choose_unit(layout_, estimate_median_bound(*segments_.front().sketches));
+    choose_limit(estimate_median_bound(*segments_.front().sketches));
+    clamps_query_ = is_clamping_worthwhile();
     if (segments_.size() > first_segments) {
       for_each_segment(0, order_.size(), 64,
                        [this](std::uint32_t number, std::size_t index, SegmentScratch& scratch,
@@ -211,8 +252,8 @@ class SketchSearch {
 
   std::uint32_t find_sample_minimum(const SketchSegment& segment, std::size_t number,
                                     SegmentScratch& scratch) const {
-    segment.make_cell_tables(layout_, kernels_, query_, scratch.tables);
-    std::uint32_t min_bound = std::numeric_limits<std::uint32_t>::max();
+    prepare_cells(segment, scratch);
+    std::uint32_t min_bound = 255;
     for (std::size_t block = number % sampled_every; block < segment.blocks();
          block += sampled_every) {
       compute_cell_bounds(segment, 0, block, 1, scratch);
@@ -221,7 +262,7 @@ class SketchSearch {
       min_bound = std::min<std::uint32_t>(
           min_bound, *std::ranges::min_element(std::span(scratch.bounds).first(rows)));
     }
-    return min_bound;
+    return scratch.query.outside + min_bound * scratch.query.unit;
   }
 
   /// Finds the best views of a segment by the bounds of their cells.
@@ -229,7 +270,7 @@ class SketchSearch {
                     std::vector<SketchedView>& best) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
-    sketches.make_cell_tables(layout_, kernels_, query_, scratch.tables);
+    prepare_cells(sketches, scratch);
     compute_cell_bounds(sketches, 0, 0, sketches.blocks(), scratch);
     // Finds the smallest limit that enough of the bounds do not exceed.
     std::array<std::size_t, 256> counts{};
@@ -241,7 +282,8 @@ class SketchSearch {
     for (std::uint32_t row = 0; row < sketches.rows(); ++row) {
       if (scratch.bounds[row] > limit || !segment.has(row)) continue;
       const ViewId view = sketches.views()[row];
-      if (!is_excluded(view)) best.push_back({scratch.bounds[row], number, row, view});
+      const std::uint32_t bound = scratch.query.outside + scratch.bounds[row] * scratch.query.unit;
+      if (!is_excluded(view)) best.push_back({bound, number, row, view});
     }
   }
 
@@ -251,7 +293,7 @@ class SketchSearch {
     for (std::uint32_t row = 0; row < std::min<std::size_t>(64, segment.rows()); ++row) {
       rows.push_back(row);
     }
-    SegmentScratch scratch(layout_);
+    SegmentScratch scratch(layout_, query_);
     compute_level_bounds(segment, 1, rows, scratch);
     const auto bounds = std::span(scratch.level_bounds).first(rows.size());
     const auto middle = bounds.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
@@ -286,7 +328,8 @@ class SketchSearch {
                       std::vector<SketchedView>& found) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
-    sketches.make_cell_tables(layout_, kernels_, query_, scratch.tables);
+    prepare_cells(sketches, scratch);
+    if (scratch.query.outside > limit) return;
     const auto passed = compute_cell_bounds(sketches, limit, 0, sketches.blocks(), scratch);
     // Filters in place: kept entries are written before the current one.
     const std::span<std::uint32_t> rows(scratch.indices.data(), passed.size());
@@ -340,6 +383,8 @@ class SketchSearch {
   std::size_t top_;
   NearestMatches nearest_;
   SegmentQuery query_;
+  std::uint32_t distinguished_limit_ = 0;
+  bool clamps_query_ = false;
   AlignedVector<std::uint8_t> magnitudes_, mask_;  // empty mask: all rows are compared
   std::size_t compared_bytes_ = 0;
   std::vector<ViewId> excluded_;                                // ascending

@@ -111,6 +111,16 @@ SketchSegment::SketchSegment(const SegmentLayout& layout, std::span<const ViewId
   begins_[1] = round_up(padded * layout.dimensions(0) / 2, 64);
   begins_[2] = begins_[1] + padded * layout.dimensions(1);
   codes_.resize(begins_[2] + padded * layout.dimensions(2));
+  const std::size_t view_bytes = layout.shape().size();
+  lowest_.assign(magnitudes.begin(), magnitudes.begin() + static_cast<std::ptrdiff_t>(view_bytes));
+  highest_ = lowest_;
+  for (std::size_t row = 1; row < views.size(); ++row) {
+    const std::uint8_t* const view = magnitudes.data() + row * view_bytes;
+    for (std::size_t i = 0; i < view_bytes; ++i) {
+      lowest_[i] = std::min(lowest_[i], view[i]);
+      highest_[i] = std::max(highest_[i], view[i]);
+    }
+  }
   make_cells(layout, sums);
   make_level(layout, 1, sums);
   make_level(layout, 2, sums);
@@ -122,7 +132,8 @@ std::size_t SketchSegment::blocks() const noexcept {
 
 std::uint64_t SketchSegment::bytes() const noexcept {
   std::uint64_t bytes = codes_.size() + views_.size() * sizeof(ViewId) +
-                        (cell_low_.size() + cell_high_.size()) * sizeof(std::int32_t);
+                        (cell_low_.size() + cell_high_.size()) * sizeof(std::int32_t) +
+                        lowest_.size() + highest_.size();
   for (const Scale& scale : scales_) {
     bytes += (2 * scale.offsets.size() + scale.max_missed.size()) * sizeof(std::int32_t) +
              scale.steps.size() * (sizeof(std::uint64_t) + sizeof(float));
@@ -236,6 +247,18 @@ void SketchSegment::make_level(const SegmentLayout& layout, int level,
   }
 }
 
+SegmentQuery::SegmentQuery(const SegmentLayout& layout, std::span<const std::uint8_t> magnitudes,
+                           int components, std::span<const std::uint8_t> allowed_rows)
+    : sums(layout.total()), sum_flags(layout.make_sum_flags(components, allowed_rows)) {
+  layout.sum_blocks(magnitudes.data(), sums.data());
+  for (std::size_t i = layout.dimensions(0); i < sum_flags.size(); ++i) {
+    mask.push_back(sum_flags[i] != 0 ? 255 : 0);
+  }
+  for (std::size_t i = 0; i < mask.size(); i += sums_per_step) {
+    group_flags.push_back(std::ranges::count(std::span(mask).subspan(i, sums_per_step), 255) > 0);
+  }
+}
+
 void SegmentQuery::choose_unit(const SegmentLayout& layout, std::uint32_t largest) {
   constexpr std::uint32_t max_code = 254;
   unit = largest / max_code + 1;
@@ -244,6 +267,27 @@ void SegmentQuery::choose_unit(const SegmentLayout& layout, std::uint32_t larges
   factors.resize(layout.dimensions(0));
   for (std::size_t d = 0; d < factors.size(); ++d) {
     factors[d] = static_cast<float>(sum_flags[d]) * inverse;
+  }
+}
+
+void SketchSegment::clamp(std::span<const std::uint8_t> magnitudes,
+                          std::span<std::uint8_t> clamped) const {
+  for (std::size_t i = 0; i < clamped.size(); ++i) {
+    clamped[i] = std::min(std::max(magnitudes[i], lowest_[i]), highest_[i]);
+  }
+}
+
+void SketchSegment::prefetch_tables() const noexcept {
+  const auto prefetch = [](const auto& numbers) {
+    const auto* const bytes = reinterpret_cast<const char*>(numbers.data());
+    const std::size_t count = numbers.size() * sizeof(numbers[0]);
+    for (std::size_t i = 0; i < count; i += 64) __builtin_prefetch(bytes + i);
+  };
+  prefetch(cell_low_);
+  prefetch(cell_high_);
+  for (const Scale& scale : scales_) {
+    prefetch(scale.offsets);
+    prefetch(scale.highest);
   }
 }
 
@@ -260,14 +304,12 @@ std::span<const std::uint32_t> SketchSegment::compute_cell_bounds(
     std::span<const std::uint8_t> tables, std::uint32_t limit, std::size_t first, std::size_t count,
     std::span<std::uint8_t> bounds, std::span<std::uint32_t> indices) const {
   const std::size_t pairs = layout.dimensions(0) / 2;
-  const auto units = static_cast<std::uint8_t>(std::min(limit / query.unit, 255U));
+  const std::uint32_t inside = limit - std::min(limit, query.outside);
+  const auto units = static_cast<std::uint8_t>(std::min(inside / query.unit, 255U));
   return indices.first(kernels.cell_bounds(codes_.data() + first * kernels::cell_block * pairs,
                                            count, {tables.data(), pairs, units}, bounds.data(),
                                            indices.data()));
 }
-
-SketchSegment::QueryBuffers::QueryBuffers(const SegmentLayout& layout)
-    : values(layout.dimensions(2)), mask(layout.dimensions(2)) {}
 
 // The sums of all views are within the scale, so the part of the query's sum outside of it is
 // part of the distance.
@@ -275,37 +317,29 @@ void SketchSegment::compute_level_bounds(const SegmentLayout& layout,
                                          const kernels::DistanceKernels& kernels,
                                          const SegmentQuery& query, int level,
                                          std::span<const std::uint32_t> rows,
-                                         QueryBuffers& query_buffers, std::uint32_t* bounds) const {
+                                         std::span<std::uint8_t> values,
+                                         std::uint32_t* bounds) const {
   const Scale& scale = scales_[static_cast<std::size_t>(level) - 1];
   const std::size_t groups = scale.steps.size();
-  std::size_t begin = layout.dimensions(0);
-  if (level == 2) begin += layout.dimensions(1);
-  std::int32_t constant = 0;
+  const std::size_t begin = level == 2 ? layout.dimensions(1) : 0;  // among levels 1 and 2
+  const std::size_t sums_begin = layout.dimensions(0) + begin;
+  const std::int32_t constant =
+      kernels.encode_query(query.sums.data() + sums_begin, query.sum_flags.data() + sums_begin,
+                           {scale.offsets.data(), scale.highest.data(), scale.steps.data(),
+                            scale.inverse_steps.data(), groups},
+                           values.data());
   std::int32_t slack = 0;
   for (std::size_t group = 0; group < groups; ++group) {
-    const auto step = static_cast<std::int32_t>(scale.steps[group]);
-    std::int32_t any = 0;
-    for (std::size_t d = group * sums_per_step; d < (group + 1) * sums_per_step; ++d) {
-      const std::int32_t counts = query.sum_flags[begin + d];
-      const std::int32_t sum = query.sums[begin + d];
-      const std::int32_t inside = std::clamp(sum, scale.offsets[d], scale.highest[d]);
-      const std::int32_t above = inside - scale.offsets[d];
-      const float scaled = static_cast<float>(above) * scale.inverse_steps[group] + 0.5F;
-      const auto code = static_cast<std::int32_t>(std::min(scaled, 255.0F));
-      any |= counts;
-      constant += counts * (std::abs(sum - inside) - std::abs(above - code * step));
-      query_buffers.values[d] = static_cast<std::uint8_t>(counts * code);
-      query_buffers.mask[d] = static_cast<std::uint8_t>(counts * 255);
-    }
-    slack += any * scale.max_missed[group];
+    if (query.group_flags[begin / sums_per_step + group]) slack += scale.max_missed[group];
   }
-  const kernels::DistanceKernels::SketchQuery encoded{query_buffers.values.data(),
-                                                      query_buffers.mask.data(),
-                                                      scale.steps.data(),
-                                                      groups,
-                                                      groups,
-                                                      constant,
-                                                      std::min(slack, scale.max_slack)};
+  const kernels::DistanceKernels::SketchQuery encoded{
+      values.data(),
+      query.mask.data() + begin,
+      scale.steps.data(),
+      groups,
+      groups,
+      constant + static_cast<std::int32_t>(query.outside),
+      std::min(slack, scale.max_slack)};
   kernels.sketch_bounds_at(codes_.data() + begins_[static_cast<std::size_t>(level)], nullptr,
                            rows.data(), rows.size(), encoded, bounds);
 }

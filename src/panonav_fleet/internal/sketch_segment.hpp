@@ -58,10 +58,15 @@ class SegmentLayout {
 struct SegmentQuery {
   std::vector<std::int32_t> sums;       ///< as `SegmentLayout::sum_blocks` computes them
   std::vector<std::int32_t> sum_flags;  ///< 1: the sum is compared; 0: it is not
+  AlignedVector<std::uint8_t> mask;     ///< for each sum of levels 1 and 2: 255 or 0, as its flag
+  std::vector<bool> group_flags;        ///< for each group of levels 1 and 2: a sum is compared
   std::vector<float> factors;           ///< for each cell: its flag divided by `unit`
   std::uint32_t unit = 1;               ///< dissimilarity of one step of a cell bound
+  std::uint32_t outside = 0;            ///< added to every bound, see `SketchSegment::clamp`
 
-  /// Sets `unit` and `factors` so that cell bounds up to `largest` are distinguished.
+  SegmentQuery(const SegmentLayout& layout, std::span<const std::uint8_t> magnitudes,
+               int components, std::span<const std::uint8_t> allowed_rows);
+  /// Sets `unit` and `factors` so that bounds up to `largest` are distinguished.
   void choose_unit(const SegmentLayout& layout, std::uint32_t largest);
 };
 
@@ -81,27 +86,29 @@ class SketchSegment {
   /// Returns the bytes of the sketches, including the padding of the last block.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
 
+  /// Clamps magnitudes to the smallest and largest of each row and component in this segment. The
+  /// distance of the query from the clamped one is part of its distance from every view.
+  void clamp(std::span<const std::uint8_t> magnitudes, std::span<std::uint8_t> clamped) const;
+  /// Loads the tables of the segment into the cache, because a search reads them soon.
+  void prefetch_tables() const noexcept;
+
   /// Computes what each cell code adds to the bounds, in whole units, rounded down.
   void make_cell_tables(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
                         const SegmentQuery& query, std::span<std::uint8_t> tables) const;
-  /// Computes bounds in units (255: that or more) of the rows of `count` blocks from block `first`
-  /// on. Returns indices, from the first of these blocks, of the rows whose bound may be at most
-  /// `limit`.
+  /// Computes bounds, less `query.outside`, in units (255: that or more) of the rows of `count`
+  /// blocks from block `first` on. Returns indices, from the first of these blocks, of the rows
+  /// whose bound may be at most `limit`.
   std::span<const std::uint32_t> compute_cell_bounds(
       const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
       const SegmentQuery& query, std::span<const std::uint8_t> tables, std::uint32_t limit,
       std::size_t first, std::size_t count, std::span<std::uint8_t> bounds,
       std::span<std::uint32_t> indices) const;
 
-  /// Buffers for a query in the codes of a segment.
-  struct QueryBuffers {
-    explicit QueryBuffers(const SegmentLayout& layout);
-    AlignedVector<std::uint8_t> values, mask;
-  };
-  /// Computes lower bounds of the dissimilarity of rows at level 1 or 2.
+  /// Computes lower bounds of the dissimilarity of rows at level 1 or 2. `values` has room for the
+  /// codes of a query, one for each sum.
   void compute_level_bounds(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
                             const SegmentQuery& query, int level,
-                            std::span<const std::uint32_t> rows, QueryBuffers& query_buffers,
+                            std::span<const std::uint32_t> rows, std::span<std::uint8_t> values,
                             std::uint32_t* bounds) const;
 
  private:
@@ -123,6 +130,7 @@ class SketchSegment {
   std::array<std::size_t, SegmentLayout::levels> begins_{};
   std::vector<std::int32_t> cell_low_, cell_high_;  // smallest and largest sum of each code
   std::array<Scale, 2> scales_;
+  std::vector<std::uint8_t> lowest_, highest_;  // magnitudes of all views
 };
 
 }  // namespace panonav::fleet

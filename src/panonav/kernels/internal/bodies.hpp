@@ -34,6 +34,8 @@ struct DistanceBody {
                                const DistanceKernels::SketchQuery& query, uint32_t* bounds);
   static void cell_tables(const int32_t* low, const int32_t* high, const int32_t* sums,
                           const float* factors, size_t dimensions, uint8_t* tables);
+  static int32_t encode_query(const int32_t* sums, const int32_t* flags, const SumScale& scale,
+                              uint8_t* values);
   static size_t cell_bounds(const uint8_t* codes, size_t blocks,
                             const DistanceKernels::CellQuery& query, uint8_t* bounds,
                             uint32_t* indices);

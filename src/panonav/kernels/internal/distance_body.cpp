@@ -87,6 +87,25 @@ uint32_t compute_interleaved_bounds(const uint8_t* sketches, const int32_t* slac
   return min_bound;
 }
 
+/// Numbers of which a vector is computed at once: the codes of a dimension, the sums of a group.
+template <int lanes>
+struct Sums : Vectors<lanes> {
+  using Ints = typename Vectors<lanes>::Ints;
+  using Floats = typename Vectors<lanes>::Floats;
+  typedef uint8_t Bytes __attribute__((vector_size(lanes)));
+
+  static void load(const int32_t* from, Ints& to) { __builtin_memcpy(&to, from, sizeof to); }
+  /// Rounds numbers >= 0 down to codes, at most 255.
+  static void round_to_codes(const Floats& numbers, Ints& codes) {
+    const Floats largest = Floats{} + 255.0F;
+    codes = __builtin_convertvector(numbers < largest ? numbers : largest, Ints);
+  }
+  static void store_bytes(const Ints& ints, uint8_t* to) {
+    const Bytes bytes = __builtin_convertvector(ints, Bytes);
+    __builtin_memcpy(to, &bytes, sizeof bytes);
+  }
+};
+
 bool is_unmasked(const DistanceKernels::SketchQuery& query) {
   for (size_t group = 0; group < query.groups; ++group) {
     if (load_group(query.mask + group * 8) != ~uint64_t{0}) return false;
@@ -129,12 +148,14 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
   constexpr size_t prefetch_distance = 24;
+  const auto prefetch = [&](size_t i) {
+    if (i >= count) return;
+    const uint8_t* const sketch = sketches + indices[i] * query.stored_groups * 8;
+    for (size_t group = 0; group < query.groups; group += 8) __builtin_prefetch(sketch + group * 8);
+  };
+  for (size_t i = 0; i < prefetch_distance; ++i) prefetch(i);
   for (size_t i = 0; i < count; ++i) {
-    if (i + prefetch_distance < count) {
-      const uint8_t* const next =
-          sketches + indices[i + prefetch_distance] * query.stored_groups * 8;
-      for (size_t group = 0; group < query.groups; group += 8) __builtin_prefetch(next + group * 8);
-    }
+    prefetch(i + prefetch_distance);
     const uint8_t* const sketch = sketches + indices[i] * query.stored_groups * 8;
     Register sums{};
     for (size_t group = 0; group < query.groups; group += sizeof(Register) / 8) {
@@ -152,18 +173,54 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
 template <Instructions set>
 void DistanceBody<set>::cell_tables(const int32_t* low, const int32_t* high, const int32_t* sums,
                                     const float* factors, size_t dimensions, uint8_t* tables) {
+  using Codes = Sums<16>;
+  using Ints = Codes::Ints;
   for (size_t d = 0; d < dimensions; ++d) {
-    const int32_t sum = sums[d];
-    const float factor = factors[d];
-    for (size_t i = 16 * d; i < 16 * d + 16; ++i) {
-      const int32_t below = low[i] - sum;
-      const int32_t above = sum - high[i];
-      int32_t outside = below > above ? below : above;
-      outside = outside > 0 ? outside : 0;
-      const float units = static_cast<float>(outside) * factor;
-      tables[i] = static_cast<uint8_t>(static_cast<int32_t>(units < 255.0F ? units : 255.0F));
-    }
+    Ints lowest;
+    Ints highest;
+    Codes::load(low + 16 * d, lowest);
+    Codes::load(high + 16 * d, highest);
+    const Ints below = lowest - sums[d];
+    const Ints above = sums[d] - highest;
+    const Ints larger = below > above ? below : above;
+    const Ints outside = larger > 0 ? larger : Ints{};
+    Ints codes;
+    Codes::round_to_codes(__builtin_convertvector(outside, Codes::Floats) * factors[d], codes);
+    Codes::store_bytes(codes, tables + 16 * d);
   }
+}
+
+template <Instructions set>
+int32_t DistanceBody<set>::encode_query(const int32_t* sums, const int32_t* flags,
+                                        const SumScale& scale, uint8_t* values) {
+  constexpr int lanes = 8;  // sums of a group
+  using Group = Sums<lanes>;
+  using Ints = Group::Ints;
+  Ints constant{};
+  for (size_t group = 0; group < scale.groups; ++group) {
+    Ints sum;
+    Ints flag;
+    Ints lowest;
+    Ints highest;
+    Group::load(sums + group * lanes, sum);
+    Group::load(flags + group * lanes, flag);
+    Group::load(scale.offsets + group * lanes, lowest);
+    Group::load(scale.highest + group * lanes, highest);
+    const Ints at_least = sum > lowest ? sum : lowest;
+    const Ints inside = at_least < highest ? at_least : highest;
+    const Ints above = inside - lowest;
+    Ints code;
+    Group::round_to_codes(
+        __builtin_convertvector(above, Group::Floats) * scale.inverse_steps[group] + 0.5F, code);
+    const Ints difference = above - code * static_cast<int32_t>(scale.steps[group]);
+    const Ints missed = difference < 0 ? -difference : difference;
+    const Ints outside = sum > inside ? sum - inside : inside - sum;
+    constant += flag * (outside - missed);
+    Group::store_bytes(flag * code, values + group * lanes);
+  }
+  int32_t total = 0;
+  for (int i = 0; i < lanes; ++i) total += constant[i];
+  return total;
 }
 
 template <Instructions set>
