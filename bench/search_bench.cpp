@@ -18,6 +18,7 @@
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_fleet/place_search.hpp"
+#include "panonav_fleet/postgresql_memories.hpp"
 #include "panonav_simulation/make_each.hpp"
 #include "rivals.hpp"
 #include "simulated_views.hpp"
@@ -298,6 +299,7 @@ int ask(const std::string& address, std::size_t views) {
 int main(int argc, char** argv) {
   using namespace panonav::bench;
   std::cout << std::unitbuf;
+  panonav::fleet::register_postgresql_memories();
   const std::string what = argc > 2 ? argv[1] : "";
   const std::size_t views = argc > 3 ? std::stoul(argv[3]) : 10000000;
   if (what == "fill") return fill(argv[2], views);

@@ -12,6 +12,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_fleet/postgresql_memories.hpp"
 
 namespace {
 
@@ -52,6 +53,7 @@ int main(int argc, char** argv) {
     std::cerr << "usage: server_bench ADDRESS, as of panonav-postgresql FOLDER address bench\n";
     return 2;
   }
+  fleet::register_postgresql_memories();
   MemoryHeader header;
   header.shape = {80, 15};
   MemoryFile file = MemoryFile::create(argv[1], header);
