@@ -20,6 +20,7 @@
 #include "panonav/mapping/topological_map.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/route/route_panorama.hpp"
+#include "panonav/route/snapshot_chain.hpp"
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/recorded_dataset.hpp"
@@ -150,7 +151,13 @@ void read_all_of(const fs::path& path) {
     (void)file.load();
     for (const ViewId view : file.views()) (void)file.thumbnail(view);
     for (const auto& name : file.map_names()) (void)file.map(name);
-    for (const auto& name : file.route_names()) (void)file.route(name);
+    for (const auto& name : file.route_names()) {
+      if (file.route_method(name) == RouteMethod::chain) {
+        (void)file.chain(name);
+      } else {
+        (void)file.route(name);
+      }
+    }
   });
 }
 

@@ -197,6 +197,11 @@ TEST_F(MemoryFileAttack, IsNamed) {
        "its last block of 2 is missing"},
       {"UPDATE routes SET columns = 2147483647, checksum = row_sum('route', 2147483647, 20)",
        "columns are 2147483647; allowed: 16 to 16384"},
+      // A chain whose checksums are right.
+      {"INSERT INTO routes VALUES('chain', 0, 3, row_sum('chain', 0, 3));"
+       "INSERT INTO route_blocks VALUES('chain', 0, x'504E4331', blob_sum('chain', 0, "
+       "x'504E4331'))",
+       "route chain: bytes of a chain is 4; allowed: > 32"},
       {"INSERT INTO routes VALUES('bomb', 16384, 51200, row_sum('bomb', 16384, 51200));"
        "WITH RECURSIVE n(i, b) AS (SELECT 0, bomb(256 * 16410) UNION ALL SELECT i + 1, b FROM n "
        "WHERE i < 199) INSERT INTO route_blocks SELECT 'bomb', i, b, blob_sum('bomb', i, b) FROM n",

@@ -13,6 +13,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/route/route_panorama.hpp"
+#include "panonav/route/snapshot_chain.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
@@ -245,6 +246,108 @@ TEST_F(RouteTables, DamagedBytes) {
     }
   }
   EXPECT_GT(refused, 30);
+}
+
+SnapshotChain random_chain(int nodes, std::uint64_t seed) {
+  Random random(seed);
+  SnapshotChain chain({.rows = 2, .components = 5, .bits = 5}, ElevationBand{-0.4, 0.5});
+  for (int i = 0; i < nodes; ++i) {
+    std::vector<float> cosines(10);
+    std::vector<float> sines(10);
+    for (float& value : cosines) value = static_cast<float>(random.normal());
+    for (std::size_t k = 2; k < sines.size(); ++k) sines[k] = static_cast<float>(random.normal());
+    const bool is_way_point = i % 3 == 1 && i + 1 < nodes;
+    const Point2 place{0.9 * i, random.normal()};
+    chain.append(place,
+                 is_way_point ? std::nullopt : std::optional(HomingView(2, 5, cosines, sines)));
+  }
+  chain.set_model({.typical_distance_m = 2.5F, .reach_m = 0.75F});
+  return chain;
+}
+
+TEST_F(RouteTables, AChainIsReadBackBitForBit) {
+  const SnapshotChain chain = random_chain(40, 1);
+  const RoutePanorama route = random_route(3, 1);
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    EXPECT_FALSE(file.chain("home").has_value());
+    EXPECT_FALSE(file.route_method("home").has_value());
+    file.save_chain("home", chain);
+    file.append_route("lines", route);
+  }
+  MemoryFile file = MemoryFile::open(path, Access::read_write);
+  EXPECT_EQ(file.chain("home"), chain);
+  EXPECT_EQ(file.route_bytes("home"), chain.pack().size());
+  EXPECT_EQ(file.route_method("home"), RouteMethod::chain);
+  EXPECT_EQ(file.route_method("lines"), RouteMethod::panorama);
+  EXPECT_EQ(file.route_names(), (std::vector<std::string>{"home", "lines"}));
+  EXPECT_TRUE(file.verify().empty());
+  // Neither method takes the route of the other.
+  EXPECT_THROW((void)file.route("home"), FileError);
+  EXPECT_THROW((void)file.chain("lines"), FileError);
+  EXPECT_THROW(file.append_route("home", route), FileError);
+  EXPECT_THROW(file.save_chain("lines", chain), ContractError);
+  EXPECT_THROW(file.save_chain("home", chain), ContractError);
+  EXPECT_THROW(file.save_chain("", chain), ContractError);
+  EXPECT_THROW(file.save_chain("empty", SnapshotChain{}), ContractError);
+  // A copy, a new name, and undo.
+  file.copy_to(folder / "copy.panonav");
+  EXPECT_EQ(MemoryFile::open(folder / "copy.panonav", Access::read_only).chain("home"), chain);
+  file.rename_route("home", "way");
+  EXPECT_EQ(file.chain("way"), chain);
+  EXPECT_FALSE(file.chain("home").has_value());
+  file.change([&] { file.remove_route("way"); }, "remove a chain");
+  EXPECT_FALSE(file.chain("way").has_value());
+  file.undo();
+  EXPECT_EQ(file.chain("way"), chain);
+  EXPECT_TRUE(file.verify().empty());
+}
+
+// Packed bytes that `SnapshotChain::pack` does not write, with and without a right checksum.
+TEST_F(RouteTables, ChainsThatWereTamperedWith) {
+  for (const std::string sql :
+       {"UPDATE routes SET columns = 16", "UPDATE routes SET columns = -1",
+        "UPDATE routes SET lines = lines - 1", "UPDATE routes SET lines = 1 << 60",
+        "UPDATE routes SET lines = 0", "UPDATE routes SET checksum = checksum + 1",
+        "UPDATE routes SET name = 'other'", "DELETE FROM routes", "DELETE FROM route_blocks",
+        "UPDATE route_blocks SET number = 1", "UPDATE route_blocks SET lines = x'00'",
+        "UPDATE route_blocks SET lines = substr(lines, 1, 100)",
+        "UPDATE route_blocks SET checksum = 0",
+        "INSERT INTO route_blocks SELECT route, 1, lines, checksum FROM route_blocks"}) {
+    std::filesystem::remove(path);
+    {
+      MemoryFile file = MemoryFile::create(path, small_header());
+      file.save_chain("route", random_chain(30, 2));
+    }
+    run_sql(path, sql);
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    EXPECT_FALSE(file.verify().empty()) << sql;
+    const std::string name = sql.find("name = 'other'") == std::string::npos ? "route" : "other";
+    EXPECT_THROW((void)file.chain(name), FileError) << sql;
+    EXPECT_THROW(file.copy_to(folder / "copy.panonav"), FileError) << sql;
+    EXPECT_FALSE(std::filesystem::exists(folder / "copy.panonav")) << sql;
+  }
+}
+
+TEST_F(RouteTables, DamagedBytesOfAChain) {
+  const SnapshotChain chain = random_chain(3000, 3);
+  {
+    MemoryFile file = MemoryFile::create(path, small_header());
+    file.save_chain("route", chain);
+  }
+  const std::string good = bytes_of(path);
+  Random random(8);
+  int refused = 0;
+  for (int round = 0; round < 100; ++round) {
+    const auto copy = folder.write("copy.panonav", damaged_bytes(good, random, round));
+    try {
+      EXPECT_EQ(MemoryFile::open(copy, Access::read_only).chain("route"), chain) << round;
+    } catch (const FileError& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 20);
 }
 
 }  // namespace

@@ -62,6 +62,7 @@ std::vector<std::string> find_scaled_routes(const MemoryFile& memory) {
   const auto map_scale = read_map_scale(memory);
   std::vector<std::string> names = memory.route_names();
   std::erase_if(names, [&](const std::string& name) {
+    if (memory.route_method(name) == RouteMethod::chain) return true;
     const int columns = memory.route(name).value().columns();
     const RouteSource source = read_route_source(memory, name, columns);
     return !source.is_in_map_unit || source.assumed_unit_m || source.map_scale != map_scale;

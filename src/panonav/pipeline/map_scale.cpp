@@ -150,6 +150,8 @@ std::optional<double> scale_routes(MemoryFile& memory, double factor) {
       is_map_metric ? read_map_scale(memory) : std::optional(1.0 / read_assumed_unit_m(memory));
   const auto new_scale = former_scale ? std::optional(factor * *former_scale) : std::nullopt;
   for (const std::string& name : memory.route_names()) {
+    // Chains are in metres of odometry.
+    if (memory.route_method(name) == RouteMethod::chain) continue;
     const RoutePanorama route = memory.route(name).value();
     RouteSource source = read_route_source(memory, name, route.columns());
     const auto own_factor = choose_route_factor(source, is_map_metric, factor, new_scale);

@@ -25,6 +25,7 @@
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/route/route_panorama.hpp"
+#include "panonav/route/snapshot_chain.hpp"
 #include "panonav/storage/memory_address.hpp"
 
 namespace panonav {
@@ -379,8 +380,24 @@ class Merge {
     }
   }
 
+  /// Returns the name, or a free one like it, for a route of one of the memories.
+  [[nodiscard]] std::string choose_route_name(const MemoryFile& file, const std::string& name,
+                                              std::size_t from) {
+    const auto used_names = file.route_names();
+    std::string new_name = make_free_name(name, *files_[from], [&](const std::string& other) {
+      return std::ranges::find(used_names, other) != used_names.end();
+    });
+    if (new_name != name) ++result_.renamed;
+    return new_name;
+  }
+
   void add_routes(MemoryFile& file, std::size_t from) {
     for (const std::string& name : files_[from]->route_names()) {
+      if (files_[from]->route_method(name) == RouteMethod::chain) {
+        // A chain is in a frame of its own.
+        file.save_chain(choose_route_name(file, name, from), files_[from]->chain(name).value());
+        continue;
+      }
       RoutePanorama route = files_[from]->route(name).value();
       RouteSource source = read_route_source(*files_[from], name, route.columns());
       const double unit_m = source.assumed_unit_m ? read_assumed_unit_m(file) : 1.0;
@@ -395,12 +412,7 @@ class Merge {
         if (from == 1 && result_.alignment) pose = result_.alignment->first_from_second * pose;
         moved.append(pose, route.line(i));
       }
-      const auto used_names = file.route_names();
-      const std::string new_name =
-          make_free_name(name, *files_[from], [&](const std::string& other) {
-            return std::ranges::find(used_names, other) != used_names.end();
-          });
-      if (new_name != name) ++result_.renamed;
+      const std::string new_name = choose_route_name(file, name, from);
       file.append_route(new_name, moved);
       store_route_source(file, new_name, source);
       learn_and_store_route(file, new_name);

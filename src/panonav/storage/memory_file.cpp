@@ -186,9 +186,8 @@ void MemoryFile::copy_to(const std::filesystem::path& path) const {
       for (const std::string& name : map_names()) {
         from.accept_row(std::nullopt, [&] { write_map(to, name, this->map(name).value()); });
       }
-      for (const std::string& name : route_names()) {
-        from.accept_row(std::nullopt,
-                        [&] { append_to_route(to, name, read_route(from, name).value()); });
+      for (const std::string& name : list_stored_routes(from)) {
+        from.accept_row(std::nullopt, [&] { copy_route(from, to, name); });
       }
     });
   });
@@ -371,6 +370,19 @@ std::size_t MemoryFile::append_route(std::string_view name, const RoutePanorama&
 
 std::optional<RoutePanorama> MemoryFile::route(std::string_view name) const {
   return implementation_->read([&](MemoryTables& tables) { return read_route(tables, name); });
+}
+
+void MemoryFile::save_chain(std::string_view name, const SnapshotChain& chain) {
+  implementation_->write([&](MemoryTables& tables) { write_chain(tables, name, chain); });
+}
+
+std::optional<SnapshotChain> MemoryFile::chain(std::string_view name) const {
+  return implementation_->read([&](MemoryTables& tables) { return read_chain(tables, name); });
+}
+
+std::optional<RouteMethod> MemoryFile::route_method(std::string_view name) const {
+  return implementation_->read(
+      [&](MemoryTables& tables) { return read_route_method(tables, name); });
 }
 
 std::uint64_t MemoryFile::route_bytes(std::string_view name) const {

@@ -19,6 +19,7 @@
 namespace panonav {
 
 class RoutePanorama;
+class SnapshotChain;
 struct TopologicalMap;
 
 /// Properties that all views of a memory share: how a picture becomes a signature. They are fixed
@@ -50,6 +51,12 @@ struct NewView {
 enum class Access {
   read_only,  ///< others may write at the same time
   read_write  ///< one process at a time
+};
+
+/// Method by which a route is remembered.
+enum class RouteMethod {
+  panorama,  ///< lines of pixels (`RoutePanorama`)
+  chain      ///< small snapshots with odometry between them (`SnapshotChain`)
 };
 
 /// A visual memory on disk: an SQLite file (docs/formats.md). Given the address of a server
@@ -212,8 +219,18 @@ class MemoryFile {
   /// and at most 256 stored ones.
   std::size_t append_route(std::string_view name, const RoutePanorama& more);
   /// Returns exactly the lines that were appended; nullopt if there is no route of that name.
+  /// Throws FileError on a chain of snapshots.
   [[nodiscard]] std::optional<RoutePanorama> route(std::string_view name) const;
-  /// Returns the size of the route's lines and poses as stored, packed without loss, in bytes.
+  /// Stores a chain of snapshots as a route, in its packed form. Throws ContractError on a name
+  /// that is empty or that a route has.
+  void save_chain(std::string_view name, const SnapshotChain& chain);
+  /// Returns exactly the chain that was saved; nullopt if there is no route of that name. Throws
+  /// FileError on a route panorama.
+  [[nodiscard]] std::optional<SnapshotChain> chain(std::string_view name) const;
+  /// Returns how the route is remembered; nullopt if there is no route of that name.
+  [[nodiscard]] std::optional<RouteMethod> route_method(std::string_view name) const;
+  /// Returns the size of the route as stored, in bytes: lines and poses, packed without loss, or
+  /// the packed chain.
   /// Throws ContractError when there is no such route.
   [[nodiscard]] std::uint64_t route_bytes(std::string_view name) const;
   /// Removes a route. Throws ContractError when there is no such route.

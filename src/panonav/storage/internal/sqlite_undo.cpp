@@ -164,7 +164,7 @@ void SqliteTables::require_intact(UndoneRows rows) {
     RecordBytes scratch;
     read_available_views(rows.views, [&](const ViewRow& row) { check_row(row, shape, scratch); });
     for (const std::string& name : rows.maps) static_cast<void>(read_map(*this, name));
-    for (const std::string& name : rows.routes) static_cast<void>(read_route(*this, name));
+    for (const std::string& name : rows.routes) check_route(*this, name);
   } catch (const ContractError& error) {
     fail_damaged(std::string("a change that can be undone is not one of panonav: ") + error.what());
   }
