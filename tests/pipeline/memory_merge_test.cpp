@@ -12,6 +12,7 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/route/route_panorama.hpp"
+#include "panonav/route/snapshot_chain.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -67,6 +68,9 @@ TEST_F(Merge, TwoDrivesInOneRoomBecomeOneMemoryInTheFrameOfTheFirst) {
   const auto second_truth = drive(40, 110);
   const fs::path first = remember("first.panonav", 5, first_truth);
   const fs::path second = remember("second.panonav", 5, second_truth);
+  SnapshotChain chain;
+  chain.append({}, HomingView(8, 6, std::vector<float>(48), std::vector<float>(48)));
+  MemoryFile::open(second, Access::read_write).save_chain("home", chain);
   std::size_t advanced = 0;
   const MergedMemory result = merge_memories(first, second, merged, {}, {}, [&] { ++advanced; });
   ASSERT_TRUE(result.alignment);
@@ -87,7 +91,8 @@ TEST_F(Merge, TwoDrivesInOneRoomBecomeOneMemoryInTheFrameOfTheFirst) {
     EXPECT_EQ(file.thumbnail(*view), (std::vector<std::uint8_t>{1, static_cast<std::uint8_t>(i)}));
   }
   EXPECT_EQ(file.map(map_name).value().nodes.size(), 220U);
-  EXPECT_EQ(file.route_names(), (std::vector<std::string>{"route", "second/route"}));
+  EXPECT_EQ(file.route_names(), (std::vector<std::string>{"home", "route", "second/route"}));
+  EXPECT_EQ(file.chain("home"), chain);
   const RoutePanorama route = file.route("second/route").value();
   const Pose2 start = inverse(first_truth.front()) * second_truth.front();
   EXPECT_LT(distance(route.poses().front().position(), start.position()), 0.4);
