@@ -13,11 +13,13 @@
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/route/route_panorama.hpp"
+#include "panonav/route/snapshot_chain.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/live_pictures.hpp"
 #include "panonav_recordings/recorded_dataset.hpp"
 #include "panonav_recordings/ros_messages.hpp"
 #include "panonav_recordings/video_file.hpp"
+#include "runs/chain_run.hpp"
 #include "runs/described_input.hpp"
 
 namespace panonav::command {
@@ -54,21 +56,27 @@ struct NamedRoute {
   std::size_t lines = 0;
   double length_m = 0.0;
   std::uint64_t bytes = 0;
+  std::optional<ChainSummary> chain;  // nullopt: a route panorama
 };
 
 std::vector<NamedRoute> list_routes(const MemoryFile& memory) {
   std::vector<NamedRoute> routes;
   for (auto& name : memory.route_names()) {
-    const auto route = memory.route(name);
-    if (!route) continue;
+    if (memory.route_method(name) == RouteMethod::chain) {
+      const ChainSummary chain = summarise_chain(memory.chain(name).value());
+      routes.push_back({std::move(name), 0, chain.length_m, chain.bytes, chain});
+      continue;
+    }
     const auto bytes = memory.route_bytes(name);
-    routes.push_back({std::move(name), route->size(), route->length_m(), bytes});
+    const RoutePanorama route = memory.route(name).value();
+    routes.push_back({std::move(name), route.size(), route.length_m(), bytes, std::nullopt});
   }
   return routes;
 }
 
 /// Returns the unit of a route's lengths, which may differ from that of the memory's positions.
 LengthUnit read_route_unit(const MemoryFile& memory, const std::string& name) {
+  if (memory.route_method(name) == RouteMethod::chain) return LengthUnit::metres;
   const int columns = memory.route(name).value().columns();
   return read_route_source(memory, name, columns).assumed_unit_m ? LengthUnit::view_steps
                                                                  : LengthUnit::metres;
@@ -136,10 +144,20 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
                       {"normalise_gain", steps.normalise_gain}}}};
   json["verbs"] = find_memory_verbs(memory);
   auto routes = ordered_json::array();
-  for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
+  for (const auto& [name, lines, length_m, bytes, chain] : list_routes(memory)) {
+    if (chain) {
+      ordered_json route{{"name", name}, {"method", "chain"}};
+      add_chain_fields(route, *chain);
+      routes.push_back(std::move(route));
+      continue;
+    }
     const char* const length_key =
         read_route_unit(memory, name) == LengthUnit::metres ? "length_m" : "length_steps";
-    routes.push_back({{"name", name}, {"lines", lines}, {length_key, length_m}, {"bytes", bytes}});
+    routes.push_back({{"name", name},
+                      {"method", "panorama"},
+                      {"lines", lines},
+                      {length_key, length_m},
+                      {"bytes", bytes}});
   }
   json["routes"] = std::move(routes);
   json["map"] = nullptr;
@@ -210,8 +228,12 @@ ExitCode print_memory(const std::string& path, Session& session) {
         "  positions   none: localise names the nearest view, but gives no position; panonav "
         "memorise makes a map of images taken every 20 to 50 cm");
   }
-  for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
+  for (const auto& [name, lines, length_m, bytes, chain] : list_routes(memory)) {
     session.set_length_unit(read_route_unit(memory, name));
+    if (chain) {
+      session.print("  route       " + name + ": " + format_chain(*chain, session));
+      continue;
+    }
     session.print(
         "  route       " + name + ": " + format_count(lines, "line") + " over " +
         session.format_length(length_m, 1) + ", " +

@@ -9,6 +9,7 @@
 #include "panonav_viewer/page.hpp"
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
+#include "runs/chain_run.hpp"
 #include "runs/followed_run.hpp"
 #include "runs/recording.hpp"
 #include "runs/run_record.hpp"
@@ -24,6 +25,7 @@ struct FollowArguments {
   std::optional<std::string> name;
   int every = 1;
   bool no_odometry = false;
+  bool back = false;
   std::optional<std::string> tum;
   std::optional<std::string> report;
   RunRecordArguments record;
@@ -145,9 +147,26 @@ void write_fixes(const std::string& path, const std::vector<FollowedImage>& imag
   write_trajectory(path, trajectory, units);
 }
 
+/// Follows the chain of that name. Throws UsageError on options for route panoramas.
+ExitCode follow_chain(const Arguments& declared, const FollowArguments& arguments,
+                      const MemoryFile& memory, const std::string& name, const Dataset& run,
+                      Session& session) {
+  declared.reject_options({"--no-odometry", "--tum", "--report", "--record", "--view",
+                           "[route_tracker]", "[route_fit]"},
+                          "as the route '" + name + "' is a chain of snapshots");
+  ChainGuide guide(memory, run.source, name,
+                   arguments.back ? ChainDirection::back : ChainDirection::forward);
+  return follow_chain_run(guide, run, arguments.every, session);
+}
+
 ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments, Session& session) {
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   const Dataset run = open_run(arguments.dataset, arguments.run, memory, session);
+  const std::string name = find_route_name(memory, arguments.name);
+  if (memory.route_method(name) == RouteMethod::chain) {
+    return follow_chain(declared, arguments, memory, name, run, session);
+  }
+  declared.reject_options({"--back"}, "as the route '" + name + "' is no chain of snapshots");
   if (!has_odometry(run)) {
     declared.reject_options({"--recovery-m", "--surprise-m"},
                             "as " + arguments.dataset + " has no odometry");
@@ -227,6 +246,8 @@ Run declare_route_follow(Arguments& arguments) {
                    "Use only every N-th image; the odometry of skipped images is added up");
   arguments.flag("--no-odometry", values->no_odometry,
                  "Do not use odometry, but search the whole route for each image");
+  arguments.flag("--back", values->back,
+                 "Follow a chain of snapshots from its end to its beginning");
   arguments.option("--tum FILE", values->tum,
                    "Write the estimated poses to this file: as CSV if the name ends in .csv, "
                    "otherwise as TUM text");
@@ -257,11 +278,13 @@ Verb route_follow_verb() {
           "odometry, the search starts at the pose that the odometry predicts (in the output: "
           "predicted). If this search fails, the verb searches near this pose (recovered), and "
           "then along the whole route (found). Parts of the scene that have changed are ignored "
-          "and reported. The exit code is 1 if no image can be "
-          "located on the route.",
+          "and reported. Along a chain of snapshots, the verb gives the next motion of the robot "
+          "for each image instead. The exit code is 1 if no image can be "
+          "located on the route, or if the robot is lost along a chain.",
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"
-          "  panonav route follow office.panonav repeat_run --no-odometry --json",
+          "  panonav route follow office.panonav repeat_run --no-odometry --json\n"
+          "  panonav route follow office.panonav return_run --name home --back",
           declare_route_follow};
 }
 

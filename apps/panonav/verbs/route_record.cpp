@@ -11,6 +11,7 @@
 #include "panonav/storage/memory_file.hpp"
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
+#include "runs/chain_run.hpp"
 #include "runs/memorising.hpp"
 #include "runs/recording.hpp"
 
@@ -30,6 +31,10 @@ struct RecordArguments {
   bool odometry = false;
   std::optional<std::string> report;
   HorizonScanlineOptions line;
+  std::optional<std::string> method;
+  ChainSpacing chain;
+
+  [[nodiscard]] bool is_chain() const { return method == "chain"; }
 };
 
 /// Parses rows such as "17-20". Throws UsageError.
@@ -231,6 +236,23 @@ void print_recorded(const RecordArguments& arguments, const RouteRecorder::Recor
   }
 }
 
+/// Prints how to improve and to use the recorded route.
+void print_hints(const RecordArguments& arguments, const PictureSource& pictures,
+                 const RouteRecorder& recorder, Session& session) {
+  if (pictures.kind == PictureKind::panorama && !pictures.layout.elevations &&
+      !recorder.source().horizon_rows) {
+    session.print(
+        "The elevations of the images are not known; each line is the mean of all rows. Select the "
+        "rows at the horizon with --horizon-rows.");
+  }
+  if (recorder.memory().route_names().size() > 1) {
+    session.suggest({"panonav", "route", "follow", arguments.memory, arguments.dataset, "--name",
+                     arguments.name});
+  } else {
+    session.suggest({"panonav", "route", "follow", arguments.memory, arguments.dataset});
+  }
+}
+
 ExitCode record(const Arguments& declared, const RecordArguments& arguments, Session& session) {
   if (arguments.every_m && !(*arguments.every_m >= 0.0)) {
     throw UsageError("--every-m is " + to_text(*arguments.every_m) + "; allowed: 0 or more");
@@ -242,7 +264,9 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   const Dataset dataset =
       open_recording(arguments.dataset, arguments.pictures,
                      memory ? std::optional(memory->header().source) : std::nullopt, session);
-  set_line_options(declared, arguments, dataset.source, memory, options);
+  if (!arguments.is_chain()) {
+    set_line_options(declared, arguments, dataset.source, memory, options);
+  }
   if (arguments.report) prepare_report_folder(*arguments.report, "route record");
   const bool is_new = !memory;
   // Sets the image layout of a new file now, so that views can be memorised into it later.
@@ -250,16 +274,25 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
     memory = MemoryFile::create(arguments.memory,
                                 make_header_from_recording(dataset, {}, {}, session.executor()));
   }
-  const DrivePoses drive = [&] {
+  const auto remove_if_failing = [&](const auto& work) {
     try {
-      return find_poses(declared, arguments, dataset, *memory, session);
+      return work();
     } catch (...) {
       memory.reset();
       std::error_code ignored;
       if (is_new) fs::remove(arguments.memory, ignored);
       throw;
     }
-  }();
+  };
+  const DrivePoses drive =
+      remove_if_failing([&] { return find_poses(declared, arguments, dataset, *memory, session); });
+  if (arguments.is_chain()) {
+    remove_if_failing([&] {
+      record_chain_run({arguments.memory, arguments.name}, *memory, drive, dataset.entries.size(),
+                       arguments.chain, session);
+    });
+    return ExitCode::done;
+  }
   options.odometry =
       drive.origin == RoutePoseOrigin::odometry || drive.origin == RoutePoseOrigin::images;
   options.assumed_unit_m = drive.assumed_unit_m;
@@ -279,18 +312,7 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
                  recorder.memory().info().file_bytes, session);
   if (session.json()) return ExitCode::done;
   print_frame(frame, recorder.memory(), session);
-  if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&
-      !recorder.source().horizon_rows) {
-    session.print(
-        "The elevations of the images are not known; each line is the mean of all rows. Select the "
-        "rows at the horizon with --horizon-rows.");
-  }
-  if (recorder.memory().route_names().size() > 1) {
-    session.suggest({"panonav", "route", "follow", arguments.memory, arguments.dataset, "--name",
-                     arguments.name});
-  } else {
-    session.suggest({"panonav", "route", "follow", arguments.memory, arguments.dataset});
-  }
+  print_hints(arguments, dataset.source, recorder, session);
   return ExitCode::done;
 }
 
@@ -313,6 +335,15 @@ Run declare_route_record(Arguments& arguments) {
   declare_report(arguments, values->report, "a page with all lines of the route as one image");
   declare_pictures(arguments, values->pictures);
   arguments.options("line", values->line);
+  arguments.choice("--method", values->method, {"panorama", "chain"},
+                   "What is stored: lines of pixels (panorama, default), or a chain of small "
+                   "snapshots with odometry between them, of some bytes a metre");
+  arguments.options("chain", values->chain);
+  arguments.reject_options_unless(
+      {"[chain]"}, [values] { return values->is_chain(); }, "without --method chain");
+  arguments.reject_options_unless(
+      {"--every-m", "--horizon-rows", "--report", "[line]"},
+      [values] { return !values->is_chain(); }, "with --method chain");
   arguments.explain_interruption(
       "Lines stored so far are kept. To continue, run the same command again.");
   return [values, &arguments](Session& session) { return record(arguments, *values, session); };
@@ -330,8 +361,10 @@ Verb route_record_verb() {
       "are stored in batches. To continue after an interruption, run the same command again. A "
       "recording that starts at the end of the route extends the route. Its poses are those of "
       "the data set or of the memory's map; those of odometry or images alone are in a frame of "
-      "the route's own, which is not that of the views.",
+      "the route's own, which is not that of the views. With --method chain, the verb stores a "
+      "few small snapshots instead, along which a robot with odometry drives there and back.",
       "  panonav route record office.panonav teach_run\n"
+      "  panonav route record office.panonav teach_run --name home --method chain\n"
       "  panonav route record office.panonav teach_run --name corridor --odometry --report "
       "corridor",
       declare_route_record};

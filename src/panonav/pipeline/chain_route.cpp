@@ -1,0 +1,112 @@
+#include "panonav/pipeline/chain_route.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+
+namespace panonav {
+
+ChainSummary summarise_chain(const SnapshotChain& chain) {
+  ChainSummary summary;
+  summary.snapshots = chain.snapshots();
+  summary.way_points = chain.nodes().size() - summary.snapshots;
+  summary.length_m = chain.length_m();
+  summary.bytes = chain.pack().size();
+  if (summary.length_m > 0.0) {
+    summary.bytes_per_m = static_cast<double>(summary.bytes) / summary.length_m;
+  }
+  if (summary.snapshots > 1) {
+    summary.spacing_m = summary.length_m / static_cast<double>(summary.snapshots - 1);
+  }
+  summary.expected_offset_m = ChainOdometry{}.position_error_m(summary.spacing_m);
+  return summary;
+}
+
+SnapshotChain record_chain(MemoryFile& memory, const std::string& name, const DrivePoses& drive,
+                           const ChainSpacing& spacing, Executor& executor,
+                           const std::function<void()>& progress) {
+  if (memory.route_method(name)) {
+    throw FileError(memory.path().string(),
+                    "already contains the route '" + name +
+                        "'; allowed for the name of a chain: one that no route has");
+  }
+  if (drive.assumed_unit_m) {
+    throw FileError(drive.drive.folder.string(),
+                    "has poses in view steps; allowed for a chain: metres of odometry, of "
+                    "positions, or of a map that panonav scale has scaled");
+  }
+  SnapshotShape shape;
+  shape.rows = std::min(shape.rows, memory.header().shape.rows);
+  shape.components = std::min(shape.components, memory.header().shape.components);
+  const HomingEncoder encoder(memory.header(), drive.drive.source);
+  ChainRecorder recorder(shape, spacing);
+  process_in_order(
+      drive.drive.entries.size(), executor,
+      [&](std::size_t i) {
+        return encoder.view(encoder.panorama(read_observation(drive.drive.entries[i])));
+      },
+      [&](std::size_t i, HomingView&& view) {
+        const Pose2 moved = i == 0 ? Pose2{} : inverse(drive.poses[i - 1]) * drive.poses[i];
+        recorder.add(view, moved);
+        if (progress) progress();
+      });
+  SnapshotChain chain = recorder.finish();
+  memory.save_chain(name, chain);
+  return chain;
+}
+
+namespace {
+
+SnapshotChain load_chain(const MemoryFile& memory, const std::optional<std::string>& name) {
+  return memory.chain(find_route_name(memory, name)).value();
+}
+
+}  // namespace
+
+ChainGuide::ChainGuide(const MemoryFile& memory, const std::optional<PictureSource>& source,
+                       const std::optional<std::string>& name, ChainDirection direction,
+                       const ChainFollowerOptions& options)
+    : chain_(load_chain(memory, name)),
+      encoder_(memory.header(), source.value_or(memory.header().source)),
+      follower_(chain_, direction, options) {}
+
+ChainDecision ChainGuide::step(const HomingView& view, const Pose2& odometry) {
+  const Pose2 moved = odometry_ ? inverse(*odometry_) * odometry : Pose2{};
+  odometry_ = odometry;
+  return follower_.decide(view, moved);
+}
+
+ChainDecision ChainGuide::step(const Observation& observation) {
+  if (!observation.odometry) {
+    throw ContractError("odometry of the observation", "unknown",
+                        "known for each image along a chain of snapshots");
+  }
+  return step(encode(observation), *observation.odometry);
+}
+
+std::size_t ChainGuide::snapshot_number(std::size_t node) const {
+  const auto nodes = chain_.nodes().first(node + 1);
+  return static_cast<std::size_t>(
+      std::count_if(nodes.begin(), nodes.end(), [](const auto& n) { return n.has_snapshot(); }));
+}
+
+const char* to_string(ChainState state) {
+  switch (state) {
+    case ChainState::travelling:
+      return "travelling";
+    case ChainState::homing:
+      return "homing";
+    case ChainState::searching:
+      return "searching";
+    case ChainState::arrived:
+      return "arrived";
+    case ChainState::lost:
+      return "lost";
+  }
+  return "lost";
+}
+
+}  // namespace panonav

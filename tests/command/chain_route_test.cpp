@@ -1,0 +1,87 @@
+// Routes as chains of snapshots: recording, listing and following by the command.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "command/room_run.hpp"
+#include "support/command_runner.hpp"
+
+namespace panonav::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+using ChainVerbs = RouteVerbs;
+
+// A chain of snapshots takes some bytes a metre; a drive along it, there or back, is told its
+// motions until it has arrived.
+TEST_F(ChainVerbs, AChainIsRecordedListedAndFollowedInBothDirections) {
+  const std::string memory = folder_ / "m.panonav";
+  (void)record({"--name", "lines"});
+  const json chain = record({"--name", "home", "--method", "chain"});
+  EXPECT_EQ(chain["method"], "chain");
+  EXPECT_GE(chain["snapshots"], 2);
+  EXPECT_NEAR(chain["length_m"].get<double>(), 4.0, 0.15);
+  EXPECT_NEAR(chain["bytes_per_m"].get<double>(),
+              chain["bytes"].get<double>() / chain["length_m"].get<double>(), 1e-6);
+  const json cheap = record({"--name", "cheap", "--method", "chain", "--bytes-per-100-m", "2000"});
+  EXPECT_LE(cheap["snapshots"], chain["snapshots"]);
+  // The memory lists the reported values.
+  const json routes = answer_of({"info", memory, "--json"})["routes"];
+  ASSERT_EQ(routes.size(), 3U);
+  EXPECT_EQ(routes[1]["name"], "home");
+  EXPECT_EQ(routes[1]["bytes"], chain["bytes"]);
+  EXPECT_EQ(routes[1]["spacing_m"], chain["spacing_m"]);
+  EXPECT_EQ(routes[1]["expected_offset_m"], chain["expected_offset_m"]);
+  EXPECT_EQ(routes[2]["method"], "panorama");
+  const std::string text = run_panonav({"info", memory}).out;
+  EXPECT_TRUE(contains(text, "bytes per metre")) << text;
+  EXPECT_TRUE(contains(text, "expected offset")) << text;
+  run_well({"verify", memory});
+
+  write_room_run(folder_ / "there", room_, straight({-2.0, 0.0}, 0.0, 4.0, 0.1));
+  write_room_run(folder_ / "back", room_, straight({2.0, 0.0}, std::numbers::pi, 4.0, 0.1));
+  for (const std::string way : {"there", "back"}) {
+    std::vector<std::string> words{"route",  "follow", memory,  folder_ / way,
+                                   "--name", "home",   "--json"};
+    if (way == "back") words.push_back("--back");
+    const std::vector<json> steps = answers_of(words);
+    ASSERT_GT(steps.size(), 10U) << way;
+    // The images may end within the last steps of homing.
+    const std::string state = steps.back()["state"];
+    EXPECT_TRUE(state == "arrived" || (way == "back" && state == "homing")) << steps.back();
+    EXPECT_EQ(steps.back()["snapshot"], way == "back" ? json(1) : chain["snapshots"]) << way;
+    EXPECT_NEAR(steps.back()["pose"]["x_m"].get<double>(), way == "back" ? 0.0 : 4.0, 0.4) << way;
+  }
+}
+
+TEST_F(ChainVerbs, OptionsOfTheOtherMethodAreRefused) {
+  const std::string memory = folder_ / "m.panonav";
+  const std::string teach = folder_ / "teach";
+  expect_refusal({"route", "record", memory, teach, "--bytes-per-100-m", "900"},
+                 "--bytes-per-100-m has no effect without --method chain");
+  for (const std::string option : {"--every-m", "--columns"}) {
+    expect_refusal({"route", "record", memory, teach, "--method", "chain", option, "64"},
+                   option + " has no effect with --method chain");
+  }
+  expect_refusal({"route", "record", memory, teach, "--method", "chain", "--bytes-per-100-m", "-1"},
+                 "bytes_per_100_m is -1; allowed: >= 0");
+  EXPECT_FALSE(fs::exists(memory));
+  (void)record({"--method", "chain"});
+  expect_refusal({"route", "record", memory, teach, "--method", "chain"},
+                 "already contains the route 'route'");
+  expect_refusal({"route", "record", memory, teach}, "is a chain of snapshots");
+  for (const std::string option : {"--no-odometry", "--levels=1"}) {
+    expect_refusal({"route", "follow", memory, teach, option}, "is a chain of snapshots");
+  }
+  (void)record({"--name", "lines"});
+  expect_refusal({"route", "follow", memory, teach, "--name", "lines", "--back"},
+                 "is no chain of snapshots");
+}
+
+}  // namespace
+}  // namespace panonav::testing
