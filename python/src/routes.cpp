@@ -3,6 +3,7 @@
 
 #include "memories.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/chain_route.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_follower.hpp"
@@ -234,11 +235,106 @@ void bind_recording(py::module_& m) {
       py::arg("memory"), py::arg("name") = "route", "A route of a MemoryFile, or None.");
 }
 
+/// A motion along a chain, and where the robot is.
+struct ChainStep : ChainDecision {
+  std::string name;
+  std::size_t snapshot = 0;
+  Pose2 pose;
+};
+
+ChainStep make_chain_step(ChainGuide& guide, const Observation& observation) {
+  const ChainDecision decision = guide.step(observation);
+  return {decision, observation.name, guide.snapshot_number(decision.target),
+          guide.chain_from_robot()};
+}
+
+ChainDirection choose_direction(bool back) {
+  return back ? ChainDirection::back : ChainDirection::forward;
+}
+
+ChainSummary record_chain_of(const Dataset& dataset, const std::filesystem::path& memory,
+                             const std::string& name, bool odometry, const ChainSpacing& spacing,
+                             int threads) {
+  InterruptibleExecutor executor(threads);
+  MemoryFile file =
+      memory_exists(memory)
+          ? MemoryFile::open(memory, Access::read_write)
+          : MemoryFile::create(memory, make_header_from_recording(dataset, {}, {}, executor));
+  const DrivePoses drive = find_drive_poses(dataset, file, name, odometry, executor);
+  return summarise_chain(record_chain(file, name, drive, spacing, executor));
+}
+
+void bind_chain_records(py::module_& m) {
+  Record<ChainSummary>(m, "ChainSummary", "Size and spacing of a chain of snapshots.")
+      .field("snapshots", &ChainSummary::snapshots, "Number of snapshots.")
+      .field("way_points", &ChainSummary::way_points, "Number of nodes without a snapshot.")
+      .field("length_m", &ChainSummary::length_m, "Sum of all legs.")
+      .field("bytes", &ChainSummary::bytes, "Size of the packed form.")
+      .field("bytes_per_m", &ChainSummary::bytes_per_m, "0 for a chain without length.")
+      .field("spacing_m", &ChainSummary::spacing_m, "Mean distance between snapshots.")
+      .field("expected_offset_m", &ChainSummary::expected_offset_m,
+             "Offset to be expected by odometry after travelling spacing_m.");
+  Record<ChainStep>(m, "ChainStep", "The next motion of a robot along a chain of snapshots.")
+      .field("name", &ChainStep::name, "Name of the image, if it has one.")
+      .field(
+          "state", [](const ChainStep& s) { return std::string(to_string(s.state)); },
+          "'travelling', 'homing', 'searching', 'arrived' or 'lost'.")
+      .field("snapshot", &ChainStep::snapshot, "Number of the next snapshot, from 1.")
+      .field("turn_rad", &ChainStep::turn_rad, "Direction of the motion in the robot frame.")
+      .field("advance_m", &ChainStep::advance_m, "Length of the motion.")
+      .field("pose", &ChainStep::pose, "Estimated pose in the frame of the chain.");
+}
+
+void bind_chains(py::module_& m) {
+  bind_chain_records(m);
+  m.def(
+      "record_chain",
+      [](const std::filesystem::path& memory, const py::object& recording, const std::string& name,
+         const std::optional<PictureSource>& source, bool odometry, int threads,
+         const py::kwargs& keywords) {
+        ChainSpacing spacing;
+        Keywords(keywords).options(spacing).finish();
+        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
+        const py::gil_scoped_release free;
+        return record_chain_of(dataset, memory, name, odometry, spacing, threads);
+      },
+      py::arg("memory"), py::arg("recording"), py::arg("name") = "route",
+      py::arg("source") = py::none(), py::kw_only(), py::arg("odometry") = false,
+      py::arg("threads") = 0,
+      append_option_list("Records a route as a chain of snapshots, like `panonav route record "
+                         "--method chain`.",
+                         {options_of<ChainSpacing>()})
+          .c_str());
+  m.def(
+      "follow_chain",
+      [](const std::filesystem::path& memory, const py::object& recording,
+         const std::optional<std::string>& name, const std::optional<PictureSource>& source,
+         bool back) {
+        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
+        const py::gil_scoped_release free;
+        ChainGuide guide(MemoryFile::open(memory, Access::read_only), dataset.source, name,
+                         choose_direction(back));
+        std::vector<ChainStep> steps;
+        for (const DatasetEntry& entry : dataset.entries) {
+          if (!entry.odometry) continue;
+          steps.push_back(make_chain_step(guide, read_observation(entry)));
+          const ChainState state = steps.back().state;
+          if (state == ChainState::arrived || state == ChainState::lost) break;
+        }
+        return steps;
+      },
+      py::arg("memory"), py::arg("recording"), py::arg("name") = py::none(),
+      py::arg("source") = py::none(), py::kw_only(), py::arg("back") = false,
+      "Decides the motions along a chain of snapshots for each image with odometry, like `panonav "
+      "route follow`, until the robot has arrived or is lost.");
+}
+
 }  // namespace
 
 void bind_routes(py::module_& m) {
   bind_recording(m);
   bind_following(m);
+  bind_chains(m);
 }
 
 }  // namespace panonav::python

@@ -376,6 +376,26 @@ def same_route(recording, folder, every_m):
     assert any(step.on_route for step in steps)
 
 
+def test_chains(tmp_path):
+    drive = tmp_path / "drive"
+    panonav.simulate("loop", drive, path="tour", spacing_m=0.25, kind="panorama", heading="path",
+                     rows=24, columns=128, rays_per_axis=1)
+    memory = tmp_path / "chain.panonav"
+    ours = panonav.record_chain(memory, drive, bytes_per_100_m=2000)
+    printed = command_json("route", "record", tmp_path / "theirs.panonav", drive, "--method", "chain",
+                           "--bytes-per-100-m", 2000)[0]
+    assert all(printed[key] == value for key, value in ours.to_dict().items())
+    for back in (False, True):
+        followed = command_json("route", "follow", memory, drive, *(["--back"] if back else []))
+        steps = [step.to_dict() for step in panonav.follow_chain(memory, drive, back=back)]
+        for line in followed:
+            line["name"] = line.pop("file")
+            del line["stamp_s"]
+        assert steps == followed
+    with pytest.raises(panonav.FileError, match="is a chain of snapshots"):
+        panonav.follow_route(memory, drive)
+
+
 def test_scale_by_camera_height(tmp_path):
     drive = panonav.simulate("office", tmp_path / "drive", path="tour", spacing_m=0.3, kind="panorama", heading="path")
     (tmp_path / "walk").mkdir()
