@@ -100,6 +100,11 @@ ReproductionPlan plan_elsewhere(const Experiments& context) {
     const std::filesystem::path folder = options.data / recording;
     plan.push_back({20.0, [=] { elsewhere->reproduce_leave_one_out(folder); }});
   }
+  std::vector<std::filesystem::path> posed;
+  for (const char* const recording : {"ciirc_b670", "gantry_plants", "sussex_route"}) {
+    if (simulation::has_data(options.data, recording)) posed.push_back(options.data / recording);
+  }
+  if (!posed.empty()) plan.push_back({3.0, [=] { elsewhere->reproduce_orientation(posed); }});
   for (const char* const name : {"office", "small_warehouse"}) {
     if (!simulation::has_scene(options.data, name)) continue;
     plan.push_back({60.0, [=] { elsewhere->reproduce_days(name); }});

@@ -57,6 +57,10 @@ struct ElsewhereExperiments : Experiments {
   void reproduce_days(const std::string& place);
   /// Merges the memories of two walks, both through one place or through different places.
   void reproduce_merging();
+  /// Describes the images of recordings (folders of data sets) wrongly in three ways, mirrored,
+  /// turned by 90 degrees and both, and counts how often their poses show it; also how often
+  /// nothing is reported of the right descriptions.
+  void reproduce_orientation(const std::vector<std::filesystem::path>& recordings);
   /// Localises each image of a recording (a data set's folder), rotated at random, in the memory of
   /// all other images: by panonav, the built-in rival methods and `rivals`.
   void reproduce_leave_one_out(const std::filesystem::path& recording,

@@ -11,9 +11,11 @@
 
 #include "lab/elsewhere/experiments.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/orientation_check.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav_simulation/make_each.hpp"
 
@@ -254,6 +256,36 @@ void ElsewhereExperiments::reproduce_leave_one_out(
     others += ", " + pictures.add_other(rival->name(), found, rival->bytes_per_view());
   }
   result.rows[judged].over += "; the others on the same queries: " + others;
+}
+
+void ElsewhereExperiments::reproduce_orientation(
+    const std::vector<std::filesystem::path>& recordings) {
+  const double turn_rad = radians(90.0);
+  std::size_t found = 0;
+  std::size_t silent = 0;
+  std::size_t descriptions = 0;
+  for (const std::filesystem::path& folder : recordings) {
+    Dataset recording = read_dataset(folder);
+    const PictureSource right = recording.source;
+    silent += check_orientation(recording, executor).fault ? 0 : 1;
+    for (const OrientationFault& off :
+         {OrientationFault{true, 0.0}, OrientationFault{false, turn_rad},
+          OrientationFault{true, turn_rad}}) {
+      recording.source = correct_orientation(right, off).value();
+      const auto fault = check_orientation(recording, executor).fault;
+      ++descriptions;
+      found += fault && fault->is_mirrored == off.is_mirrored &&
+                       (fault->turn_rad != 0.0) == (off.turn_rad != 0.0)
+                   ? 1
+                   : 0;
+    }
+  }
+  const std::string what = "images of real recordings with poses, described ";
+  add_rate(result, "elsewhere.orientation.found",
+           what + "wrongly (mirrored, turned by 90 degrees, both): what is wrong is reported",
+           found, descriptions, at_least(1.0));
+  add_rate(result, "elsewhere.orientation.silent", what + "rightly: nothing is reported", silent,
+           recordings.size(), at_least(1.0));
 }
 
 }  // namespace panonav::lab

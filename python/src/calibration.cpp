@@ -3,6 +3,8 @@
 #include "panonav/camera/find_mirror.hpp"
 #include "panonav/camera/mirror_camera.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/orientation_check.hpp"
+#include "recordings.hpp"
 
 namespace panonav::python {
 
@@ -112,10 +114,49 @@ void bind_mirrors(py::module_& m) {
       "check.");
 }
 
+void bind_orientation(py::module_& m) {
+  Record<OrientationCheck>(m, "OrientationCheck",
+                           "What poses or odometry show of the stated orientation of images.")
+      .field("columns_right", &OrientationCheck::columns_right,
+             "True if columns run in the stated direction; None: nothing can be said.")
+      .field("forward_right", &OrientationCheck::forward_right,
+             "True if forward is where it is stated; None: nothing can be said.")
+      .field(
+          "forward_turn_rad",
+          [](const OrientationCheck& c) { return c.fault ? c.fault->turn_rad : 0.0; },
+          "Azimuth of the stated forward direction, counter-clockwise; 0 unless it is wrong.")
+      .field(
+          "turns", [](const OrientationCheck& c) { return c.evidence.turns(); },
+          "Number of compared pairs that turn.")
+      .field(
+          "opposite_turns", [](const OrientationCheck& c) { return c.evidence.opposite_turns(); },
+          "Number of them whose images turn in the opposite direction.")
+      .field(
+          "moves", [](const OrientationCheck& c) { return c.evidence.moves(); },
+          "Number of compared pairs with a direction of motion.")
+      .field("corrected", &OrientationCheck::corrected,
+             "Corrected `PictureSource`; None without a fault, and for two lenses.")
+      .field("explanation", &OrientationCheck::explanation,
+             "The finding in one line; empty if nothing can be said.");
+  m.def(
+      "check_orientation",
+      [](const py::object& recording, const std::optional<PictureSource>& source, int threads) {
+        const Dataset dataset = to_dataset(recording, source);
+        const py::gil_scoped_release free;
+        InterruptibleExecutor executor(threads);
+        return check_orientation(dataset, executor);
+      },
+      py::arg("recording"), py::arg("source") = py::none(), py::kw_only(), py::arg("threads") = 0,
+      "Checks by poses or odometry whether the columns of the images of a recording run in the "
+      "stated direction and forward is where it is stated, as `panonav calibrate --orientation`. "
+      "Reads at most 240 images.");
+}
+
 }  // namespace
 
 void bind_calibration(py::module_& m) {
   bind_mirrors(m);
+  bind_orientation(m);
   Record<DualFisheyeCalibration>(m, "DualFisheyeCalibration", "Calibration of two lenses.")
       .field("camera", &DualFisheyeCalibration::camera,
              "Has the model 'dual-fisheye'; the camera was turned about its vertical.")

@@ -335,6 +335,16 @@ def same_catchment(recording, flags, **options):
     return survey
 
 
+def test_check_orientation(office):
+    run = office / "drive"
+    right = panonav.check_orientation(run)
+    printed = command_json("calibrate", "--orientation", run, "-o", office / "unused.toml")[0]
+    assert printed["orientation_fault"] is None and right.corrected is None
+    assert [right.columns_right, right.forward_right] == [printed["columns_right"], printed["forward_right"]]
+    assert right.columns_right and right.forward_right and "columns run clockwise" in right.explanation
+    assert right.to_dict()["forward_turn_rad"] == 0.0
+
+
 def test_catchment_office(office):
     run = office / "memory_run"
     plainly = same_catchment(run, [])

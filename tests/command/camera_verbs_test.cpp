@@ -358,8 +358,43 @@ TEST_F(CameraVerbs, MemoriseSaysWhereColumnsRunOtherwiseThanStated) {
   EXPECT_GT(fault["opposite_turns"], 10);
   EXPECT_NEAR(fault["forward_turn_deg"].get<double>(), 90.0, 10.0);
   const auto said = run_panonav({"memorise", out_ / "wrong2.panonav", run}).out;
-  EXPECT_TRUE(contains(said, "The columns of the images do not run counter-clockwise")) << said;
+  const std::string finding = "columns run clockwise, not counter-clockwise";
+  EXPECT_TRUE(contains(said, finding)) << said;
   EXPECT_TRUE(contains(said, "columns = \"clockwise\"")) << said;
+
+  // All verbs that read the images or the views say the same.
+  EXPECT_TRUE(contains(run_panonav({"info", out_ / "wrong.panonav"}).out, finding));
+  EXPECT_TRUE(contains(run_panonav({"info", run}).out, finding));
+  EXPECT_TRUE(contains(run_panonav({"localise", out_ / "right.panonav", run}).err, finding));
+  const auto info = answer_of({"info", run, "--json"});
+  EXPECT_EQ(info["orientation_fault"]["columns_run_opposite"], true);
+
+  expect_refusal({"calibrate", "--orientation", run, "-o", run + "/dataset.toml"}, "dataset.toml");
+  const std::string corrected = out_ / "corrected.toml";
+  run_well({"calibrate", "--orientation", run, "-o", corrected});
+  fs::copy_file(corrected, fs::path(run) / "dataset.toml", fs::copy_options::overwrite_existing);
+  EXPECT_TRUE(
+      answer_of({"memorise", out_ / "corrected.panonav", run, "--json"})["orientation_fault"]
+          .is_null());
+  const auto now =
+      answer_of({"calibrate", "--orientation", run, "-o", out_ / "none.toml", "--json"});
+  EXPECT_EQ(now["columns_right"], true);
+  EXPECT_EQ(now["forward_right"], true);
+  EXPECT_TRUE(now["out"].is_null());
+  EXPECT_FALSE(fs::exists(out_ / "none.toml"));
+}
+
+TEST_F(CameraVerbs, EvaluateSaysThatAMapWasMadeOfMisreadImages) {
+  const std::string run = out_ / "run";
+  run_well({"simulate", "office", run, "--path", "walk", "--poses", "60", "--spacing-m", "0.2",
+            "--heading", "path", "--kind", "panorama", "--rows", "20", "--columns", "128"});
+  write_file(fs::path(run) / "dataset.toml",
+             std::string_view("[images]\nkind = \"panorama\"\ncolumns = \"counter-clockwise\"\n"
+                              "elevation_deg = [-30, 40]\n[poses]\nfile = \"poses.csv\"\n"));
+  run_well({"map", out_ / "map.panonav", run});
+  const auto said =
+      run_panonav({"evaluate", out_ / "map.panonav", run + "/poses.csv", "--align", "similarity"});
+  EXPECT_TRUE(contains(said.out, "columns run clockwise, not counter-clockwise")) << said.out;
 }
 
 }  // namespace

@@ -120,6 +120,8 @@ DescribedInput describe_dataset(const std::string& folder) {
     if (has) known += (known.empty() ? "" : ", ") + std::string(name);
   }
   described.facts.push_back("known of each image: " + (known.empty() ? "nothing" : known));
+  const auto some = find_known_fields(dataset);
+  if (some.positions || some.odometry) described.posed_dataset = folder;
   for (const auto& warning : dataset.warnings) described.facts.push_back(warning);
   described.use = {list_verbs_that_take(InputKind::dataset), make_memorise_command(folder, {})};
   std::erase_if(described.use.verbs, [&](const std::string& verb) {

@@ -51,6 +51,7 @@ struct DescribedInput {
   std::uint64_t bytes = 0;         ///< of its files; 0: not known
   std::uint64_t images = 0;        ///< number of its images
   std::vector<std::string> facts;  ///< further lines
+  std::string posed_dataset;       ///< folder of a data set with poses or odometry; else empty
   InputUse use;
 };
 

@@ -1,94 +1,95 @@
 #include "runs/orientation_note.hpp"
 
-#include <cmath>
 #include <filesystem>
 #include <string_view>
-#include <variant>
-#include <vector>
 
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/open_input.hpp"
 
 namespace panonav::command {
 
 namespace {
 
-/// A setting that is wrong: its field in a file, its flag (empty: it has none), and its value.
-struct Correction {
-  std::string field, flag, value;
-};
+/// Returns " --columns-run clockwise --forward-column 0.250".
+std::string format_flags(const OrientationCheck& check) {
+  std::string flags;
+  for (const auto& [field, value] : check.settings) {
+    flags += (field == "columns" ? " --columns-run " : " --forward-column ") + value;
+  }
+  return flags;
+}
 
-std::vector<Correction> list_corrections(const OrientationFault& fault,
-                                         const PictureSource& corrected) {
-  std::vector<Correction> corrections;
-  const auto& camera = corrected.camera;
-  if (fault.is_mirrored) {
-    const auto direction = camera ? camera->direction : corrected.layout.direction;
-    corrections.push_back({camera ? "direction" : "columns", camera ? "" : "--columns-run",
-                           std::string(to_string(direction))});
+/// Returns " columns = "clockwise", forward_column = 0.250".
+std::string format_fields(const OrientationCheck& check) {
+  std::string fields;
+  for (const OrientationSetting& setting : check.settings) {
+    fields += (fields.empty() ? " " : ", ") + to_toml(setting);
   }
-  if (fault.turn_rad == 0.0) return corrections;
-  if (camera && !std::holds_alternative<EquirectangularModel>(camera->model)) {
-    corrections.push_back(
-        {"forward_angle_deg", "", format_fixed(degrees(camera->forward_angle_rad), 0)});
-  } else {
-    corrections.push_back(
-        {"forward_column", camera ? "" : "--forward-column",
-         format_fixed(camera ? camera->forward_column : corrected.layout.forward_column, 3)});
-  }
-  return corrections;
+  return fields;
 }
 
 }  // namespace
 
-std::string describe_orientation(const OrientationFault& fault, const OrientationEvidence& evidence,
-                                 const PictureSource& source, const std::string& recording) {
-  std::string text;
-  if (fault.is_mirrored) {
-    const auto stated = source.camera ? source.camera->direction : source.layout.direction;
-    text = "The columns of the images do not run " + std::string(to_string(stated)) + ": " +
-           (evidence.opposite_turns() > 0 ? std::to_string(evidence.opposite_turns()) + " of " +
-                                                format_count(evidence.turns(), "turn") +
-                                                " of the robot are in the opposite direction. "
-                                          : "motions of the robot in several directions fit only "
-                                            "the opposite. ");
+std::string describe_fault(const OrientationCheck& check, const PictureSource& source,
+                           const std::string& recording) {
+  if (!check.fault) return "";
+  const std::string text = check.explanation + "; ";
+  if (!check.corrected) return text + "calibrate the two lenses again (panonav calibrate --help)";
+  if (source.camera) return text + "state" + format_fields(check) + " in the camera file";
+  if (!recording.empty() && has_dataset_file(recording)) {
+    const auto file = std::filesystem::path(recording) / "dataset.toml";
+    return text + "state" + format_fields(check) + " in " + to_readable_line(file.string());
   }
-  if (fault.turn_rad != 0.0) {
-    text += "Forward is " + format_fixed(degrees(std::abs(fault.turn_rad)), 0) +
-            " degrees to the " + (fault.turn_rad < 0.0 ? "left" : "right") +
-            " of the stated direction, as " + std::to_string(evidence.moves()) +
-            " motions of the robot show. ";
-  }
-  const auto corrected = correct_orientation(source, fault);
-  if (!corrected) return text + "Calibrate the two lenses again: panonav calibrate --help";
-  const auto corrections = list_corrections(fault, *corrected);
-  const auto file = std::filesystem::path(recording) / "dataset.toml";
-  const bool has_flags = !source.camera && !std::filesystem::exists(file);
-  std::string settings;
-  for (const Correction& one : corrections) {
-    if (has_flags) {
-      settings += " " + one.flag + " " + one.value;
-    } else {
-      const bool is_word = one.value.find_first_not_of("-0123456789.") != std::string::npos;
-      settings += (settings.empty() ? " " : ", ") + one.field + " = " +
-                  (is_word ? "\"" + one.value + "\"" : one.value);
-    }
-  }
-  return text + "Memorise the images into a new memory with" + settings +
-         (has_flags       ? ""
-          : source.camera ? " in the camera file"
-                          : " in " + file.string());
+  return text + "say" + format_flags(check);
 }
 
-ordered_json orientation_json(const std::optional<OrientationFault>& fault,
-                              const OrientationEvidence& evidence) {
-  if (!fault) return nullptr;
-  return {{"columns_run_opposite", fault->is_mirrored},
-          {"forward_turn_deg", degrees(fault->turn_rad)},
+ordered_json orientation_json(const OrientationCheck& check) {
+  if (!check.fault) return nullptr;
+  const OrientationEvidence& evidence = check.evidence;
+  return {{"columns_run_opposite", check.fault->is_mirrored},
+          {"forward_turn_deg", degrees(check.fault->turn_rad)},
           {"turns", evidence.turns()},
           {"opposite_turns", evidence.opposite_turns()},
           {"moves", evidence.moves()}};
+}
+
+ExitCode correct_recording(const std::vector<std::string>& inputs, const PictureArguments& pictures,
+                           const std::string& out, Session& session) {
+  const std::string& input = inputs.front();
+  if (inputs.size() > 1) {
+    throw UsageError("--orientation is with " + format_count(inputs.size(), "input") +
+                     "; allowed: one recording");
+  }
+  const Dataset recording = open_recording(input, pictures, {}, session);
+  const OrientationCheck check = check_orientation(recording, session.executor());
+  if (check.explanation.empty()) {
+    return session.no_answer(
+        "panonav calibrate: " + to_readable_line(input) +
+        " does not show the orientation of its images (" +
+        format_count(check.evidence.turns(), "turn") + ", " +
+        format_count(check.evidence.moves(), "motion") +
+        "); it needs poses with headings or odometry, turns in both directions or motions in "
+        "several, and images at most half as far apart as things around are away");
+  }
+  if (check.corrected) write_orientation(out, recording, check);
+  if (session.json()) {
+    const ordered_json written = check.corrected ? ordered_json(out) : ordered_json(nullptr);
+    session.print(json_line({{"input", input},
+                             {"orientation_fault", orientation_json(check)},
+                             {"columns_right", to_json_or_null(check.columns_right)},
+                             {"forward_right", to_json_or_null(check.forward_right)},
+                             {"out", written}}));
+    return ExitCode::done;
+  }
+  if (!check.fault) {
+    session.print(check.explanation + "; there is nothing to correct, and no file is written");
+    return ExitCode::done;
+  }
+  session.print(describe_fault(check, recording.source, input));
+  if (check.corrected) session.print(out + " is written with these settings");
+  return ExitCode::done;
 }
 
 }  // namespace panonav::command

@@ -12,6 +12,7 @@
 #include "panonav/pipeline/open_input.hpp"
 #include "runs/file_content.hpp"
 #include "runs/mirror_options.hpp"
+#include "runs/orientation_note.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {
@@ -55,6 +56,7 @@ struct CalibrateArguments {
   std::optional<std::string> mount;
   std::optional<std::string> export_format;
   std::optional<double> inner_radius_px;
+  bool orientation = false;
   MirrorCircle::SearchOptions search;
   MirrorOptions mirror;
   LensesOptions lenses;
@@ -324,6 +326,9 @@ ExitCode convert_camera(const CalibrateArguments& arguments, Session& session) {
 
 ExitCode calibrate(const Arguments& declared, const CalibrateArguments& arguments,
                    Session& session) {
+  if (arguments.orientation) {
+    return correct_recording(arguments.inputs, arguments.pictures, arguments.out, session);
+  }
   if (arguments.inputs.size() == 1 && is_camera_file(arguments.inputs.front())) {
     auto unused = recording_flags();
     for (const char* flag :
@@ -391,6 +396,21 @@ Run declare_calibrate(Arguments& arguments) {
   declare_topics(arguments, values->pictures.topics);
   declare_part(arguments, values->pictures.part, true);
   arguments.required_option("-o,--out", values->out, "Name of the new camera file (camera.toml)");
+  arguments.flag(
+      "--orientation", values->orientation,
+      "Correct the direction of columns and the forward direction by the poses or "
+      "odometry of INPUT, a recording; write its camera file, or dataset.toml, to --out");
+  declare_picture_layout(arguments, values->pictures);
+  arguments.hide_from_help({"--kind", "--camera", "--columns-run", "--forward-column",
+                            "--elevation-deg", "--ignore-gpano"});
+  arguments.reject_options_unless(
+      {"--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
+       "--ignore-gpano"},
+      [values] { return values->orientation; }, "without --orientation");
+  arguments.reject_options_unless(
+      {"--overlay", "--inner-radius-px", "--mount", "--export", "[mirror]", "[lenses]",
+       "[mirror_search]"},
+      [values] { return !values->orientation; }, "with --orientation");
   arguments.option("--overlay FILE", values->overlay,
                    "Write a PNG image that shows the calibration drawn over the first input image");
   arguments.option(
@@ -406,6 +426,7 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.options("mirror_search", values->search);
   arguments.show_in_help({"--profile", "--inner-elevation-deg", "--rim-elevation-deg",
                           "--direction", "--forward-angle-deg"});
+  arguments.hide_from_help({"--inner-radius-px"});
   const auto make_profile_check = [values](int profile) {
     return [values, profile] { return values->mirror.profile == profile; };
   };
@@ -435,10 +456,12 @@ Verb calibrate_verb() {
       "around it. Rotate the camera on its stand by about 90 degrees between the images. Check the "
       "image of --overlay before you use the camera file. The exit code is 1 if no image shows the "
       "rim of a mirror, if the rim is not at the same pixels in all images, or if the images are "
-      "not sufficient to calibrate two lenses.",
+      "not sufficient to calibrate two lenses, and with --orientation, if the poses do not show "
+      "it.",
       "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
       "  panonav calibrate camchain.yaml -o camera.toml --mount down\n"
       "  panonav calibrate camera.toml -o camchain.yaml --export kalibr\n"
+      "  panonav calibrate --orientation office_run -o corrected.toml\n"
       "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
       "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "
       "--right-roll-deg -90 -o camera.toml",

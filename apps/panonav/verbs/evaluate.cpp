@@ -6,9 +6,12 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/estimate_evaluation.hpp"
+#include "panonav/pipeline/orientation_check.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/recorded_poses.hpp"
 #include "panonav_recordings/recording.hpp"
 #include "reports/map_measures.hpp"
+#include "runs/orientation_note.hpp"
 
 namespace panonav::command {
 
@@ -223,6 +226,26 @@ void note_few_pairs(const EstimateEvaluation& evaluation, const std::string& spa
                " have a true pose, so the errors say nothing about most of the estimate; " + spans);
 }
 
+/// Check of the orientation of the images from which a map was made.
+struct MapOrientation {
+  OrientationCheck check;
+  std::string fault;  ///< line for people; empty: none that true poses show
+};
+
+/// Compares the views of a map with the true poses of their stamps; finds nothing for a trajectory.
+MapOrientation check_map(const EvaluateArguments& arguments, const TrajectoryEstimate& estimate,
+                         const TrajectoryFile& truth) {
+  if (!estimate.map || truth.units.times != estimate.trajectory.units.times) return {};
+  const auto memory = MemoryFile::open(arguments.estimate, Access::read_only);
+  MapOrientation orientation{
+      check_orientation(memory, truth, arguments.options.max_stamp_difference_s), {}};
+  if (orientation.check.fault) {
+    orientation.fault = "the stated orientation of the images is wrong: " +
+                        describe_fault(orientation.check, memory.header().source, "");
+  }
+  return orientation;
+}
+
 ExitCode evaluate(const Arguments& declared, EvaluateArguments arguments, Session& session) {
   TrajectoryEstimate estimate = read_estimate(arguments);
   TrajectoryFile truth =
@@ -233,6 +256,7 @@ ExitCode evaluate(const Arguments& declared, EvaluateArguments arguments, Sessio
   const std::string truth_name = truth.is_estimate ? "reference" : "ground truth";
   const std::array units{estimate.trajectory.units, truth.units};
   const std::array<std::string, 2> formats{estimate.trajectory.format, truth.format};
+  const MapOrientation orientation = check_map(arguments, estimate, truth);
   const std::size_t repeated = estimate.trajectory.repeated + truth.repeated;
   std::optional<EstimateEvaluation> evaluation;
   try {
@@ -253,7 +277,9 @@ ExitCode evaluate(const Arguments& declared, EvaluateArguments arguments, Sessio
   }
   note_few_pairs(*evaluation, spans, session);
   if (session.json()) {
-    session.print(session.json_line(to_json(*evaluation, arguments.options, formats)));
+    ordered_json json = to_json(*evaluation, arguments.options, formats);
+    json["orientation_fault"] = orientation_json(orientation.check);
+    session.print(session.json_line(std::move(json)));
     return ExitCode::done;
   }
   const TrajectoryError& error = evaluation->trajectory;
@@ -268,6 +294,7 @@ ExitCode evaluate(const Arguments& declared, EvaluateArguments arguments, Sessio
                 "; paired by " + describe_pairing(*evaluation, formats, units));
   session.print(describe_alignment(error, arguments.options));
   print_errors(*evaluation, arguments, session);
+  if (!orientation.fault.empty()) session.print(orientation.fault);
   return ExitCode::done;
 }
 

@@ -12,6 +12,8 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/open_input.hpp"
+#include "panonav/pipeline/orientation_check.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/route/snapshot_chain.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -21,6 +23,7 @@
 #include "panonav_recordings/video_file.hpp"
 #include "runs/chain_run.hpp"
 #include "runs/described_input.hpp"
+#include "runs/orientation_note.hpp"
 
 namespace panonav::command {
 
@@ -115,7 +118,8 @@ std::map<std::string, std::size_t> count_views_by_floor(const MemoryFile& memory
   return counts;
 }
 
-ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
+ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info,
+                     const OrientationCheck& orientation) {
   const auto& header = memory.header();
   const auto& steps = header.preprocessing;
   ordered_json json{{"memory", memory.path().string()},
@@ -160,6 +164,7 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
                       {"bytes", bytes}});
   }
   json["routes"] = std::move(routes);
+  json["orientation_fault"] = orientation_json(orientation);
   json["map"] = nullptr;
   if (const auto map = describe_map(memory)) {
     json["map"] = {{"unit", map->unit == LengthUnit::metres ? "m" : "view_steps"},
@@ -170,6 +175,17 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
     json["elevations_rad"] = {header.elevations->bottom_rad, header.elevations->top_rad};
   }
   return json;
+}
+
+/// Prints what poses show of the stated orientation; nothing if they show nothing.
+void print_orientation(const OrientationCheck& check, const PictureSource& source,
+                       const std::string& recording, Session& session) {
+  if (check.fault) {
+    session.print("  " + session.red("orientation") + " " +
+                  describe_fault(check, source, recording));
+  } else if (!check.explanation.empty()) {
+    session.print("  orientation " + check.explanation);
+  }
 }
 
 /// Prints what the memory's map contains, and whether the positions of the views come from it.
@@ -189,9 +205,10 @@ void print_map(const MemoryFile& memory, Session& session) {
 ExitCode print_memory(const std::string& path, Session& session) {
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto info = memory.info();
+  const OrientationCheck orientation = check_orientation(memory);
   session.set_length_unit(read_length_unit(memory));
   if (session.json()) {
-    session.print(json_line(to_json(memory, info)));
+    session.print(json_line(to_json(memory, info, orientation)));
     return ExitCode::done;
   }
   const auto& header = memory.header();
@@ -222,6 +239,7 @@ ExitCode print_memory(const std::string& path, Session& session) {
                                 : std::string()) +
                 ", format " + std::to_string(info.format_version) + ", " +
                 format_count(info.thumbnails, "thumbnail"));
+  print_orientation(orientation, header.source, "", session);
   print_map(memory, session);
   if (info.views > 0 && info.views_with_position == 0) {
     session.print(
@@ -397,6 +415,12 @@ ExitCode print_video(const std::string& path, Session& session) {
 
 ExitCode print_described(const std::string& path, Session& session) {
   const DescribedInput described = describe_input(path);
+  OrientationCheck orientation;
+  std::optional<Dataset> recording;
+  if (!described.posed_dataset.empty()) {
+    recording = open_input(described.posed_dataset);
+    orientation = check_orientation(*recording, session.executor());
+  }
   if (session.json()) {
     session.print(json_line({{"input", path},
                              {"type", described.type},
@@ -404,6 +428,7 @@ ExitCode print_described(const std::string& path, Session& session) {
                              {"bytes", described.bytes},
                              {"images", described.images},
                              {"facts", described.facts},
+                             {"orientation_fault", orientation_json(orientation)},
                              {"verbs", described.use.verbs}}));
     return ExitCode::done;
   }
@@ -412,6 +437,8 @@ ExitCode print_described(const std::string& path, Session& session) {
     session.print("  size        " + std::to_string(described.bytes) + " bytes");
   }
   for (const auto& fact : described.facts) session.print("  " + fact);
+  if (recording)
+    print_orientation(orientation, recording->source, described.posed_dataset, session);
   print_use(described.use, session);
   return ExitCode::done;
 }

@@ -8,6 +8,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/orientation_check.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -16,6 +17,7 @@
 #include "reports/report_page.hpp"
 #include "runs/localised_query.hpp"
 #include "runs/localised_run.hpp"
+#include "runs/orientation_note.hpp"
 
 namespace panonav::command {
 
@@ -122,6 +124,13 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
   require_stored_band(arguments.pictures, file);
   Dataset recording = open_queries(arguments, file.header().source, session);
+  if (arguments.inputs.size() == 1 && recording.entries.size() > 1) {
+    const OrientationCheck orientation = check_orientation(recording, session.executor());
+    if (orientation.fault) {
+      session.note("the stated orientation of the images is wrong: " +
+                   describe_fault(orientation, recording.source, arguments.inputs.front()));
+    }
+  }
   if (has_incomparable_truth(recording, arguments.inputs.front(), file, session)) {
     for (DatasetEntry& entry : recording.entries) entry.pose.reset();
   }

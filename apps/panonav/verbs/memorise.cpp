@@ -181,9 +181,8 @@ void print_map(const MemoriseArguments& arguments, const MemoryMap& map, bool is
 void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
                   const Memoriser::Counts& counts, std::size_t known_before,
                   const std::vector<Skipped>& skipped, const Dataset* recording, Session& session) {
-  const OrientationEvidence orientation =
-      recording ? collect_orientation_evidence(*recording, memory) : OrientationEvidence{};
-  const std::optional<OrientationFault> fault = orientation.find_fault();
+  const OrientationCheck orientation =
+      recording ? check_orientation(*recording, memory) : OrientationCheck{};
   const std::size_t appended = counts.appended;
   const auto info = memory.counts();
   if (session.json()) {
@@ -191,16 +190,15 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
     for (const Skipped& one : skipped) {
       skipped_json.push_back({{"file", one.file}, {"why", one.why}});
     }
-    session.print(
-        json_line(ordered_json{{"memory", arguments.memory},
-                               {"appended", appended},
-                               {"known_before", known_before},
-                               {"skipped", std::move(skipped_json)},
-                               {"views", info.views},
-                               {"views_with_position", info.views_with_position},
-                               {"map", to_json(counts.map)},
-                               {"orientation_fault", orientation_json(fault, orientation)},
-                               {"file_bytes", info.file_bytes}}));
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                         {"appended", appended},
+                                         {"known_before", known_before},
+                                         {"skipped", std::move(skipped_json)},
+                                         {"views", info.views},
+                                         {"views_with_position", info.views_with_position},
+                                         {"map", to_json(counts.map)},
+                                         {"orientation_fault", orientation_json(orientation)},
+                                         {"file_bytes", info.file_bytes}}));
     return;
   }
   session.print(
@@ -208,10 +206,10 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
       (known_before > 0 ? ", " + std::to_string(known_before) + " already in the memory" : "") +
       (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " skipped") + "; " +
       arguments.memory + " holds " + std::to_string(info.views));
-  if (fault) {
-    session.print(
-        session.red("The stated orientation of the images is wrong") + ". " +
-        describe_orientation(*fault, orientation, recording->source, arguments.inputs.front()));
+  if (orientation.fault) {
+    session.print(session.red("The stated orientation of the images is wrong") + ": " +
+                  describe_fault(orientation, recording->source, arguments.inputs.front()) +
+                  ", and memorise them into a new memory");
   }
   if (!memory.header().elevations) {
     session.print(

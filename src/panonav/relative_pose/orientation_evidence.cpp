@@ -98,13 +98,12 @@ OrientationEvidence::CommonTurn OrientationEvidence::find_common_turn(bool is_mi
   return best;
 }
 
-bool OrientationEvidence::is_mirrored() const {
-  if (coin_tail(opposite_turns_, turns_) <= max_chance) return true;
-  if (coin_tail(turns_ - opposite_turns_, turns_) <= max_chance) return false;
-  // On straight drives the same motions agree in both senses.
+std::optional<bool> OrientationEvidence::runs_as_stated() const {
+  if (coin_tail(opposite_turns_, turns_) <= max_chance) return false;
+  if (coin_tail(turns_ - opposite_turns_, turns_) <= max_chance) return true;
+  // On straight drives the same motions agree in both directions.
   const CommonTurn stated = find_common_turn(false);
   const CommonTurn mirrored = find_common_turn(true);
-  if (!is_common(mirrored)) return false;
   std::size_t only_stated = 0;
   std::size_t only_mirrored = 0;
   for (const Move& move : moves_) {
@@ -113,7 +112,10 @@ bool OrientationEvidence::is_mirrored() const {
     only_stated += fits_stated && !fits_mirrored ? 1 : 0;
     only_mirrored += fits_mirrored && !fits_stated ? 1 : 0;
   }
-  return coin_tail(only_mirrored, only_stated + only_mirrored) <= max_chance;
+  const std::size_t only_one = only_stated + only_mirrored;
+  if (is_common(mirrored) && coin_tail(only_mirrored, only_one) <= max_chance) return false;
+  if (is_common(stated) && coin_tail(only_stated, only_one) <= max_chance) return true;
+  return std::nullopt;
 }
 
 bool OrientationEvidence::is_common(const CommonTurn& turn) const {
@@ -121,13 +123,19 @@ bool OrientationEvidence::is_common(const CommonTurn& turn) const {
                                            min_agreeing_share * static_cast<double>(moves_.size());
 }
 
+std::size_t OrientationEvidence::agreeing_moves() const {
+  return find_common_turn(runs_as_stated() == false).agreeing;
+}
+
+std::optional<double> OrientationEvidence::find_turn_rad() const {
+  const CommonTurn common = find_common_turn(runs_as_stated() == false);
+  if (!is_common(common)) return std::nullopt;
+  const double limit_rad = min_forward_error_rad + 3.0 * common.deviation_rad;
+  return std::abs(common.turn_rad) > limit_rad ? common.turn_rad : 0.0;
+}
+
 std::optional<OrientationFault> OrientationEvidence::find_fault() const {
-  OrientationFault fault{is_mirrored(), 0.0};
-  const CommonTurn common = find_common_turn(fault.is_mirrored);
-  if (is_common(common) &&
-      std::abs(common.turn_rad) > min_forward_error_rad + 3.0 * common.deviation_rad) {
-    fault.turn_rad = common.turn_rad;
-  }
+  const OrientationFault fault{runs_as_stated() == false, find_turn_rad().value_or(0.0)};
   if (fault == OrientationFault{}) return std::nullopt;
   return fault;
 }

@@ -33,10 +33,17 @@ class OrientationEvidence {
   [[nodiscard]] std::size_t opposite_turns() const noexcept { return opposite_turns_; }
   /// Number of pairs with a direction of motion.
   [[nodiscard]] std::size_t moves() const noexcept { return moves_.size(); }
+  /// Number of them that agree on where forward is.
+  [[nodiscard]] std::size_t agreeing_moves() const;
 
-  /// Returns what is stated wrongly: the direction of the columns if chance explains the turns with
-  /// a probability of at most 0.001, or the motions fit only mirrored images; and forward if it is
-  /// more than 20 degrees off in most motions. nullopt if nothing is, or the pairs do not show it.
+  /// True if the columns run in the stated direction, false if in the other. nullopt: the pairs do
+  /// not show it. Chance explains the turns with a probability of at most 0.001, or the motions fit
+  /// one direction only.
+  [[nodiscard]] std::optional<bool> runs_as_stated() const;
+  /// Returns the azimuth of the stated forward direction, by most motions; 0 if it is less than 20
+  /// degrees off. nullopt: the motions are few or do not agree.
+  [[nodiscard]] std::optional<double> find_turn_rad() const;
+  /// Returns what the two functions above find to be stated wrongly; nullopt: nothing.
   [[nodiscard]] std::optional<OrientationFault> find_fault() const;
 
  private:
@@ -53,7 +60,6 @@ class OrientationEvidence {
   };
   [[nodiscard]] CommonTurn find_common_turn(bool is_mirrored) const;
   [[nodiscard]] bool is_common(const CommonTurn& turn) const;
-  [[nodiscard]] bool is_mirrored() const;
 
   std::size_t turns_ = 0;
   std::size_t opposite_turns_ = 0;
