@@ -21,6 +21,10 @@ constexpr double square_of_coordinate = 3.841;
 constexpr double square_of_position = 5.991;
 /// Smallest number of fits from which anything is learnt.
 constexpr std::size_t min_fits = 3;
+/// Lines of which one is kept where errors by interpolation are learnt. Two blended lines show an
+/// edge twice, which moves a fit along the path. Midway between the lines both sides cancel out; a
+/// third of the way the error is about its root mean square over all positions between the lines.
+constexpr std::size_t lines_per_kept_line = 3;
 
 /// Returns the correlation that 1 % of correlations of the same distribution exceed, by the normal
 /// distribution of Fisher's z and Student's distribution of its estimated spread. Needs two
@@ -60,12 +64,18 @@ std::vector<float> shuffle_line(std::span<const float> line) {
   return shuffled;
 }
 
+}  // namespace
+
 /// Error of a fit, with the covariance by the noise of the lines.
-struct FitError {
+struct RouteTracker::FitError {
   Point2 position;
   double heading_rad = 0.0;
   std::array<double, 9> covariance{};
 
+  /// Returns the variance of x and of y that puts the error on the circle of 95 %.
+  [[nodiscard]] double square_variance_m2() const {
+    return (position.x_m * position.x_m + position.y_m * position.y_m) / square_of_position;
+  }
   /// Returns the variance of x and of y that must be added so that the error lies on the ellipse of
   /// 95 %; 0 if it lies within it.
   [[nodiscard]] double missing_variance_m2() const {
@@ -79,7 +89,7 @@ struct FitError {
     };
     if (is_within(0.0)) return 0.0;
     double low = 0.0;
-    double high = (position.x_m * position.x_m + position.y_m * position.y_m) / square_of_position;
+    double high = square_variance_m2();
     constexpr int halvings = 40;
     for (int i = 0; i < halvings; ++i) {
       const double middle = 0.5 * (low + high);
@@ -92,29 +102,30 @@ struct FitError {
   }
 };
 
-}  // namespace
-
 struct RouteTracker::TestRoute {
-  TestRoute(const RoutePanorama& route, const RouteFitOptions& options)
-      : lines(make_half(route), options) {
+  /// Keeps one of every `kept_every` lines, and tests up to 40 of the lines after them.
+  TestRoute(const RoutePanorama& route, std::size_t kept_every, const RouteFitOptions& options)
+      : lines(thin_out(route, kept_every), options) {
     constexpr std::size_t samples = 40;
     for (std::size_t s = 0; s < samples; ++s) {
-      // Lines of odd numbers, spread over the route.
-      const std::size_t i = (s * route.size() / samples) | 1U;
+      // Spread over the route, at each distance from a kept line in turn.
+      const std::size_t kept = s * route.size() / samples / kept_every * kept_every;
+      const std::size_t i = kept + 1 + s % (kept_every - 1);
       if (i >= route.size()) break;
-      if (!poses.empty() && poses.back() == route.poses()[i]) continue;
+      if (std::ranges::find(poses, route.poses()[i]) != poses.end()) continue;
       poses.push_back(route.poses()[i]);
       values.push_back(line_values(route, i));
     }
   }
-  static RoutePanorama make_half(const RoutePanorama& route) {
-    RoutePanorama half(route.columns());
-    for (std::size_t i = 0; i < route.size(); i += 2) half.append(route.poses()[i], route.line(i));
-    return half;
+  static RoutePanorama thin_out(const RoutePanorama& route, std::size_t kept_every) {
+    RoutePanorama kept(route.columns());
+    for (std::size_t i = 0; i < route.size(); i += kept_every)
+      kept.append(route.poses()[i], route.line(i));
+    return kept;
   }
 
   RouteLines lines;
-  std::vector<Pose2> poses;                // of the other lines
+  std::vector<Pose2> poses;                // of the tested lines
   std::vector<std::vector<float>> values;  // of these
 };
 
@@ -128,9 +139,9 @@ void RouteTracker::learn(const RoutePanorama& route, const RouteFitOptions& fit)
   const bool is_set = options_.min_correlation != 0.0;
   limits_.min_correlation = is_set ? options_.min_correlation : default_correlation;
   if (route.size() < min_lines) return;
-  const TestRoute test(route, fit);
-  if (!is_set) learn_acceptance(test);
-  learn_model_errors(test);
+  const TestRoute halved(route, 2, fit);
+  if (!is_set) learn_acceptance(halved);
+  learn_model_errors(halved, TestRoute(route, lines_per_kept_line, fit));
 }
 
 void RouteTracker::learn_acceptance(const TestRoute& test) {
@@ -172,9 +183,8 @@ void RouteTracker::learn_acceptance(const TestRoute& test) {
   }
 }
 
-void RouteTracker::learn_model_errors(const TestRoute& test) {
-  std::vector<double> variances_m2;
-  std::vector<double> variances_rad2;
+std::vector<RouteTracker::FitError> RouteTracker::measure_errors(const TestRoute& test) const {
+  std::vector<FitError> errors;
   for (std::size_t i = 0; i < test.poses.size(); ++i) {
     const Pose2& truth = test.poses[i];
     // To the left and right in turn.
@@ -186,12 +196,29 @@ void RouteTracker::learn_model_errors(const TestRoute& test) {
                          fix->covariance};
     // A fit that moves away from the truth has found another minimum, which the limits refuse.
     if (std::hypot(error.position.x_m, error.position.y_m) > std::abs(lateral_m)) continue;
-    variances_m2.push_back(error.missing_variance_m2());
-    variances_rad2.push_back(error.missing_variance_rad2());
+    errors.push_back(error);
   }
-  if (variances_m2.size() < min_fits) return;
-  limits_.model_variance_m2 = order_statistic(std::move(variances_m2), coverage);
-  limits_.model_variance_rad2 = order_statistic(std::move(variances_rad2), coverage);
+  return errors;
+}
+
+void RouteTracker::learn_model_errors(const TestRoute& halved, const TestRoute& thinned) {
+  const auto compute_coverage_limit = [](const std::vector<FitError>& errors, auto variance) {
+    std::vector<double> values;
+    for (const FitError& error : errors) values.push_back((error.*variance)());
+    return order_statistic(std::move(values), coverage);
+  };
+  const std::vector<FitError> errors = measure_errors(halved);
+  if (errors.size() < min_fits) return;
+  limits_.model_variance_m2 = compute_coverage_limit(errors, &FitError::missing_variance_m2);
+  limits_.model_variance_rad2 = compute_coverage_limit(errors, &FitError::missing_variance_rad2);
+  const std::vector<FitError> thinned_errors = measure_errors(thinned);
+  if (thinned_errors.size() < min_fits) return;
+  // Errors of poses or by tilt are in both; those by interpolation grow with the spacing or faster.
+  constexpr auto spacings = static_cast<double>(lines_per_kept_line);
+  limits_.model_variance_m2 +=
+      std::max(0.0, compute_coverage_limit(thinned_errors, &FitError::square_variance_m2) -
+                        compute_coverage_limit(errors, &FitError::square_variance_m2)) /
+      (spacings * spacings);
 }
 
 }  // namespace panonav

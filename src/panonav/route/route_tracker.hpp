@@ -91,8 +91,10 @@ class RouteTracker {
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
 
  private:
-  /// Half of the lines as a route, and lines of the other half.
+  /// Some of the lines as a route, and lines between them.
   struct TestRoute;
+  /// Error of a fit of such a line.
+  struct FitError;
   /// Lists the views in which a search looks for a line.
   void list_search_views();
   /// Sets the limits; leaves those for which there are too few lines or fits.
@@ -102,7 +104,8 @@ class RouteTracker {
   /// directions decide, and any line fits somewhere far from the path.
   [[nodiscard]] bool has_enough_columns(const RouteFix& fix) const;
   [[nodiscard]] bool is_match(const RouteFix& fix) const;
-  void learn_model_errors(const TestRoute& test);
+  [[nodiscard]] std::vector<FitError> measure_errors(const TestRoute& test) const;
+  void learn_model_errors(const TestRoute& halved, const TestRoute& thinned);
   [[nodiscard]] std::optional<RouteFix> find_best_on_route(std::span<const float> line) const;
   [[nodiscard]] std::optional<RouteFix> recover(std::span<const float> line,
                                                 const Pose2& predicted) const;
