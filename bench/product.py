@@ -59,7 +59,8 @@ ROWS = [
     ("unwrap", "unwrap {walk} -o {out}", None),
     ("convert", "convert {walk} {out}.mcap", None),
 ]
-OF_WALKS = ("{walk}", "{route}", "{other}", "arrange")  # what large memories do not have, or what takes hours there
+# Large memories do not have these, or they take hours there, or need more bytes for undo than are allowed (prune).
+OF_WALKS = ("{walk}", "{route}", "{other}", "arrange", "prune")
 
 
 def count_cost(words, instructions=False):

@@ -92,9 +92,9 @@ void check_new_name(std::string_view what, std::string_view name) {
 
 void require_undo_bytes(const std::filesystem::path& file, std::int64_t bytes) {
   if (bytes <= max_undo_bytes) return;
-  throw FileError(file.string(), "would keep " + std::to_string(bytes) +
-                                     " bytes to undo this; allowed: up to " +
-                                     std::to_string(max_undo_bytes) + ", or not to keep them");
+  throw FileError(file.string(),
+                  "would keep " + std::to_string(bytes) + " bytes to undo this; allowed: up to " +
+                      std::to_string(max_undo_bytes) + "; remove fewer views at a time");
 }
 
 void throw_undo_conflict(const std::filesystem::path& file, std::string_view what,
