@@ -68,6 +68,8 @@ TEST_F(ChainVerbs, OptionsOfTheOtherMethodAreRefused) {
     expect_refusal({"route", "record", memory, teach, "--method", "chain", option, "64"},
                    option + " has no effect with --method chain");
   }
+  expect_refusal({"route", "record", memory, teach, "--method", "chain", "--bytes-per-100-m", "50"},
+                 "50; allowed: 0, or 240 and more");
   expect_refusal({"route", "record", memory, teach, "--method", "chain", "--bytes-per-100-m", "-1"},
                  "bytes_per_100_m is -1; allowed: >= 0");
   EXPECT_FALSE(fs::exists(memory));

@@ -233,7 +233,7 @@ TEST(ChainFollower, SearchesForASnapshotThatOdometryHasMissed) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const ToyWorld world = striped_round_room(6.0, seed);
     const SnapshotChain chain =
-        record_chain(world, route, {.max_spacing_m = 4.0, .bytes_per_100_m = 500.0});
+        record_chain(world, route, {.max_spacing_m = 4.0, .bytes_per_100_m = 700.0});
     // The errors are larger than assumed.
     const Drive driven =
         drive(world, chain, route, ChainDirection::forward, route.front(), 0.8, 0.2);

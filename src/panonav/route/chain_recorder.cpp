@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/internal/snapshot_sight.hpp"
 
@@ -115,6 +116,13 @@ ChainRecorder::ChainRecorder(const SnapshotShape& shape, const ChainSpacing& spa
     : spacing_(spacing), odometry_(odometry), chain_(shape) {
   validate(spacing_);
   validate(odometry_);
+  const auto bytes = static_cast<double>(chain_.shape().bytes() + packed_leg_bytes);
+  const double fewest = 100.0 * bytes / spacing_.max_spacing_m;
+  require(spacing_.bytes_per_100_m == 0.0 || spacing_.bytes_per_100_m >= fewest, "bytes_per_100_m",
+          spacing_.bytes_per_100_m,
+          "0, or " + format_number(std::ceil(fewest)) +
+              " and more, as there is a snapshot at least every " +
+              format_number(spacing_.max_spacing_m) + " m");
 }
 
 double ChainRecorder::min_spacing_m() const noexcept {

@@ -14,8 +14,8 @@ namespace panonav {
 /// Spacing of the snapshots of a chain.
 struct ChainSpacing {
   double max_spacing_m = 10.0;  ///< largest distance along the path between snapshots, 0.1 .. 20
-  /// Bytes that 100 m may take, from 50; 0: as many as homing needs. A smaller number than homing
-  /// needs leaves gaps that odometry alone may not bridge.
+  /// Bytes that the snapshots of 100 m may take, at least a snapshot every `max_spacing_m`; 0: as
+  /// many as homing needs. A smaller number leaves gaps that odometry alone may not bridge.
   double bytes_per_100_m = 0.0;
   friend bool operator==(const ChainSpacing&, const ChainSpacing&) = default;
 };
@@ -31,7 +31,8 @@ void visit_options(ChainSpacing& spacing, OptionVisitor& visitor);
 /// pair of views. Cost per view: about 20 home vectors.
 class ChainRecorder {
  public:
-  /// Throws OptionError.
+  /// Throws OptionError; ContractError if `bytes_per_100_m` is too small for one snapshot every
+  /// `max_spacing_m`.
   explicit ChainRecorder(const SnapshotShape& shape = {}, const ChainSpacing& spacing = {},
                          const ChainOdometry& odometry = {});
 
@@ -41,7 +42,8 @@ class ChainRecorder {
   /// the first one.
   std::size_t add(const HomingView& view, const Pose2& moved);
 
-  /// Returns the chain recorded so far, ending with the last view; empty if there was no view.
+  /// Returns the chain recorded so far, ending with the last view or one less
+  /// than 0.1 m before it; empty if there was no view.
   [[nodiscard]] SnapshotChain finish() const;
 
  private:
