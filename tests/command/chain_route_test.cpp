@@ -17,8 +17,8 @@ using nlohmann::json;
 
 using ChainVerbs = RouteVerbs;
 
-// A chain of snapshots takes some bytes a metre; a drive along it, there or back, is told its
-// motions until it has arrived.
+// A chain of snapshots takes some bytes a metre; each image of a drive along it, there or back,
+// gets a motion until the drive has arrived.
 TEST_F(ChainVerbs, AChainIsRecordedListedAndFollowedInBothDirections) {
   const std::string memory = folder_ / "m.panonav";
   (void)record({"--name", "lines"});

@@ -181,26 +181,26 @@ HomewardLoss measure_loss(const Recording& recording, double max_distance_m) {
   return loss;
 }
 
+void expect_small_loss(const Recording& recording, double max_distance_m, int min_pairs,
+                       double min_unpacked) {
+  const HomewardLoss loss = measure_loss(recording, max_distance_m);
+  ::testing::Test::RecordProperty("unpacked", std::to_string(loss.unpacked));
+  ::testing::Test::RecordProperty("packed", std::to_string(loss.packed));
+  ASSERT_GT(loss.pairs, min_pairs);
+  EXPECT_GT(loss.unpacked, min_unpacked);
+  EXPECT_GT(loss.packed, loss.unpacked - 0.02);
+}
+
 TEST(PackedSnapshot, OfPlantsLosesAtMostAFiftiethOfTheHomewardComponent) {
   const auto recording = gantry_plants({.rows = 8, .columns = 90});
   PANONAV_REQUIRE_DATA(recording, "gantry_plants");
-  const HomewardLoss loss = measure_loss(*recording, 0.501);
-  RecordProperty("unpacked", std::to_string(loss.unpacked));
-  RecordProperty("packed", std::to_string(loss.packed));
-  ASSERT_GT(loss.pairs, 5000);
-  EXPECT_GT(loss.unpacked, 0.65);
-  EXPECT_GT(loss.packed, loss.unpacked - 0.02);
+  expect_small_loss(*recording, 0.501, 5000, 0.65);
 }
 
 TEST(PackedSnapshot, OfRoomsLosesAtMostAFiftiethOfTheHomewardComponent) {
   const auto recording = sparse_rooms({.rows = 8, .columns = 512});
   PANONAV_REQUIRE_DATA(recording, "ciirc_b670");
-  const HomewardLoss loss = measure_loss(*recording, 3.0);
-  RecordProperty("unpacked", std::to_string(loss.unpacked));
-  RecordProperty("packed", std::to_string(loss.packed));
-  ASSERT_GT(loss.pairs, 100);
-  EXPECT_GT(loss.unpacked, 0.7);
-  EXPECT_GT(loss.packed, loss.unpacked - 0.02);
+  expect_small_loss(*recording, 3.0, 100, 0.7);
 }
 
 }  // namespace

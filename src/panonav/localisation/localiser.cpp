@@ -23,27 +23,6 @@ namespace panonav {
 
 namespace {
 
-// Returns the signature with the magnitudes of disallowed rows set to 0; unchanged without
-// `allowed_rows`.
-PackedSignature mask_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
-  if (allowed_rows.empty()) return signature;
-  for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
-    if (allowed_rows[i % allowed_rows.size()] == 0) signature.magnitudes[i] = 0;
-  }
-  return signature;
-}
-
-// Returns the features in allowed rows.
-std::optional<LocalFeatures> mask_rows(std::optional<LocalFeatures> features,
-                                       std::span<const std::uint8_t> allowed_rows) {
-  if (features && !allowed_rows.empty()) {
-    std::erase_if(features->features, [&](const LocalFeatures::Feature& feature) {
-      return allowed_rows[feature.row] == 0;
-    });
-  }
-  return features;
-}
-
 /// Largest number of matches that are blurred and compared with a query out of focus.
 constexpr std::size_t blurred_candidates = 64;
 

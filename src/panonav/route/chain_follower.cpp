@@ -109,14 +109,19 @@ bool ChainFollower::is_confident(const SnapshotSight& sight) const {
          sight.confidence >= static_cast<double>(chain_.model().homing_confidence);
 }
 
+// Returns the way to the snapshot, along the axes of the chain.
+Point2 ChainFollower::home_from_robot(const HomeVector& vector) const {
+  const auto r_m = static_cast<double>(chain_.model().typical_distance_m);
+  return Pose2{0.0, 0.0, wrap_angle(-vector.heading_rad)} *
+         Point2{r_m * vector.xi, r_m * vector.eta};
+}
+
 // True if the home vector ends where the error of odometry allows the target to be.
 bool ChainFollower::agrees_with_odometry(const SnapshotSight& sight) const {
-  const auto r_m = static_cast<double>(chain_.model().typical_distance_m);
-  const double heading_rad = wrap_angle(-sight.vector.heading_rad);
-  const Point2 home = Pose2{pose_.x_m, pose_.y_m, heading_rad} *
-                      Point2{r_m * sight.vector.xi, r_m * sight.vector.eta};
+  const Point2 home = home_from_robot(sight.vector);
+  const Point2 end{pose_.x_m + home.x_m, pose_.y_m + home.y_m};
   return sight.vector.frequencies > 0.0 &&
-         distance(home, position(target_)) <= options_.error_factor * error_m();
+         distance(end, position(target_)) <= options_.error_factor * error_m();
 }
 
 void ChainFollower::start(const HomingView& view) {
@@ -151,9 +156,8 @@ void ChainFollower::aim_at(std::size_t node) {
 
 // Sets the pose from the home vector to the target.
 void ChainFollower::fix_pose(const HomeVector& vector) {
-  const auto r_m = static_cast<double>(chain_.model().typical_distance_m);
   const double heading_rad = wrap_angle(-vector.heading_rad);
-  const Point2 home = Pose2{0.0, 0.0, heading_rad} * Point2{r_m * vector.xi, r_m * vector.eta};
+  const Point2 home = home_from_robot(vector);
   const Pose2 fixed{position(target_).x_m - home.x_m, position(target_).y_m - home.y_m,
                     heading_rad};
   learn_drift(fixed);

@@ -79,6 +79,7 @@ class ChainFollower {
   [[nodiscard]] SnapshotSight look_at(std::size_t node, const HomingView& view,
                                       bool any_heading) const;
   [[nodiscard]] bool is_confident(const SnapshotSight& sight) const;
+  [[nodiscard]] Point2 home_from_robot(const HomeVector& vector) const;
   [[nodiscard]] bool agrees_with_odometry(const SnapshotSight& sight) const;
 
   void start(const HomingView& view);
@@ -108,9 +109,9 @@ class ChainFollower {
   double since_target_m_ = 0.0;  // distance driven since the target was chosen
   double expected_path_m_ = 0.0;
   // Systematic errors of the odometry in both drives, for each metre driven.
-  Point2 drift_m_per_m_;         // as by wind, in the frame of the chain
-  double scale_error_ = 0.0;     // of distances
-  double turn_rad_per_m_ = 0.0;  // of the heading
+  Point2 drift_m_per_m_;         // by wind, in the frame of the chain
+  double scale_error_ = 0.0;     // relative error of distances
+  double turn_rad_per_m_ = 0.0;  // drift of the heading
   Pose2 fixed_pose_;             // at the last snapshot that was reached
   double heading_by_odometry_rad_ = 0.0;
   // The present approach.

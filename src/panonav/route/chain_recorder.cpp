@@ -116,8 +116,7 @@ ChainRecorder::ChainRecorder(const SnapshotShape& shape, const ChainSpacing& spa
     : spacing_(spacing), odometry_(odometry), chain_(shape) {
   validate(spacing_);
   validate(odometry_);
-  const auto bytes = static_cast<double>(chain_.shape().bytes() + packed_leg_bytes);
-  const double fewest = 100.0 * bytes / spacing_.max_spacing_m;
+  const double fewest = 100.0 * bytes_per_snapshot() / spacing_.max_spacing_m;
   require(spacing_.bytes_per_100_m == 0.0 || spacing_.bytes_per_100_m >= fewest, "bytes_per_100_m",
           spacing_.bytes_per_100_m,
           "0, or " + format_number(std::ceil(fewest)) +
@@ -125,11 +124,13 @@ ChainRecorder::ChainRecorder(const SnapshotShape& shape, const ChainSpacing& spa
               format_number(spacing_.max_spacing_m) + " m");
 }
 
+double ChainRecorder::bytes_per_snapshot() const noexcept {
+  return static_cast<double>(chain_.shape().bytes() + packed_leg_bytes);
+}
+
 double ChainRecorder::min_spacing_m() const noexcept {
   if (spacing_.bytes_per_100_m == 0.0) return min_snapshot_spacing_m;
-  const auto bytes = static_cast<double>(chain_.shape().bytes() + packed_leg_bytes);
-  return std::clamp(100.0 * bytes / spacing_.bytes_per_100_m, min_snapshot_spacing_m,
-                    spacing_.max_spacing_m);
+  return std::max(100.0 * bytes_per_snapshot() / spacing_.bytes_per_100_m, min_snapshot_spacing_m);
 }
 
 bool ChainRecorder::can_home(const StoredView& from, const StoredView& to) const {
@@ -247,10 +248,10 @@ ChainModel ChainRecorder::learn_model() const {
   std::vector<double> beside;
   std::vector<double> elsewhere;
   std::vector<std::pair<double, bool>> by_confidence;
-  constexpr double beside_share = 0.1;  // of R
+  constexpr double max_length_beside = 0.1;  // in units of R
   for (const ComparedPair& pair : pairs_) {
     const auto r_m = static_cast<double>(model.typical_distance_m);
-    if (pair.distance_m <= std::max(beside_share * r_m, 1.5 * kept_view_spacing_m)) {
+    if (pair.distance_m <= std::max(max_length_beside * r_m, 1.5 * kept_view_spacing_m)) {
       beside.push_back(pair.difference);
     } else if (!pair.is_right) {
       elsewhere.push_back(pair.difference);

@@ -36,6 +36,24 @@ std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) 
 
 }  // namespace
 
+PackedSignature mask_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
+  if (allowed_rows.empty()) return signature;
+  for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
+    if (allowed_rows[i % allowed_rows.size()] == 0) signature.magnitudes[i] = 0;
+  }
+  return signature;
+}
+
+std::optional<LocalFeatures> mask_rows(std::optional<LocalFeatures> features,
+                                       std::span<const std::uint8_t> allowed_rows) {
+  if (features && !allowed_rows.empty()) {
+    std::erase_if(features->features, [&](const LocalFeatures::Feature& feature) {
+      return allowed_rows[feature.row] == 0;
+    });
+  }
+  return features;
+}
+
 std::vector<PositionBounds> bound_neighbours(const VisualMemory& memory,
                                              std::span<const RankedMatch> ranked, double spacing_m,
                                              double position_spacing_m) {
