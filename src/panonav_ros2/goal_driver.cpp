@@ -25,6 +25,7 @@ void GoalDriver::set_memory(const LoadedMemory& memory) {
   end("another memory");
   navigator_.reset();
   route_driver_.reset();
+  chain_driver_.reset();
   memory_ = &memory;
   mission_file_.emplace(memory.path, setup_.node.resume_s);
 }
@@ -39,6 +40,7 @@ void GoalDriver::start(const Mission& mission) {
     if (memory_ == nullptr)
       throw Error("the memory is being made; allowed: first finish, then this");
     route_driver_.reset();
+    chain_driver_.reset();
     if (mission.goal) {
       set_goal(mission.goal->position());
     } else {
@@ -58,6 +60,19 @@ void GoalDriver::start(const Mission& mission) {
 }
 
 void GoalDriver::make_route_driver(const Mission& mission) {
+  const bool is_chain = memory_->file.route_method(mission.route) == RouteMethod::chain;
+  if (mission.back && !is_chain) {
+    throw FileError(memory_->path.string(),
+                    "has no chain of snapshots '" + mission.route +
+                        "'; allowed for the way back: a route that panonav route record --method "
+                        "chain made");
+  }
+  if (is_chain) {
+    chain_driver_.emplace(memory_->file, setup_.tracker.source, mission.route,
+                          mission.back ? ChainDirection::back : ChainDirection::forward,
+                          setup_.navigator.base);
+    return;
+  }
   RouteDriverOptions options{.follower = {.name = mission.route, .tracker = {}, .fit = {}},
                              .base = setup_.navigator.base,
                              .resume_m = mission.along_m};
@@ -81,6 +96,10 @@ void GoalDriver::set_goal(Point2 goal) {
 
 void GoalDriver::drive(const Observation& observation, const std::optional<Pose2>& pose) {
   if (!has_mission()) return;
+  if (chain_driver_) {
+    drive_along_chain(observation);
+    return;
+  }
   mission_file_->store_if_due(mission_, motion_.map_from_odom());
   if (route_driver_) {
     drive_along_route(observation, pose);
@@ -122,6 +141,21 @@ void GoalDriver::drive_along_route(const Observation& observation,
                                                 {"length_m", format_fixed(step.length_m, 3)}};
   if (step.fix) values.push_back({"lateral_m", format_fixed(step.fix->lateral_m, 3)});
   feedback_.publish(make_message(fine, state, std::move(values)));
+}
+
+void GoalDriver::drive_along_chain(const Observation& observation) {
+  const ChainDriver::Step step = chain_driver_->step(observation);
+  const std::string state(to_string(step.state));
+  if (step.state == ChainState::arrived || step.state == ChainState::lost) {
+    end(state, step.state == ChainState::arrived ? fine : error);
+    return;
+  }
+  send(step.velocity);
+  if (!step.decided) return;
+  feedback_.publish(make_message(fine, state,
+                                 {{"snapshot", std::to_string(step.snapshot)},
+                                  {"snapshots", std::to_string(chain_driver_->chain().snapshots())},
+                                  {"remaining_m", format_fixed(step.remaining_m, 3)}}));
 }
 
 void GoalDriver::send(const Velocity& velocity) {

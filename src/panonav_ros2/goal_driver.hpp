@@ -58,6 +58,7 @@ class GoalDriver {
   void set_goal(Point2 goal);
   void drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose);
   void drive_along_route(const Observation& observation, const std::optional<Pose2>& pose);
+  void drive_along_chain(const Observation& observation);
   void send(const Velocity& velocity);
   void publish_areas();
   [[nodiscard]] bool has_mission() const;
@@ -76,7 +77,9 @@ class GoalDriver {
   std::optional<MissionFile> mission_file_;
   Mission mission_;
   std::optional<RobotNavigator> navigator_;
-  std::optional<RouteDriver> route_driver_;  // used instead of the navigator along a route
+  // Used instead of the navigator: along a route panorama, along a chain of snapshots.
+  std::optional<RouteDriver> route_driver_;
+  std::optional<ChainDriver> chain_driver_;
 
   mutable std::mutex mutex_;  // guards the following members and the order of velocities
   bool has_mission_ = false;

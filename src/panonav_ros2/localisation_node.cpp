@@ -191,6 +191,8 @@ struct LocalisationNode::Implementation {
         localiser.start_globally();
       } else if (command == "repeat" && !argument.empty()) {
         driver.start({.route = argument});
+      } else if (command == "return" && !argument.empty()) {
+        driver.start({.route = argument, .back = true});
       } else if (command == "add" && !argument.empty()) {
         localiser.add_view(argument);
       } else if (command == "forget" && !argument.empty()) {
@@ -198,7 +200,10 @@ struct LocalisationNode::Implementation {
       } else if (command == "load" && !argument.empty()) {
         localiser.load_neighbour(argument);
       } else {
-        reject_command(words, "relocalise, cancel, repeat ROUTE, add NAME, forget NAME, load FILE");
+        reject_command(
+            words,
+            "relocalise, cancel, repeat ROUTE, return ROUTE, add NAME, forget NAME, load "
+            "FILE");
       }
     } catch (const Error& error) {
       return "refused: " + to_readable_line(error.what());

@@ -14,6 +14,7 @@ namespace panonav::ros2 {
 struct Mission {
   std::optional<Pose2> goal;
   std::string route;
+  bool back = false;  ///< along a chain of snapshots from its end; such a drive is not stored
   std::optional<double> along_m = {};  ///< path length already driven
   double min_correlation = 0.0;  ///< threshold learnt by the route's follower; 0: not yet learnt
   Pose2 map_from_odom = {};      ///< when the mission was stored

@@ -139,5 +139,87 @@ TEST_F(RouteDriving, GoesOnWhereItWasAndBelievesAWitness) {
   }
 }
 
+/// The same round, remembered as a chain of snapshots.
+class ChainDriving : public RouteDriving {
+ protected:
+  ChainDriving() {
+    auto file = MemoryFile::open(memory, Access::read_write);
+    const HomingEncoder encoder(file.header(), file.header().source);
+    ChainRecorder recorder;
+    simulation::SimulatedOdometry drifting({}, 4);
+    Pose2 read;
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const Pose2 before = read;
+      if (i > 0) read = drifting.advance(inverse(path[i - 1]) * path[i]);
+      recorder.add(encoder.view(encoder.panorama(Observation(picture(path[i])))),
+                   inverse(before) * read);
+    }
+    file.save_chain("home", recorder.finish());
+  }
+
+  /// Drives and returns the robot's final pose; `carry` may put it elsewhere at each step.
+  Pose2 drive_chain(Pose2 robot, ChainDirection direction, DriveKind drive, ChainState& state,
+                    const std::function<void(int, Pose2&)>& carry = {}) {
+    const BaseOptions base{.drive = drive};
+    ChainDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt, "home", direction,
+                       base);
+    simulation::SimulatedOdometry wheels({}, 9);
+    Pose2 read;
+    decisions = 0;
+    for (int i = 0; i < 1000; ++i) {
+      Observation seen(picture(robot));
+      seen.odometry = read;
+      const ChainDriver::Step step = driver.step(seen);
+      state = step.state;
+      decisions += step.decided ? 1 : 0;
+      EXPECT_LE(step.snapshot, driver.chain().snapshots());
+      if (state == ChainState::arrived || state == ChainState::lost) {
+        EXPECT_EQ(step.velocity, Velocity{});
+        EXPECT_EQ(driver.step(seen).velocity, Velocity{});
+        break;
+      }
+      const Pose2 moved = integrate_velocity(step.velocity, base.period_s);
+      read = wheels.advance(moved);
+      robot = robot * moved;
+      way_m += std::hypot(moved.x_m, moved.y_m);
+      if (carry) carry(i, robot);
+    }
+    return robot;
+  }
+
+  int decisions = 0;
+};
+
+TEST_F(ChainDriving, RepeatsTheChainInBothDirectionsWithEveryDrive) {
+  for (const ChainDirection direction : {ChainDirection::forward, ChainDirection::back}) {
+    for (const DriveKind drive : {DriveKind::differential, DriveKind::holonomic}) {
+      const bool is_back = direction == ChainDirection::back;
+      way_m = 0.0;
+      ChainState state{};
+      const Pose2 robot =
+          drive_chain((is_back ? end : start) * Pose2{0.0, 0.1, 0.3}, direction, drive, state);
+      EXPECT_EQ(state, ChainState::arrived);
+      EXPECT_LT(distance(robot.position(), (is_back ? start : end).position()), 0.2);
+      EXPECT_GT(way_m, 8.0);      // the round ends where it begins
+      EXPECT_LT(decisions, 400);  // a motion takes several periods
+    }
+  }
+}
+
+TEST_F(ChainDriving, ARobotThatWasCarriedAwayDoesNotClaimToHaveArrived) {
+  ChainState state{};
+  (void)drive_chain(start, ChainDirection::forward, DriveKind::differential, state,
+                    [&](int i, Pose2& robot) {
+                      if (i == 60) robot = {6.8, 1.0, 0.5};
+                    });
+  EXPECT_NE(state, ChainState::arrived);
+  ChainDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt, "home",
+                     ChainDirection::back);
+  EXPECT_THROW((void)driver.step(picture(start)), ContractError);
+  EXPECT_THROW(ChainDriver(MemoryFile::open(memory, Access::read_only), std::nullopt, "nowhere",
+                           ChainDirection::back),
+               FileError);
+}
+
 }  // namespace
 }  // namespace panonav::testing

@@ -2,6 +2,8 @@
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
+#include "panonav/route/chain_recorder.hpp"
 #include "panonav_ros2/simulated_robot.hpp"
 #include "ros2/node_on_the_wire.hpp"
 
@@ -153,6 +155,29 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   EXPECT_EQ(ask("repeat drive"), "repeat done");
   EXPECT_TRUE(arrives());
   EXPECT_FALSE(fs::exists(mission));
+
+  // A chain of snapshots leads back to where it began; a route panorama does not.
+  EXPECT_EQ(ask("return drive").find("refused: "), 0U);
+  (void)FastPeer::next(result, 5s);  // the refusal
+  const HomingEncoder encoder(MemoryFile::open(drive, Access::read_only).header(), source());
+  ChainRecorder recorder;
+  const Pose2 beginning{0.8, 0.8, 0.2};
+  for (int i = 0; i <= 20; ++i) {
+    const Pose2 moved{i == 0 ? 0.0 : 0.1, 0.0, 0.0};
+    recorder.add(
+        encoder.view(encoder.panorama(Observation(picture(beginning * Pose2{0.1 * i, 0.0, 0.0})))),
+        moved);
+  }
+  MemoryFile::open(drive, Access::read_write).save_chain("chain", recorder.finish());
+  FastPeer::write(set_pose,
+                  recordings::ros::PoseStamped{
+                      {0, "map"}, recordings::ros::to_pose(beginning * Pose2{2.0, 0.0, 1.0})});
+  std::this_thread::sleep_for(100ms);
+  EXPECT_EQ(ask("return chain"), "return done");
+  const auto ending = FastPeer::next(result, 30s);
+  ASSERT_FALSE(ending.empty());
+  EXPECT_EQ(read<recordings::ros::DiagnosticArray>(ending).status.at(0).message, "arrived");
+  EXPECT_LT(distance(robot_is().position(), beginning.position()), 0.25);
 
   // The mission of a node that was killed is continued by the next one.
   carried_back();

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "panonav/motion/path_follower.hpp"
 #include "panonav/motion/velocity.hpp"
+#include "panonav/pipeline/chain_route.hpp"
 #include "panonav/pipeline/route_follower.hpp"
 
 namespace panonav {
@@ -80,5 +83,41 @@ class RouteDriver {
 
 /// Returns "searching", "driving", "arrived" or "lost".
 [[nodiscard]] std::string_view to_string(RouteDriver::State state);
+
+/// Repeats a chain of snapshots: takes an image with its odometry, returns a velocity. The robot
+/// carries out one motion of a `ChainGuide` by odometry, then decides the next one by the image at
+/// its end; images in between are not used. One thread at a time.
+class ChainDriver {
+ public:
+  /// The robot's next motion after an observation, and its place along the chain.
+  struct Step {
+    ChainState state = ChainState::travelling;  ///< after the last decision
+    Velocity velocity;                          ///< for the next period; 0 if arrived or lost
+    bool decided = false;                       ///< true if this image decided the next motion
+    std::size_t snapshot = 0;  ///< number of the snapshot ahead, from 1 in the recorded order
+    double remaining_m = 0.0;  ///< length of the present motion that is left
+  };
+
+  /// Throws as `ChainGuide`, and OptionError.
+  ChainDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
+              const std::optional<std::string>& name, ChainDirection direction,
+              const BaseOptions& base = {});
+
+  /// Returns the next motion; call it once in each period of the base until the robot has arrived
+  /// or is lost. Throws as `ChainGuide::step`.
+  [[nodiscard]] Step step(const Observation& observation);
+
+  /// Returns the chain.
+  [[nodiscard]] const SnapshotChain& chain() const noexcept { return guide_.chain(); }
+
+ private:
+  /// Returns the point to which the present motion leads, in the robot frame at `odometry`.
+  [[nodiscard]] Point2 target_from(const Pose2& odometry) const;
+
+  BaseOptions base_;
+  ChainGuide guide_;
+  std::optional<ChainDecision> decision_;
+  Pose2 decided_at_;  // pose by odometry at the last decision
+};
 
 }  // namespace panonav
