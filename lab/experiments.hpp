@@ -2,11 +2,13 @@
 
 #include <functional>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "lab/rows.hpp"
 #include "panonav/core/executor.hpp"
+#include "panonav_simulation/mission.hpp"
 #include "panonav_simulation/place_recording.hpp"
 
 namespace panonav::lab {
@@ -17,6 +19,11 @@ struct Experiments {
   const ReproductionOptions& options;
   Executor& executor;
   Reproduction& result;
+
+  /// Returns the rendering of views with the optics of the options. `pixel_size`: of mirror images,
+  /// as of `make_mirror_rendering`.
+  [[nodiscard]] simulation::PanoramaRendering make_rendering(int rows, int columns,
+                                                             int pixel_size = 1) const;
 };
 
 /// One step of the reproduction of a paper.
@@ -78,6 +85,11 @@ struct NavigationExperiments : Experiments {
   /// Measures missions in variants of `loop` with one path blocked, which leaves a detour, and with
   /// two blocked, which leaves none.
   void reproduce_blocked_missions() const;
+
+  /// Makes a place for missions whose robot has the optics of the options. Its mirror images have
+  /// 320 x 240 pixels, because a mission takes ten a second.
+  [[nodiscard]] simulation::MissionPlace make_place(
+      simulation::Scene scene, std::optional<Point2> inside = std::nullopt) const;
 };
 
 /// The experiments of [Y03], and those that its author announced as future work.

@@ -9,6 +9,7 @@
 #include "lab/experiments.hpp"
 #include "lab/m03/experiments.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/worlds.hpp"
 
 namespace panonav::lab {
@@ -168,15 +169,16 @@ const Paper& find_paper(std::string_view name) {
   static const std::array<Paper, 7> papers{{
       {"f11",
        {.scenes = 20, .runs = 20},
-       {.scenes = 2, .runs = 1, .columns = 256, .max_views = 1000},
+       {.optics = Optics::panorama, .scenes = 2, .runs = 1, .columns = 256, .max_views = 1000},
        plan_f11},
       {"m03",
        {.seed = 601, .scenes = 10, .runs = 4},
-       {.seed = 601, .scenes = 1, .runs = 3, .variants = 2},
+       {.optics = Optics::panorama, .seed = 601, .scenes = 1, .runs = 3, .variants = 2},
        plan_m03},
       {"m04",
        {.scenes = 20, .runs = 100},
-       {.scenes = 2,
+       {.optics = Optics::panorama,
+        .scenes = 2,
         .runs = 2,
         .queries = 15,
         .fine_lattice_every = 0,
@@ -185,11 +187,12 @@ const Paper& find_paper(std::string_view name) {
        plan_m04},
       {"navigation",
        {.seed = 1001, .scenes = 4, .runs = 100},
-       {.seed = 1001, .scenes = 2, .runs = 2},
+       {.optics = Optics::panorama, .seed = 1001, .scenes = 2, .runs = 2},
        plan_navigation},
       {"s06",
        {.seed = 101, .scenes = 5},
-       {.seed = 101,
+       {.optics = Optics::panorama,
+        .seed = 101,
         .scenes = 2,
         .goals_every = 4,
         .goals_every_further = 8,
@@ -220,6 +223,13 @@ const Paper& find_paper(std::string_view name) {
 }
 
 }  // namespace
+
+simulation::PanoramaRendering Experiments::make_rendering(int rows, int columns,
+                                                          int pixel_size) const {
+  if (options.optics == Optics::mirror)
+    return simulation::make_mirror_rendering(rows, columns, std::nullopt, pixel_size);
+  return {.rows = rows, .columns = columns, .rays_per_axis = 1};
+}
 
 void require_minima(std::initializer_list<OptionMinimum> options) {
   for (const auto& [name, value, min] : options) {

@@ -19,6 +19,12 @@ struct MissionGrid {
   double spacing_m = 0.0;
 };
 
+/// Optics of the views in the experiments of a paper.
+enum class Optics {
+  mirror,   ///< images of the simulated mirror camera, 640 x 480, unwarped as those of a robot
+  panorama  ///< panoramas that are rendered directly: no mirror, some four times as fast
+};
+
 /// Extent of the experiments of a paper. The experiments of each paper read only some of the
 /// members; `default_options` returns the values of a paper.
 struct ReproductionOptions {
@@ -26,6 +32,8 @@ struct ReproductionOptions {
   /// Folder of the recordings and Gazebo worlds (docs/formats.md); if empty, their experiments are
   /// skipped.
   std::filesystem::path data = {};
+  /// Not used by [Y03], whose lines are always those of a mirror, and by the experiments elsewhere.
+  Optics optics = Optics::mirror;
   std::uint64_t seed = 1;  ///< of the first scene; each next scene adds 1
   int scenes = 20;         ///< variants of a scene; fewer for some experiments
   int runs = 20;           ///< missions, paths, walks or homing runs in each place

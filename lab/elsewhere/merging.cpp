@@ -169,7 +169,7 @@ void ElsewhereExperiments::reproduce_merging() {
     if (!simulation::has_scene(options.data, name)) continue;
     const simulation::PlaceRecording place = simulation::make_empty_place(
         simulation::make_or_read_scene(options.data, name, {.seed = options.seed}), options.seed,
-        512, executor);
+        {.columns = 512, .rays_per_axis = 1}, executor);
     for (int i = 0; i < options.walks; ++i) {
       sessions[name].push_back(
           record_walk(place, std::string(name) + "_" + std::to_string(i), options.walk_pictures,

@@ -274,7 +274,7 @@ simulation::PlaceRecording MappingExperiments::make_variant(const std::string& s
                                                             int number) const {
   const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(number);
   return simulation::make_empty_place(simulation::make_scene(scene, {.seed = seed}), seed,
-                                      options.columns, executor);
+                                      make_rendering(options.rows, options.columns), executor);
 }
 
 void MappingExperiments::reproduce_first_set() const {

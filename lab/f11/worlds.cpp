@@ -357,8 +357,9 @@ void MappingExperiments::reproduce_identical_doors() const {
 void MappingExperiments::reproduce_world(const std::string& name) const {
   constexpr double length_m = 60.0;
   constexpr double spacing_m = 0.15;
-  const simulation::PlaceRecording place = simulation::make_empty_place(
-      simulation::read_gazebo_world(options.data, name), options.seed, options.columns, executor);
+  const simulation::PlaceRecording place =
+      simulation::make_empty_place(simulation::read_gazebo_world(options.data, name), options.seed,
+                                   make_rendering(options.rows, options.columns), executor);
   WorldErrors errors;
   for (int run = 0; run < options.runs; ++run) {
     Random random(options.seed, 300 + static_cast<std::uint64_t>(run));
@@ -419,8 +420,9 @@ void MappingExperiments::reproduce_recordings() const {
 void MappingExperiments::measure_large_maps() const {
   // Each round has its own small lateral offset, so that no view repeats exactly.
   constexpr int columns = 256;
-  const simulation::PlaceRecording place = simulation::make_empty_place(
-      simulation::make_scene("loop", {.seed = options.seed}), options.seed, columns, executor);
+  const simulation::PlaceRecording place =
+      simulation::make_empty_place(simulation::make_scene("loop", {.seed = options.seed}),
+                                   options.seed, make_rendering(options.rows, columns), executor);
   Random random(options.seed, 400);
   std::vector<Point2> path;
   const auto rounds = options.max_views / 180 + 2;

@@ -190,7 +190,8 @@ simulation::PlaceRecording TrackingExperiments::record_variant(const std::string
                                    .spacing_m = spacing_m,
                                    .queries = 1,
                                    .rows = options.rows,
-                                   .columns = columns},
+                                   .columns = columns,
+                                   .mirror = options.optics == Optics::mirror},
                                   executor);
 }
 

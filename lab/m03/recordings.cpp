@@ -96,7 +96,8 @@ void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
                                 .spacing_m = spacing_m,
                                 .queries = 1,
                                 .rows = options.rows,
-                                .columns = options.columns / 2},
+                                .columns = options.columns / 2,
+                                .mirror = options.optics == Optics::mirror},
                                executor);
   const auto remembered = make_tracking_place(place, executor);
   RunCondition noisy = make_clean_condition();

@@ -77,7 +77,10 @@ std::string append_shape_difference(const std::string& title, double mu) {
 class LatticeExperiment {
  public:
   explicit LatticeExperiment(const Experiments& context)
-      : options_(context.options), executor_(context.executor), result_(context.result) {}
+      : options_(context.options),
+        executor_(context.executor),
+        result_(context.result),
+        rendering_(context.make_rendering(options_.rows, 256)) {}
 
   void run_scene(int scene) {
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(scene);
@@ -131,9 +134,7 @@ class LatticeExperiment {
  private:
   [[nodiscard]] simulation::PlaceRecording make_place(simulation::Scene scene,
                                                       std::uint64_t seed) const {
-    auto place = simulation::make_empty_place(std::move(scene), seed, 256, executor_);
-    place.rendering.rows = options_.rows;
-    return place;
+    return simulation::make_empty_place(std::move(scene), seed, rendering_, executor_);
   }
 
   void arrange_hall(std::uint64_t seed, bool drawn) {
@@ -270,6 +271,7 @@ class LatticeExperiment {
   const ReproductionOptions& options_;
   Executor& executor_;
   Reproduction& result_;
+  simulation::PanoramaRendering rendering_;
   ArrangementQuality hall_with_phases_, hall_plain_, small_room_, coarse_, coarse_without_phases_,
       coarse_plain_, fine_, fine_without_phases_;
   std::vector<double> turn_error_deg_, correlation_range_, time_ms_;

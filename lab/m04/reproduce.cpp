@@ -32,13 +32,15 @@ void add_office(const FigureExperiments& experiments, std::uint64_t seed,
                                 .seed = seed,
                                 .spacing_m = 0.25,
                                 .queries = context.options.queries,
-                                .rows = context.options.rows},
+                                .rows = context.options.rows,
+                                .mirror = context.options.optics == Optics::mirror},
                                context.executor);
   for (const auto& experiment : experiments) experiment->add(place, context.executor);
 }
 
 void reproduce_missions(const MissionGrid& grid, const Experiments& context) {
-  const ReproductionOptions missions{.seed = context.options.seed + mission_seed_offset,
+  const ReproductionOptions missions{.optics = context.options.optics,
+                                     .seed = context.options.seed + mission_seed_offset,
                                      .scenes = context.options.mission_scenes,
                                      .runs = context.options.runs};
   NavigationExperiments{{missions, context.executor, context.result}}.reproduce_grid_missions(

@@ -158,13 +158,22 @@ std::optional<double> find_blocking_width_m(const simulation::Scene& scene,
 
 }  // namespace
 
+simulation::MissionPlace NavigationExperiments::make_place(simulation::Scene scene,
+                                                           std::optional<Point2> inside) const {
+  simulation::MissionPlace place =
+      simulation::make_mission_place(std::move(scene), executor, inside);
+  constexpr int pixel_size = 2;
+  place.rendering = make_rendering(place.rendering.rows, place.rendering.columns, pixel_size);
+  return place;
+}
+
 void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
                                                     double spacing_m) const {
   MissionResults measured;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::MissionPlace place =
-        simulation::make_mission_place(simulation::make_scene(scene, {.seed = seed}), executor);
+        make_place(simulation::make_scene(scene, {.seed = seed}));
     const simulation::RememberedPlace remembered =
         simulation::memorise_grid(place, spacing_m, Random(seed, 1).next(), executor);
     const auto missions = simulation::sample_missions(
@@ -190,16 +199,16 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::SceneVariation variation{.seed = seed};
-    const simulation::MissionPlace place = simulation::make_mission_place(
-        simulation::make_or_read_scene(options.data, scene, variation), executor);
+    const simulation::MissionPlace place =
+        make_place(simulation::make_or_read_scene(options.data, scene, variation));
     const simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, plan_exploring_drive(place, seed), simulation::make_noisy_wheels(),
         Random(seed, 1).next(), executor);
     variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
     variation.moved_objects = moved_objects_fraction;
     variation.moved_seed = Random(seed, 4).next();
-    const simulation::MissionPlace other = simulation::make_mission_place(
-        simulation::make_or_read_scene(options.data, scene, variation), executor);
+    const simulation::MissionPlace other =
+        make_place(simulation::make_or_read_scene(options.data, scene, variation));
     simulation::MissionOptions mission;
     mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
     const double radius_m = 0.5 * remembered.spacing_m;
@@ -261,7 +270,7 @@ void NavigationExperiments::reproduce_tours() const {
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::MissionPlace place =
-        simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
+        make_place(simulation::make_scene("loop", {.seed = seed}));
     const simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, plan_exploring_drive(place, seed), simulation::make_noisy_wheels(),
         Random(seed, 1).next(), executor);
@@ -309,8 +318,7 @@ void NavigationExperiments::reproduce_route_missions() const {
   std::map<NavigationDecision::Event, std::size_t> events;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
-    simulation::MissionPlace place =
-        simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
+    simulation::MissionPlace place = make_place(simulation::make_scene("loop", {.seed = seed}));
     place.line = simulation::make_line_sensor(place);
     const auto drive = plan_exploring_drive(place, seed);
     simulation::RememberedPlace remembered = simulation::memorise_drive(
@@ -357,7 +365,7 @@ void NavigationExperiments::reproduce_blocked_missions() const {
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::Scene scene = simulation::make_scene("loop", {.seed = seed});
-    const simulation::MissionPlace place = simulation::make_mission_place(scene, executor);
+    const simulation::MissionPlace place = make_place(scene);
     const auto drive = plan_exploring_drive(place, seed);
     const simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, drive, simulation::make_noisy_wheels(), Random(seed, 1).next(), executor);
@@ -379,9 +387,9 @@ void NavigationExperiments::reproduce_blocked_missions() const {
           find_blocking_width_m(scene, screens, mission.start.position(), drive[goal].position());
       if (!width_m) continue;
       for (const bool both : {false, true}) {
-        const simulation::MissionPlace now = simulation::make_mission_place(
-            add_screens(scene, std::span(screens).first(both ? 2 : 1), *width_m), executor,
-            mission.start.position());
+        const simulation::MissionPlace now =
+            make_place(add_screens(scene, std::span(screens).first(both ? 2 : 1), *width_m),
+                       mission.start.position());
         const auto runs = simulation::run_missions(
             now, remembered, {mission}, {},
             Random(seed, 100 + static_cast<std::uint64_t>(k)).next(), executor);

@@ -11,6 +11,7 @@
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/recording.hpp"
 
 namespace panonav::lab {
 
@@ -196,10 +197,10 @@ std::vector<TrackingRun> record_runs(const std::vector<std::vector<Pose2>>& pose
     Executor here(1);
     for (std::size_t j = begin; j < end; ++j) {
       const auto [r, i] = jobs[j];
-      Panorama view = renderer.render_panorama(
-          {.pose = poses[r][i], .height_m = place.scene.camera_height_m}, place.rendering, here);
       views[r][i] = compute_packed_signature(
-          simulation::apply_sensor(std::move(view), sensor, seed + 1000 * r + i),
+          simulation::capture_panorama(renderer, poses[r][i], place.rendering,
+                                       {.camera_height_m = place.scene.camera_height_m}, sensor,
+                                       seed + 1000 * r + i, here),
           remembered.memory());
     }
   });

@@ -8,6 +8,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/sensor.hpp"
 
@@ -38,7 +39,7 @@ ArenaRecording record_views(const simulation::Renderer& renderer, const simulati
       const Pose2 truth{position.x_m + options.position_noise_m * error_x,
                         position.y_m + options.position_noise_m * error_y,
                         wrap_angle(heading + options.heading_noise_rad * error_heading)};
-      rows[i] = render_arena_row(renderer, scene, truth, random.next(), here);
+      rows[i] = render_arena_row(renderer, scene, options.rendering, truth, random.next(), here);
       const Panorama one_row(1, s06_columns, std::nullopt, rows[i]);
       views[i] = ArenaView{{position.x_m, position.y_m, heading},
                            homing_view(compute_signature(one_row, s06_components))};
@@ -58,17 +59,19 @@ std::vector<Pose2> collect_poses(const ArenaRecording& recording) {
 
 }  // namespace
 
+simulation::PanoramaRendering make_arena_rendering(Optics optics) {
+  constexpr ElevationBand around_horizon{-half_band_rad, half_band_rad};
+  if (optics == Optics::mirror)
+    return simulation::make_mirror_rendering(camera_rows, camera_columns, around_horizon);
+  return {.rows = camera_rows, .columns = camera_columns, .elevations = around_horizon};
+}
+
 std::vector<float> render_arena_row(const simulation::Renderer& renderer,
-                                    const simulation::Scene& scene, const Pose2& pose,
-                                    std::uint64_t seed, Executor& executor) {
-  const simulation::PanoramaRendering rendering{.rows = camera_rows,
-                                                .columns = camera_columns,
-                                                .elevations = {-half_band_rad, half_band_rad},
-                                                .rays_per_axis = 2};
-  const Panorama view = simulation::apply_sensor(
-      renderer.render_panorama({.pose = pose, .height_m = scene.camera_height_m}, rendering,
-                               executor),
-      {}, seed);
+                                    const simulation::Scene& scene,
+                                    const simulation::PanoramaRendering& rendering,
+                                    const Pose2& pose, std::uint64_t seed, Executor& executor) {
+  const Panorama view = simulation::capture_panorama(
+      renderer, pose, rendering, {.camera_height_m = scene.camera_height_m}, {}, seed, executor);
   constexpr int ratio = camera_columns / s06_columns;
   std::vector<float> row(s06_columns);
   for (int c = 0; c < s06_columns; ++c) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lab/baselines/expected_image_homing.hpp"
+#include "lab/reproduction.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/homing/homing_survey.hpp"
 #include "panonav_simulation/place_recording.hpp"
@@ -25,6 +26,10 @@ enum class ArenaHeading {
   random,  ///< random, as of a robot without a compass
 };
 
+/// Returns the rendering of 10 rows of 360 pixels, 5 degrees below to 5 above the horizon, that the
+/// rows of an arena are averaged from.
+[[nodiscard]] simulation::PanoramaRendering make_arena_rendering(Optics optics);
+
 struct ArenaOptions {
   std::uint64_t seed = 1;
   ArenaHeading heading = ArenaHeading::random;
@@ -34,6 +39,8 @@ struct ArenaOptions {
   /// Light of the second recording, relative to the first.
   double light = 1.05;
   double spacing_m = s06_spacing_m;
+  /// 10 rows of 360 pixels around the horizon; with or without a mirror.
+  simulation::PanoramaRendering rendering = make_arena_rendering(Optics::panorama);
 };
 
 /// A view and its pose. The heading serves to evaluate home vectors; homing rules do not use it.
@@ -61,11 +68,13 @@ struct Arena : simulation::SimulatedPlace {
 /// is free.
 [[nodiscard]] Arena record_arena(const ArenaOptions& options, Executor& executor);
 
-/// Renders the row of pixels at `pose` through a noisy camera: 360 pixels of 1 degree and 10 rows,
-/// averaged to 72 pixels.
+/// Renders the row of pixels at `pose` through a noisy camera with the rendering of
+/// `ArenaOptions`, averaged to 72 pixels.
 [[nodiscard]] std::vector<float> render_arena_row(const simulation::Renderer& renderer,
-                                                  const simulation::Scene& scene, const Pose2& pose,
-                                                  std::uint64_t seed, Executor& executor);
+                                                  const simulation::Scene& scene,
+                                                  const simulation::PanoramaRendering& rendering,
+                                                  const Pose2& pose, std::uint64_t seed,
+                                                  Executor& executor);
 
 /// Returns the options of homing runs in [S06 section 4.4], scaled to the grid spacing of the
 /// arena.

@@ -17,12 +17,14 @@ namespace {
 /// Experiments over the arenas, run one after the other. Holds the first arena while it is needed,
 /// and the results of all arenas until they are compared.
 struct ArenaExperiments : Experiments {
+  const simulation::PanoramaRendering rendering = make_arena_rendering(options.optics);
   std::optional<Arena> first_arena{};
   std::unique_ptr<ArenaSurveys> first_surveys{};  ///< surveys of the first arena
   std::vector<CatchmentAreas> areas{};
 
   void record_first() {
-    first_arena = record_arena({.seed = options.seed, .spacing_m = options.spacing_m}, executor);
+    first_arena = record_arena(
+        {.seed = options.seed, .spacing_m = options.spacing_m, .rendering = rendering}, executor);
     first_surveys = std::make_unique<ArenaSurveys>(
         *first_arena, static_cast<std::size_t>(options.goals_every), executor);
     add_row(result, "s06.places", "free places of the first arena",
@@ -44,16 +46,19 @@ struct ArenaExperiments : Experiments {
   }
 
   void add_variant(int number) {
-    areas.push_back(measure_further_arena(record_arena(
-        {.seed = options.seed + static_cast<std::uint64_t>(number), .spacing_m = options.spacing_m},
-        executor)));
+    areas.push_back(measure_further_arena(
+        record_arena({.seed = options.seed + static_cast<std::uint64_t>(number),
+                      .spacing_m = options.spacing_m,
+                      .rendering = rendering},
+                     executor)));
   }
 
   void add_pose_noise() {
     const Arena arena = record_arena({.seed = options.seed,
                                       .position_noise_m = 0.003,
                                       .heading_noise_rad = radians(2.0),
-                                      .spacing_m = options.spacing_m},
+                                      .spacing_m = options.spacing_m,
+                                      .rendering = rendering},
                                      executor);
     const CatchmentAreas noisy = measure_further_arena(arena);
     reproduce_heading_with_pose_noise(arena, result);
@@ -61,9 +66,11 @@ struct ArenaExperiments : Experiments {
   }
 
   void add_fixed_heading() {
-    const Arena arena = record_arena(
-        {.seed = options.seed, .heading = ArenaHeading::fixed, .spacing_m = options.spacing_m},
-        executor);
+    const Arena arena = record_arena({.seed = options.seed,
+                                      .heading = ArenaHeading::fixed,
+                                      .spacing_m = options.spacing_m,
+                                      .rendering = rendering},
+                                     executor);
     report_variant("fixed_heading", "all views at one heading", measure_further_arena(arena),
                    result);
   }

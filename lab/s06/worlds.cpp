@@ -119,7 +119,8 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   const auto& [options, executor, reproduction] = context;
   const std::uint64_t seed = options.seed;
   const HomingPlace place =
-      make_homing_place(simulation::read_gazebo_world(options.data, name), {}, executor);
+      make_homing_place(simulation::read_gazebo_world(options.data, name),
+                        {.rendering = context.make_rendering(40, 256)}, executor);
   const auto tasks = sample_homing_tasks(place, options.starts, homing_start_radius_m, seed);
   const auto runs = run_home(place, tasks, {}, seed, executor);
 
@@ -187,7 +188,8 @@ void reproduce_homing_in_scenes(int starts, const Experiments& context) {
     for (std::uint64_t variant = 0; variant < seeds_per_scene; ++variant) {
       const std::uint64_t number = seed + variant;
       HomingPlace place =
-          make_homing_place(simulation::make_scene(name, {.seed = number}), {}, executor);
+          make_homing_place(simulation::make_scene(name, {.seed = number}),
+                            {.rendering = context.make_rendering(40, 256)}, executor);
       const auto tasks = sample_homing_tasks(place, starts, homing_start_radius_m, number);
       const auto append = [&](std::vector<HomingRun>& all, const HomingRunOptions& changed) {
         for (HomingRun& run : run_home(place, tasks, changed, number, executor)) {

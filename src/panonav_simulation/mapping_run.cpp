@@ -38,9 +38,10 @@ float largest_nonconstant_magnitude(const MappingRecording& recording, int compo
 
 }  // namespace
 
-PlaceRecording make_empty_place(Scene scene, std::uint64_t seed, int columns, Executor& executor) {
+PlaceRecording make_empty_place(Scene scene, std::uint64_t seed, PanoramaRendering rendering,
+                                Executor& executor) {
   PlaceRecording place{make_place(std::move(scene), executor), seed};
-  place.rendering = {.rows = 80, .columns = columns, .rays_per_axis = 1};
+  place.rendering = std::move(rendering);
   return place;
 }
 

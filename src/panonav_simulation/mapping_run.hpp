@@ -16,9 +16,9 @@
 
 namespace panonav::simulation {
 
-/// Makes a place to drive through, without reference views.
-[[nodiscard]] PlaceRecording make_empty_place(Scene scene, std::uint64_t seed, int columns,
-                                              Executor& executor);
+/// Makes a place to drive through, without reference views; `rendering` is that of its views.
+[[nodiscard]] PlaceRecording make_empty_place(Scene scene, std::uint64_t seed,
+                                              PanoramaRendering rendering, Executor& executor);
 
 /// True poses, wheel odometry and views of a drive.
 struct MappingRecording {

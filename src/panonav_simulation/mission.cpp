@@ -16,6 +16,7 @@
 #include "panonav/signature/fourier_signature.hpp"
 #include "panonav_simulation/line_camera.hpp"
 #include "panonav_simulation/mapping_run.hpp"
+#include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/simulated_odometry.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
@@ -112,11 +113,18 @@ FourierSignature sense_view(const MissionPlace& place, const Pose2& pose, std::u
   if (place.view_sensor) return place.view_sensor(pose, seed);
   Executor here(1);
   const double height_m = place.scene.camera_height_m;
-  Panorama view =
-      place.renderer->render_panorama({.pose = pose, .height_m = height_m}, place.rendering, here);
+  // People are painted into panoramas: before the sensor's noise, unless the noise is that of the
+  // mirror image.
+  const bool is_unwarped = place.rendering.unwarper != nullptr;
+  const FrameOptions frame{.camera_height_m = height_m};
+  Panorama view = is_unwarped || people == nullptr
+                      ? capture_panorama(*place.renderer, pose, place.rendering, frame,
+                                         place.sensor, seed, here)
+                      : place.renderer->render_panorama({.pose = pose, .height_m = height_m},
+                                                        place.rendering, here);
   if (people != nullptr) people->paint(view, pose, height_m);
-  return compute_signature(preprocess(apply_sensor(std::move(view), place.sensor, seed), {}),
-                           place.components);
+  if (people != nullptr && !is_unwarped) view = apply_sensor(std::move(view), place.sensor, seed);
+  return compute_signature(preprocess(std::move(view), {}), place.components);
 }
 
 RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m, std::uint64_t seed,

@@ -5,9 +5,19 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/scenes.hpp"
 
 namespace panonav::simulation {
+
+namespace {
+
+PanoramaRendering make_place_rendering(const PlaceRecordingOptions& options) {
+  if (options.mirror) return make_mirror_rendering(options.rows, options.columns);
+  return {.rows = options.rows, .columns = options.columns, .rays_per_axis = 1};
+}
+
+}  // namespace
 
 SimulatedPlace make_place(Scene scene, Executor& executor, std::optional<Point2> inside) {
   auto space = std::make_shared<const FreeSpace>(scene, free_space_options(scene), inside);
@@ -29,9 +39,8 @@ std::size_t PlaceRecording::nearest_reference(Point2 position) const {
 Panorama capture_view(const PlaceRecording& place, const PanoramaRendering& rendering,
                       const Pose2& pose, std::uint64_t seed, const SensorOptions& sensor) {
   Executor here(1);
-  Panorama view = place.renderer->render_panorama(
-      {.pose = pose, .height_m = place.scene.camera_height_m}, rendering, here);
-  return apply_sensor(std::move(view), sensor, seed);
+  return capture_panorama(*place.renderer, pose, rendering,
+                          {.camera_height_m = place.scene.camera_height_m}, sensor, seed, here);
 }
 
 Panorama capture_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
@@ -64,7 +73,7 @@ PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options, E
   PlaceRecording place{make_place(std::move(scene), executor)};
   place.seed = options.seed;
   place.spacing_m = options.spacing_m;
-  place.rendering = {.rows = options.rows, .columns = options.columns, .rays_per_axis = 1};
+  place.rendering = make_place_rendering(options);
 
   std::vector<Pose2> grid;
   for (const auto& point : place.free_space->grid(options.spacing_m)) {

@@ -55,6 +55,7 @@ struct PlaceRecordingOptions {
   int queries = 60;
   int rows = 80;
   int columns = 512;
+  bool mirror = false;  ///< unwarp the views from mirror images; false: render them directly
 };
 
 /// Records references with heading 0 and queries with random headings, both with sensor noise.

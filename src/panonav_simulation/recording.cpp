@@ -2,8 +2,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/panorama/unwarper.hpp"
+#include "panonav_simulation/mirror.hpp"
 #include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/simulated_odometry.hpp"
 
@@ -186,10 +189,35 @@ void face_path(std::vector<Pose2>& poses) {
 Panorama capture_panorama(const Renderer& renderer, const Pose2& pose,
                           const PanoramaRendering& rendering, const FrameOptions& options,
                           const SensorOptions& sensor, std::uint64_t seed, Executor& executor) {
+  if (rendering.unwarper != nullptr) {
+    FrameOptions frame = options;
+    frame.rays_per_axis = rendering.rays_per_axis;
+    const Image image =
+        capture_image(renderer, pose, rendering.unwarper->camera(), frame, sensor, seed, executor);
+    return rendering.unwarper->unwrap(image.view());
+  }
   validate(options);
   return apply_sensor(
       renderer.render_panorama(make_viewpoint(pose, options, seed), rendering, executor), sensor,
       seed);
+}
+
+PanoramaRendering make_mirror_rendering(int rows, int columns,
+                                        std::optional<ElevationBand> elevations, int pixel_size) {
+  require(pixel_size >= 1 && pixel_size <= 8, "pixel_size", pixel_size, "1 .. 8");
+  Camera camera = make_simulated_mirror_camera();
+  camera.image_size = {camera.image_size.width / pixel_size, camera.image_size.height / pixel_size};
+  camera.centre = {camera.centre.u_px / pixel_size, camera.centre.v_px / pixel_size};
+  camera.rim_radius_px /= pixel_size;
+  camera.inner_radius_px /= pixel_size;
+  std::get<HyperboloidalModel>(camera.model).focal_length_px /= pixel_size;
+  const auto unwarper = std::make_shared<const Unwarper>(
+      camera, UnwarperOptions{.rows = rows, .columns = columns, .elevations = elevations});
+  return {.rows = rows,
+          .columns = columns,
+          .elevations = unwarper->elevations(),
+          .rays_per_axis = 1,
+          .unwarper = unwarper};
 }
 
 Image capture_image(const Renderer& renderer, const Pose2& pose, const RecordingCamera& camera,

@@ -67,6 +67,15 @@ struct RecordedPose {
 /// before it.
 void face_path(std::vector<Pose2>& poses);
 
+/// Returns the rendering of panoramas that are unwarped from images of
+/// `make_simulated_mirror_camera`, one ray per pixel of the image. Without `elevations`: all that
+/// the mirror shows at every azimuth. `pixel_size`: pixels of that camera along each side of a
+/// pixel of the image, 1 for its full size. Cost: some 50 ms. Throws OptionError on an invalid
+/// size, ContractError unless `pixel_size` is 1 .. 8.
+[[nodiscard]] PanoramaRendering make_mirror_rendering(
+    int rows, int columns, std::optional<ElevationBand> elevations = std::nullopt,
+    int pixel_size = 1);
+
 /// Camera of a recording: a camera model, or a panorama that is rendered directly.
 using RecordingCamera = std::variant<PanoramaRendering, Camera>;
 
@@ -90,7 +99,8 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor);
                                   const SensorOptions& sensor, std::uint64_t seed,
                                   Executor& executor);
 
-/// Takes the robot's view as a panorama. Otherwise as `capture_image`.
+/// Takes the robot's view as a panorama: rendered directly, or unwarped from an image if the
+/// rendering has an unwarper. Otherwise as `capture_image`.
 [[nodiscard]] Panorama capture_panorama(const Renderer& renderer, const Pose2& pose,
                                         const PanoramaRendering& rendering,
                                         const FrameOptions& options, const SensorOptions& sensor,

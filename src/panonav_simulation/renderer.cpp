@@ -230,6 +230,9 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
                                    Executor& executor) const {
   validate(viewpoint);
   require_rays(rendering.rays_per_axis);
+  if (rendering.unwarper != nullptr) {
+    throw ContractError("unwarper", "set", "empty in a panorama that is rendered directly");
+  }
   Panorama panorama(rendering.rows, rendering.columns, rendering.elevations);
   const int n = rendering.rays_per_axis;
   const auto channels = static_cast<std::size_t>(implementation_->channels);

@@ -11,6 +11,10 @@
 #include "panonav/panorama/panorama.hpp"
 #include "panonav_simulation/scene.hpp"
 
+namespace panonav {
+class Unwarper;
+}  // namespace panonav
+
 namespace panonav::simulation {
 
 /// Pose of the camera in the scene. Its axis is vertical if the robot is not tilted.
@@ -33,7 +37,7 @@ struct RendererOptions {
   int channels = 1;
 };
 
-/// Size and ray density of a rendered panorama.
+/// Size, ray density and optics of a rendered panorama.
 struct PanoramaRendering {
   int rows = 80;                                                      ///< number of rows, >= 1
   int columns = 512;                                                  ///< number of columns, >= 4
@@ -41,6 +45,10 @@ struct PanoramaRendering {
   /// Rays per pixel and axis: n x n rays within the pixel, all with different u and v, so that an
   /// edge is resolved to 1 / n^2 of a pixel.
   int rays_per_axis = 2;
+  /// If set, `capture_panorama` takes an image with this unwarper's camera, with rays_per_axis^2
+  /// rays per pixel of the image, and unwarps it; the panorama then has the unwarper's size and
+  /// elevations. If empty, the panorama is rendered directly.
+  std::shared_ptr<const Unwarper> unwarper = nullptr;
 };
 
 /// Light at the pixels of a camera before exposure and noise: linear, not clamped; a white surface
@@ -77,7 +85,7 @@ class Renderer {
                                      double spread_rad) const;
 
   /// Renders a panorama directly, without mirror and sensor. Throws ContractError unless rows >= 1,
-  /// columns >= 4 and rays_per_axis is 1 .. 8.
+  /// columns >= 4, rays_per_axis is 1 .. 8 and the rendering has no unwarper.
   [[nodiscard]] Panorama render_panorama(const Viewpoint& viewpoint,
                                          const PanoramaRendering& rendering,
                                          Executor& executor) const;

@@ -34,6 +34,7 @@ class ReproduceAll : public ::testing::Test {
                               {"queries", nullptr},
                               {"runs", nullptr},
                               {"rows", nullptr},
+                              {"optics", nullptr},
                               {"data", fs::canonical(folder_.path()).string()}});
     for (const std::string& paper : papers) {
       write(out_ / paper / "results.json",

@@ -24,7 +24,8 @@ TEST(NavigationReproduction, RefusesTooFewScenesAndRuns) {
 TEST_F(Reproductions, SignaturesAreTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   expect_same_on_one_and_two_threads("m04",
-                                     {.seed = 5,
+                                     {.optics = Optics::panorama,
+                                      .seed = 5,
                                       .scenes = 2,
                                       .queries = 3,
                                       .rows = 6,
@@ -37,7 +38,8 @@ TEST_F(Reproductions, SignaturesAreTheSameOnOneAndTwoThreads) {
 TEST_F(Reproductions, TrackingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   expect_same_on_one_and_two_threads("m03",
-                                     {.seed = 705,
+                                     {.optics = Optics::panorama,
+                                      .seed = 705,
                                       .scenes = 1,
                                       .runs = 2,
                                       .rows = 4,
@@ -58,7 +60,8 @@ TEST_F(Reproductions, TrackingIsTheSameOnOneAndTwoThreads) {
 TEST_F(Reproductions, HomingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   expect_same_on_one_and_two_threads("s06",
-                                     {.seed = 7,
+                                     {.optics = Optics::panorama,
+                                      .seed = 7,
                                       .scenes = 2,
                                       .goals_every = 8,
                                       .goals_every_further = 16,

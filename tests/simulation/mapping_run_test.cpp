@@ -12,8 +12,8 @@ namespace {
 
 MappingRecording small_loop(int views, std::uint64_t seed) {
   Executor executor(1);
-  const PlaceRecording place =
-      make_empty_place(make_scene("loop", {.seed = seed}), seed, 128, executor);
+  const PlaceRecording place = make_empty_place(make_scene("loop", {.seed = seed}), seed,
+                                                {.columns = 128, .rays_per_axis = 1}, executor);
   return record_for_mapping(place, drive(place, {}, 0.1, static_cast<std::size_t>(views)), 17,
                             make_noisy_wheels(), seed, executor);
 }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
+#include "panonav/panorama/unwarper.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "support/scene_views.hpp"
 
@@ -193,6 +194,48 @@ TEST_F(Recording, TheCameraStandsAtItsHeight) {
     EXPECT_NEAR(0.9 - sky * row_rad, std::atan2(1.0 - height_m, 2.0), 1.5 * row_rad);
     EXPECT_NEAR(0.9 - floor * row_rad, std::atan2(height_m, 2.0), 1.5 * row_rad);
   }
+}
+
+/// Returns the mean absolute difference of two panoramas of equal size.
+double compute_mean_difference(const Panorama& a, const Panorama& b) {
+  double sum = 0.0;
+  for (int y = 0; y < a.rows(); ++y) {
+    for (int c = 0; c < a.columns(); ++c)
+      sum += std::abs(static_cast<double>(a.at(y, c)) - static_cast<double>(b.at(y, c)));
+  }
+  return sum / (a.rows() * a.columns());
+}
+
+TEST_F(Recording, AMirrorShowsTheSameSurroundingsAsAPanorama) {
+  const Renderer renderer(scene_);
+  const PanoramaRendering mirror = make_mirror_rendering(20, 128);
+  const PanoramaRendering coarse = make_mirror_rendering(20, 128, std::nullopt, 2);
+  EXPECT_EQ(coarse.unwarper->camera().image_size.width, 320);
+  PanoramaRendering direct = mirror;
+  direct.unwarper = nullptr;
+  direct.rays_per_axis = 4;
+  const FrameOptions frame{.camera_height_m = scene_.camera_height_m, .tilt_rad = radians(3.0)};
+  Random random(5);
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    const Pose2 pose = space_.random_pose(random);
+    const auto capture = [&](const Pose2& at, const PanoramaRendering& rendering) {
+      return capture_panorama(renderer, at, rendering, frame, {}, seed, executor_);
+    };
+    const Panorama reflected = capture(pose, mirror);
+    ASSERT_EQ(reflected.rows(), 20);
+    ASSERT_EQ(reflected.columns(), 128);
+    EXPECT_EQ(reflected.elevations(), mirror.elevations);
+    // A pixel of the panorama covers 2.8 degrees: optics change less than a turn by half of that.
+    const double optics = compute_mean_difference(reflected, capture(pose, direct));
+    const Pose2 turned{pose.x_m, pose.y_m, pose.heading_rad + radians(1.4)};
+    const double turn = compute_mean_difference(reflected, capture(turned, direct));
+    EXPECT_LT(optics, turn);
+    EXPECT_LT(compute_mean_difference(capture(pose, coarse), reflected), turn);
+  }
+  const auto around_horizon = make_mirror_rendering(4, 36, ElevationBand{-0.1, 0.1});
+  EXPECT_EQ(around_horizon.elevations, (ElevationBand{-0.1, 0.1}));
+  EXPECT_THROW((void)renderer.render_panorama({}, mirror, executor_), ContractError);
+  EXPECT_THROW((void)make_mirror_rendering(0, 36), OptionError);
 }
 
 TEST_F(Recording, BadInputIsNamed) {

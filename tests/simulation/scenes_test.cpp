@@ -20,7 +20,7 @@ using namespace testing;
 namespace {
 
 constexpr std::uint64_t tested_seeds[] = {1, 2, 300};
-constexpr PanoramaRendering small_rendering{.rows = 20, .columns = 128, .rays_per_axis = 1};
+const PanoramaRendering small_rendering{.rows = 20, .columns = 128, .rays_per_axis = 1};
 
 class EveryScene : public ::testing::TestWithParam<std::string_view> {
  protected:

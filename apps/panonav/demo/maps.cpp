@@ -181,8 +181,9 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
               });
   maps.lattice = compare_with_ground_truth(maps.arranged, office);
 
-  const simulation::PlaceRecording place = simulation::make_empty_place(
-      simulation::make_scene("loop", {.seed = seed}), seed, 256, session.executor());
+  const simulation::PlaceRecording place =
+      simulation::make_empty_place(simulation::make_scene("loop", {.seed = seed}), seed,
+                                   {.columns = 256, .rays_per_axis = 1}, session.executor());
   const simulation::MappingRecording recording = simulation::record_for_mapping(
       place, drive(place, {}, spacing_m, quick ? 60 : 200), components,
       simulation::make_noisy_wheels(), seed, session.executor());

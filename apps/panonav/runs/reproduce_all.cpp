@@ -39,6 +39,7 @@ ordered_json make_run_record(const ReproduceArguments& arguments) {
   record["queries"] = to_json_or_null(arguments.queries);
   record["runs"] = to_json_or_null(arguments.runs);
   record["rows"] = to_json_or_null(arguments.rows);
+  record["optics"] = to_json_or_null(arguments.optics);
   record["data"] =
       data.empty() ? ordered_json(nullptr) : ordered_json(fs::weakly_canonical(data).string());
   return record;
@@ -113,7 +114,7 @@ lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceA
              lab::to_markdown({.version = PANONAV_VERSION,
                                .command = "panonav reproduce " + name,
                                .papers = {{name, std::string(paper.title), result.rows}}}));
-  write_paper_page(out, paper, paper.lead(options), result);
+  write_paper_page(out, paper, describe_experiments(paper, options), result);
   write_file(out / results_file_name, to_json(result.rows));
   return result;
 }

@@ -86,6 +86,7 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .subject = "visual odometry and maps",
      .runs = true,
      .data = true,
+     .optics = true,
      .lead = describe_f11},
     {.name = "m03",
      .title = "Monte-Carlo localisation: the experiments of [M03]",
@@ -94,6 +95,7 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .rows = true,
      .data = true,
      .only = true,
+     .optics = true,
      .allows_single_scene = true,
      .lead = describe_m03},
     {.name = "m04",
@@ -102,17 +104,20 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .queries = true,
      .runs = true,
      .rows = true,
+     .optics = true,
      .lead = describe_m04},
     {.name = "navigation",
      .title = "Navigation: topics that [M04] names as future work",
      .subject = "future work of m04",
      .runs = true,
      .data = true,
+     .optics = true,
      .lead = describe_navigation},
     {.name = "s06",
      .title = "Visual homing: the experiments of [S06]",
      .subject = "homing",
      .data = true,
+     .optics = true,
      .lead = describe_s06},
     {.name = "y03",
      .title = "Route panoramas: the experiments of [Y03]",
@@ -133,6 +138,17 @@ constexpr std::array<ReproducedPaper, 7> papers{{
 
 }  // namespace
 
+std::string describe_experiments(const ReproducedPaper& paper,
+                                 const lab::ReproductionOptions& options) {
+  std::string text = paper.lead(options);
+  if (!paper.optics) return text;
+  return text +
+         (options.optics == lab::Optics::mirror
+              ? " Views are unwarped from simulated images of a mirror camera, 640 x 480 (in "
+                "missions 320 x 240)."
+              : " Views are simulated panoramas without a mirror.");
+}
+
 std::span<const ReproducedPaper> list_reproduced_papers() {
   return papers;
 }
@@ -150,6 +166,9 @@ lab::ReproductionOptions make_reproduction_options(const ReproducedPaper& paper,
   options.queries = arguments.queries.value_or(options.queries);
   options.rows = arguments.rows.value_or(options.rows);
   options.only = arguments.only.value_or(options.only);
+  if (arguments.optics) {
+    options.optics = *arguments.optics == "mirror" ? lab::Optics::mirror : lab::Optics::panorama;
+  }
   if (paper.name == "navigation") options.scenes = std::min(options.scenes, options.runs);
   options.mission_scenes = std::min({options.mission_scenes, options.scenes, options.runs});
   options.swept = std::min(options.swept, options.scenes);
@@ -185,6 +204,7 @@ void reject_meaningless_options(const ReproducedPaper& paper, const ReproduceArg
   refuse(arguments.rows.has_value(), paper.rows, "--rows");
   refuse(arguments.data.has_value(), paper.data, "--data");
   refuse(arguments.only.has_value(), paper.only, "--only");
+  refuse(arguments.optics.has_value(), paper.optics, "--optics");
   refuse(arguments.continues, false, "--continue");
 }
 

@@ -24,6 +24,7 @@ struct ReproduceArguments {
   std::optional<int> rows;
   std::optional<std::string> data;
   std::optional<std::string> only;
+  std::optional<std::string> optics;  ///< "mirror" or "panorama"
 };
 
 /// The experiments of a paper, and the options that they use.
@@ -36,11 +37,16 @@ struct ReproducedPaper {
   bool rows = false;
   bool data = false;
   bool only = false;
+  bool optics = false;
   bool allows_single_scene =
       false;  ///< one scene is enough; otherwise two are needed for intervals
   /// Returns the first paragraph of the report, with the number of scenes and runs.
   std::string (*lead)(const lab::ReproductionOptions& options) = nullptr;
 };
+
+/// Returns the first paragraph of the report on a paper: its lead, and the optics of its views.
+[[nodiscard]] std::string describe_experiments(const ReproducedPaper& paper,
+                                               const lab::ReproductionOptions& options);
 
 /// Returns all papers, in the order in which `reproduce all` runs them.
 [[nodiscard]] std::span<const ReproducedPaper> list_reproduced_papers();

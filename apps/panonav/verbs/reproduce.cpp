@@ -115,7 +115,11 @@ Run declare_reproduce(Arguments& arguments) {
   const auto parts = lab::tracking_reproduction_parts();
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
                    "For m03: run only this part of the experiments (default: all parts)");
-  arguments.hide_from_help({"--queries", "--rows", "--only"});
+  arguments.choice("--optics", values->optics, {"mirror", "panorama"},
+                   "For f11, m03, m04, navigation, s06: unwarp the views from images of a mirror "
+                   "camera, or render them directly, which is some times as fast (default: mirror, "
+                   "with --quick panorama)");
+  arguments.hide_from_help({"--queries", "--rows", "--only", "--optics"});
   arguments.declare_outputs({"--out"});
   arguments.explain_interruption(
       "Reports of finished papers are kept. Run the same command again; with all, add --continue.");
