@@ -7,7 +7,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/temporary_file.hpp"
 #include "panonav/core/text.hpp"
-#include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/unfinished_folder.hpp"
 #include "panonav_recordings/internal/topic_writer.hpp"
@@ -63,7 +62,7 @@ Dataset::Fields convert_to_dataset(const Dataset& recording, const fs::path& fol
   for (DatasetEntry& entry : dataset.entries) {
     const auto bytes = read_encoded_picture(entry);
     entry.file += image_format(bytes, entry.file) == ImageFormat::png ? ".png" : ".jpg";
-    write_file(dataset.folder / unescape_name(entry.file), bytes);
+    unfinished.append(unescape_name(entry.file), bytes);
     if (advance) advance();
   }
   write_dataset(dataset);

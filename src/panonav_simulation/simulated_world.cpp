@@ -19,7 +19,6 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/unfinished_folder.hpp"
 #include "panonav_simulation/floor.hpp"
@@ -432,12 +431,9 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
           entry.odometry = recorded.odometry;
         }
         if (options.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
-        const fs::path path = unfinished.path() / entry.file;
-        if (is_sphere) {
-          write_file(path, encode_photo_sphere(frame.picture.view(), recorded.pose, frame.tilt));
-        } else {
-          write_png(path, frame.picture.view());
-        }
+        unfinished.append(entry.file, is_sphere ? encode_photo_sphere(frame.picture.view(),
+                                                                      recorded.pose, frame.tilt)
+                                                : encode_png(frame.picture.view()));
         dataset.entries.push_back(std::move(entry));
         if (on_image) on_image(dataset.entries.back(), frame.picture);
       });

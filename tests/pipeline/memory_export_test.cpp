@@ -1,14 +1,33 @@
 #include "panonav/pipeline/memory_export.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
 #include <fstream>
+#include <functional>
+#include <span>
 
 #include "panonav/core/error.hpp"
+#include "panonav/io/atomic_file.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "support/memory_samples.hpp"
+
+namespace panonav::testing {
+namespace {
+std::atomic<int> fsync_calls{0};
+}
+}  // namespace panonav::testing
+
+// Replaces that of the C library in this program, so that waiting for the disk can be counted.
+extern "C" int fsync(int file) {
+  ++panonav::testing::fsync_calls;
+  return static_cast<int>(::syscall(SYS_fsync, file));
+}
 
 namespace panonav::testing {
 namespace {
@@ -63,6 +82,42 @@ TEST_F(Export, NamesThatCannotBeFilesGetOthersAndNothingLeavesTheFolder) {
     there += entry.path() != path && entry.path() != out ? 1 : 0;
   }
   EXPECT_EQ(there, 0U);
+}
+
+TEST_F(Export, WaitsForTheDiskAsOftenForManyViewsAsForOne) {
+  std::vector<std::string> names;
+  for (int i = 0; i < 30; ++i) names.push_back(std::to_string(i) + ".png");
+  const auto count_calls = [](const std::function<void()>& work) {
+    const int before = fsync_calls;
+    work();
+    return fsync_calls - before;
+  };
+  MemoryFile file = file_of(names);
+  const int of_many = count_calls([&] { (void)export_memory(file, out); });
+  std::vector<ViewId> others = file.views();
+  others.pop_back();
+  file.remove(others);
+  EXPECT_EQ(count_calls([&] { (void)export_memory(file, folder / "one"); }), of_many);
+  EXPECT_GT(of_many, 0);  // guard
+}
+
+TEST_F(Export, SignaturesComeInTheOrderOfTheViews) {
+  std::vector<std::string> names;
+  for (int i = 0; i < 30; ++i) names.push_back(std::to_string(i) + ".png");
+  MemoryFile file = file_of(names);
+  file.remove(std::vector<ViewId>{ViewId{7}});
+  (void)export_memory(file, out);
+  const auto bytes = read_file(out / "signatures.npy", 1U << 20U);
+  const SignatureShape shape = file.header().shape;
+  ASSERT_EQ(bytes.size() % 64, 29 * 2 * shape.size() % 64);
+  const auto values = std::span(bytes).last(29 * 2 * shape.size());
+  const VisualMemory memory = file.load();
+  for (std::size_t i = 0; i < 29; ++i) {
+    const PackedSignature signature = memory.packed(memory.views()[i]);
+    const auto row = values.subspan(i * 2 * shape.size(), 2 * shape.size());
+    EXPECT_TRUE(std::ranges::equal(row.first(shape.size()), signature.magnitudes));
+    EXPECT_TRUE(std::ranges::equal(row.last(shape.size()), signature.phases));
+  }
 }
 
 TEST_F(Export, WhatSomeViewsLackIsEmptyInTheDataSet) {

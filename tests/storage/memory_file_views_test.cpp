@@ -51,6 +51,14 @@ TEST_F(ViewsOfAMemoryFile, AreThoseOfTheWholeMemory) {
   EXPECT_TRUE(std::ranges::equal(source.views(), whole.views()));
   EXPECT_TRUE(std::ranges::equal(source.file().links(), whole.links()));
   EXPECT_EQ(source.load({}).size(), 0U);
+  std::vector<ViewId> read;
+  source.file().read_views(
+      [&](ViewId view, const ReferenceInfo& info, const PackedSignature& signature) {
+        EXPECT_EQ(info, whole.info(view));
+        EXPECT_EQ(signature, whole.packed(view));
+        read.push_back(view);
+      });
+  EXPECT_TRUE(std::ranges::equal(read, whole.views()));
   const VisualMemory all = source.load(source.views());
   EXPECT_TRUE(std::ranges::equal(all.views(), whole.views()));
   EXPECT_TRUE(all.links().empty());
@@ -113,6 +121,11 @@ TEST_F(ViewsOfAMemoryFile, DamageIsAFaultOfTheFile) {
           ++views_refused;
         }
       }
+      source.file().read_views(
+          [&](ViewId view, const ReferenceInfo& info, const PackedSignature& signature) {
+            EXPECT_EQ(info, whole.info(view));
+            EXPECT_EQ(signature, whole.packed(view));
+          });
     } catch (const FileError&) {
     }
     if (HasFailure()) return;

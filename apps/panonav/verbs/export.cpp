@@ -74,7 +74,8 @@ void print_export(const MemoryExport& done, const MemoryFile& memory, const std:
 ExitCode export_all(const ExportArguments& arguments, Session& session) {
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   Progress progress(session, "exporting", static_cast<std::size_t>(memory.info().views));
-  const MemoryExport done = export_memory(memory, arguments.out, [&] { progress.advance(); });
+  const MemoryExport done =
+      export_memory(memory, arguments.out, session.executor(), [&] { progress.advance(); });
   progress.clear();
   if (!session.json()) {
     print_export(done, memory, arguments.out, session);

@@ -81,8 +81,8 @@ ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recordin
       [&](std::size_t i) { return convert(reader, recording.entries[i]); },
       [&](std::size_t i, Panorama&& panorama) {
         const Image picture = to_picture(panorama);
-        write_png(unfinished.path() / unescape_name(panorama_name(recording.entries[i].file)),
-                  picture.view());
+        unfinished.append(unescape_name(panorama_name(recording.entries[i].file)),
+                          encode_png(picture.view()));
         last = std::move(panorama);
         ++written;
         progress.advance();

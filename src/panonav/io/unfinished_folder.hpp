@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "panonav/core/temporary_file.hpp"
@@ -21,7 +23,12 @@ class UnfinishedFolder {
 
   /// Returns the temporary path under which to fill the folder.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  /// Renames the folder to its final name. Throws FileError.
+  /// Appends the bytes to a file of the folder, which is made first if it is missing, with the
+  /// folders above it; `name` is relative. Unlike `write_file`, does not wait for the disk, which
+  /// `finish` does once for all files. Throws FileError.
+  void append(const std::filesystem::path& name, std::span<const std::uint8_t> bytes) const;
+  /// Waits until all files are on the disk and renames the folder to its final name. Throws
+  /// FileError.
   void finish();
 
  private:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,6 +17,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/unfinished_folder.hpp"
+#include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/pipeline/view_list.hpp"
 
@@ -24,6 +26,7 @@ namespace panonav {
 namespace {
 
 namespace fs = std::filesystem;
+using Bytes = std::vector<std::uint8_t>;
 
 /// True if the name is a valid relative file name and does not collide with another file of the
 /// export.
@@ -97,30 +100,62 @@ class OptionText final : public OptionVisitor {
   }
 };
 
-/// Makes an array in NumPy's format 1.0: 8-bit integers, views x (magnitudes, phases) x components
+/// Returns a view's thumbnail as a PNG of the size of the memory's panoramas; empty if it has none
+/// or another one. One thread at a time uses the memory, with `reading` locked.
+Bytes enlarge_thumbnail(const MemoryFile& memory, ViewId view, std::mutex& reading) {
+  std::unique_lock lock(reading);
+  const auto thumbnail = memory.thumbnail(view);
+  lock.unlock();
+  if (!thumbnail) return {};
+  const auto panorama = panorama_from_thumbnail(*thumbnail, memory.header());
+  if (!panorama) return {};
+  const Image picture = to_picture(*panorama);
+  return encode_png(picture.view());
+}
+
+/// Writes an array in NumPy's format 1.0: 8-bit integers, views x (magnitudes, phases) x components
 /// x rows.
-std::vector<std::uint8_t> make_npy_array(const VisualMemory& memory) {
-  const SignatureShape shape = memory.shape();
+void write_npy_array(const MemoryFile& memory, const std::vector<ViewRecord>& views,
+                     const UnfinishedFolder& folder) {
+  const SignatureShape shape = memory.header().shape;
   std::string head = "{'descr': '|u1', 'fortran_order': False, 'shape': (" +
-                     std::to_string(memory.size()) + ", 2, " + std::to_string(shape.components) +
+                     std::to_string(views.size()) + ", 2, " + std::to_string(shape.components) +
                      ", " + std::to_string(shape.rows) + "), }";
   constexpr std::size_t before = 10;
   head.append(63 - (before + head.size()) % 64, ' ').push_back('\n');
-  std::vector<std::uint8_t> bytes{0x93, 'N', 'U', 'M', 'P', 'Y', 1, 0};
+  Bytes bytes{0x93, 'N', 'U', 'M', 'P', 'Y', 1, 0};
   bytes.push_back(static_cast<std::uint8_t>(head.size() & 255U));
   bytes.push_back(static_cast<std::uint8_t>(head.size() >> 8U));
   bytes.insert(bytes.end(), head.begin(), head.end());
-  for (const ViewId view : memory.views()) {
-    const PackedSignature signature = memory.packed(view);
+  constexpr std::size_t part_bytes = 1U << 20U;
+  const auto write_part = [&] {
+    folder.append("signatures.npy", bytes);
+    bytes.clear();
+  };
+  auto next = views.begin();
+  memory.read_views([&](ViewId view, const ReferenceInfo&, const PackedSignature& signature) {
+    if (next == views.end() || next->view != view) return;  // added by another process since
+    ++next;
     bytes.insert(bytes.end(), signature.magnitudes.begin(), signature.magnitudes.end());
     bytes.insert(bytes.end(), signature.phases.begin(), signature.phases.end());
+    if (bytes.size() >= part_bytes) write_part();
+  });
+  if (next != views.end()) {
+    throw FileError(memory.path().string(), "lost view " + next->info.name +
+                                                " during the export, because another process "
+                                                "changed the memory; export it again");
   }
-  return bytes;
+  write_part();
 }
 
 }  // namespace
 
-MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
+MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder) {
+  Executor alone;
+  return export_memory(memory, folder, alone);
+}
+
+MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder, Executor& executor,
                            const std::function<void()>& advance) {
   const MemoryHeader& header = memory.header();
   const auto views = list_views(memory);
@@ -139,29 +174,29 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   // A thumbnail with fewer than two columns per period of the highest component would alias.
   const bool large_enough = thumbnail_columns(header) >= 2 * header.shape.components;
   std::vector<std::string> files = choose_picture_names(views);
-  std::vector<ViewId> ids;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto& [view, info, links, thumbnail, component] = views[i];
-    ids.push_back(view);
-    if (const auto panorama = large_enough ? panorama_from_thumbnail(memory, view) : std::nullopt) {
-      const fs::path path = out / unescape_name(files[i]);
-      std::error_code error;
-      fs::create_directories(path.parent_path(), error);
-      const Image enlarged = to_picture(*panorama);
-      write_png(path, enlarged.view());
-      dataset.entries.push_back({files[i], path, info.stamp_s,
+  std::mutex reading;
+  const auto make_picture = [&](std::size_t i) {
+    return large_enough ? enlarge_thumbnail(memory, views[i].view, reading) : Bytes{};
+  };
+  const auto write_picture = [&](std::size_t i, Bytes&& picture) {
+    const ReferenceInfo& info = views[i].info;
+    if (picture.empty()) {
+      files[i].clear();
+    } else {
+      const fs::path name = unescape_name(files[i]);
+      unfinished.append(name, picture);
+      dataset.entries.push_back({files[i], out / name, info.stamp_s,
                                  unit == LengthUnit::metres ? info.pose : std::nullopt,
                                  std::nullopt});
       if (files[i] != info.name) ++done.renamed;
-    } else {
-      files[i].clear();
     }
     if (advance) advance();
-  }
+  };
+  process_in_order(views.size(), executor, make_picture, write_picture);
   done.pictures = dataset.entries.size();
 
   write_file(out / "views.csv", std::string_view(format_view_table(views, unit, files)));
-  write_file(out / "signatures.npy", make_npy_array(memory.load(ids)));
+  write_npy_array(memory, views, unfinished);
   OptionText options;
   options.text = "[signature]\ncomponents = ";  // rows and columns come from the pictures
   options.text.append(std::to_string(header.shape.components)).append("\n");

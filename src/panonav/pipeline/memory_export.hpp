@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "panonav/core/executor.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -29,6 +30,8 @@ struct MemoryExport {
 /// after each view. Throws FileError if the folder exists and is not empty, if the memory has no
 /// view, or if a file cannot be written.
 MemoryExport export_memory(const MemoryFile& memory, const std::filesystem::path& folder,
-                           const std::function<void()>& advance = {});
+                           Executor& executor, const std::function<void()>& advance = {});
+/// Writes them in the calling thread.
+MemoryExport export_memory(const MemoryFile& memory, const std::filesystem::path& folder);
 
 }  // namespace panonav

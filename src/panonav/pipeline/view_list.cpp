@@ -26,23 +26,23 @@ std::map<ViewId, std::size_t> find_components(const MemoryFile& file) {
 }  // namespace
 
 std::vector<ViewRecord> list_views(const MemoryFile& file) {
-  const VisualMemory memory = file.load();
+  std::vector<ViewRecord> views;
+  file.read_views([&](ViewId view, const ReferenceInfo& info, const PackedSignature&) {
+    views.push_back({view, info});
+  });
   const auto components = find_components(file);
   const auto pictured = file.views_with_thumbnail();
   std::map<ViewId, std::size_t> links;
-  for (const Link& link : memory.links()) {
+  for (const Link& link : file.links()) {
     ++links[link.a];
     ++links[link.b];
   }
-  std::vector<ViewRecord> views;
-  views.reserve(memory.size());
-  for (const ViewId view : memory.views()) {
-    ViewRecord& record = views.emplace_back(ViewRecord{view, memory.info(view)});
-    if (const auto found = links.find(view); found != links.end()) record.links = found->second;
-    record.thumbnail = std::ranges::binary_search(pictured, view);
-    if (const auto found = components.find(view); found != components.end()) {
+  for (ViewRecord& record : views) {
+    if (const auto found = links.find(record.view); found != links.end())
+      record.links = found->second;
+    record.thumbnail = std::ranges::binary_search(pictured, record.view);
+    if (const auto found = components.find(record.view); found != components.end())
       record.component = found->second;
-    }
   }
   return views;
 }

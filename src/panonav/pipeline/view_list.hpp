@@ -24,7 +24,7 @@ struct ViewRecord {
 };
 
 /// Returns all views of the file, ascending. Throws FileError on damage. Cost: that of
-/// `MemoryFile::load`.
+/// `MemoryFile::load`, but only the returned records are held.
 [[nodiscard]] std::vector<ViewRecord> list_views(const MemoryFile& file);
 
 /// Returns the table of views as CSV (docs/formats.md, section "Tables of views"): a header and one

@@ -100,21 +100,6 @@ struct MemoryFile::Implementation {
     tables->accept_row(std::nullopt, [&] { bytes = tables->read_checked_bytes(table, view); });
     return bytes;
   }
-  /// Undoes the newest change within a writing transaction. Throws as `MemoryFile::undo`.
-  void undo() const {
-    const auto kept = tables->history();
-    if (kept.empty() || !kept.front().undoable) {
-      throw ContractError("undo", "not possible", "after a change that was kept for it");
-    }
-    const auto faults = verify_links_and_maps(*tables, header);
-    tables->undo();
-    for (const Fault& fault : verify_links_and_maps(*tables, header)) {
-      if (std::ranges::find(faults, fault) != faults.end()) continue;
-      throw FileError(
-          tables->path().string(),
-          "cannot undo \"" + kept.front().what + "\": the memory would be damaged: " + fault.what);
-    }
-  }
   /// Changes name, pose or stamp of a view. Throws as `throw_unknown_view`.
   void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change) {
     write([&](MemoryTables&) {
@@ -222,13 +207,13 @@ std::optional<std::string> MemoryFile::undoable() const {
 }
 
 void MemoryFile::undo() {
-  implementation_->write([&](MemoryTables&) { implementation_->undo(); });
+  implementation_->write([&](MemoryTables& tables) { undo_newest_change(tables, header()); });
 }
 
 void MemoryFile::require_undo_possible() {
   // Rolled back, as it is not committed.
   const auto transaction = implementation_->tables->transaction(MemoryTables::Kind::writing);
-  implementation_->undo();
+  undo_newest_change(*implementation_->tables, header());
 }
 
 ViewId MemoryFile::append(const NewView& view) {
@@ -445,6 +430,24 @@ VisualMemory MemoryFile::load(std::span<const ViewId> views) const {
       tables.accept_row(row.id, [&] { implementation_->append_row(row, memory); });
     });
     return memory;
+  });
+}
+
+void MemoryFile::read_views(const std::function<void(ViewId, const ReferenceInfo&,
+                                                     const PackedSignature&)>& consume) const {
+  implementation_->read([&](MemoryTables& tables) {
+    PackedSignature signature;
+    std::optional<ViewId> last;
+    tables.read_views([&](const ViewRow& row) {
+      const bool is_intact = tables.accept_row(row.id, [&] {
+        tables.check_row(row, header().shape, implementation_->scratch);
+        if (last && row.id <= *last) tables.fail_damaged("views are out of order");
+      });
+      if (!is_intact) return;
+      last = row.id;
+      unpack_signature(row.signature, header().shape, signature);
+      consume(row.id, row.info, signature);
+    });
   });
 }
 

@@ -249,6 +249,11 @@ class MemoryFile {
   /// view's checksum is checked. Throws ContractError if a view is not in the file. Cost: about 10
   /// microseconds a view.
   [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const;
+  /// Calls `consume` with each view, ascending: its id, data and signature, which are valid during
+  /// the call. Shows one state of the file and checks it as `load`, but holds one view at a time.
+  /// `consume` must not use this object.
+  void read_views(const std::function<void(ViewId, const ReferenceInfo&, const PackedSignature&)>&
+                      consume) const;
   /// Returns all views, ascending.
   [[nodiscard]] std::vector<ViewId> views() const;
   /// Returns the views whose positions are within these bounds (inclusive), ascending. Servers use

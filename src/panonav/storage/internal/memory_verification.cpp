@@ -114,4 +114,18 @@ std::vector<MemoryFile::Fault> verify_memory(MemoryTables& tables, const MemoryH
   return MemoryVerification(tables, header).run();
 }
 
+void undo_newest_change(MemoryTables& tables, const MemoryHeader& header) {
+  const auto kept = tables.history();
+  if (kept.empty() || !kept.front().undoable) {
+    throw ContractError("undo", "not possible", "after a change that was kept for it");
+  }
+  const auto faults = verify_links_and_maps(tables, header);
+  tables.undo();
+  for (const MemoryFile::Fault& fault : verify_links_and_maps(tables, header)) {
+    if (std::ranges::find(faults, fault) != faults.end()) continue;
+    throw FileError(tables.path().string(), "cannot undo \"" + kept.front().what +
+                                                "\": the memory would be damaged: " + fault.what);
+  }
+}
+
 }  // namespace panonav

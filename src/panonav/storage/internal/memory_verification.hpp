@@ -15,4 +15,7 @@ namespace panonav {
 [[nodiscard]] std::vector<MemoryFile::Fault> verify_links_and_maps(MemoryTables& tables,
                                                                    const MemoryHeader& header);
 
+/// Undoes the newest change within a writing transaction. Throws as `MemoryFile::undo`.
+void undo_newest_change(MemoryTables& tables, const MemoryHeader& header);
+
 }  // namespace panonav
