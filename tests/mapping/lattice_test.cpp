@@ -15,6 +15,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/internal/lattice_springs.hpp"
 #include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
@@ -318,6 +319,18 @@ TEST(Lattice, AViewTwiceLiesAtOnePlace) {
   const Pose2& again = lattice.nodes.back().pose;
   EXPECT_LT(distance(first.position(), again.position()), 0.15);
   EXPECT_NEAR(angle_difference(again.heading_rad, first.heading_rad), 0.7, radians(3.0));
+}
+
+TEST(Lattice, PairsOfEqualViewsHaveOneResult) {
+  const Room room(32, room_kind);
+  const auto here = seen(room, {3.0, 2.0, 0.0});
+  const auto there = seen(room, {3.2, 2.1, 0.0});
+  const VisualMemory memory = memory_of({here, there, here, turn(here, 0.7), there});
+  const SpringViews views(memory, {});
+  EXPECT_EQ(views.find_first_equal({2, 4}), NodePair(0, 1));
+  EXPECT_EQ(views.find_first_equal({4, 3}), NodePair(1, 3));  // a turned view is another one
+  EXPECT_EQ(views.direction_probability({2, 4}), views.direction_probability({0, 1}));
+  EXPECT_GT(views.direction_probability({0, 1}), 0.0);  // guard
 }
 
 TEST(Lattice, ViewsThatCameLaterFindTheirPlace) {

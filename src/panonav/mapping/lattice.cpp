@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
 
@@ -266,14 +267,22 @@ class Arranger {
     return links;
   }
 
-  /// Returns the probability of the direction of each spring.
+  /// Returns the probability of the direction of each spring. Those between equal views, as of a
+  /// simulated robot that stands still, are computed once.
   std::vector<double> compute_probabilities(std::span<const Lattice::Spring* const> springs) {
-    std::vector<double> probabilities(springs.size());
+    std::map<NodePair, double> of_pairs;
+    for (const Lattice::Spring* const spring : springs)
+      of_pairs[views_.find_first_equal({spring->a, spring->b})] = 0.0;
+    std::vector<std::pair<const NodePair, double>*> pending;
+    for (auto& each : of_pairs) pending.push_back(&each);
     executor_.for_each_chunk(
-        springs.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
+        pending.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
           for (std::size_t i = begin; i < end; ++i)
-            probabilities[i] = views_.direction_probability({springs[i]->a, springs[i]->b});
+            pending[i]->second = views_.direction_probability(pending[i]->first);
         });
+    std::vector<double> probabilities;
+    for (const Lattice::Spring* const spring : springs)
+      probabilities.push_back(of_pairs.at(views_.find_first_equal({spring->a, spring->b})));
     return probabilities;
   }
 

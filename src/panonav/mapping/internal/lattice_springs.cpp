@@ -5,7 +5,9 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -48,8 +50,13 @@ bool has_direction(const Lattice::Spring& spring) {
 
 SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& options)
     : memory_(&memory), components_(options.components) {
+  std::map<std::string, std::size_t> first;  // by the bytes of the signature
   for (const ViewId view : memory.views()) {
     packed_.push_back(memory.packed(view));
+    const PackedSignature& packed = packed_.back();
+    std::string bytes(packed.magnitudes.begin(), packed.magnitudes.end());
+    bytes.append(packed.phases.begin(), packed.phases.end());
+    first_equal_.push_back(first.try_emplace(std::move(bytes), first_equal_.size()).first->second);
     if (!options.phases) continue;
     const HomingView coefficients = homing_view(memory, view);
     homing_.push_back(components_ > 0 ? first_components(coefficients, components_) : coefficients);

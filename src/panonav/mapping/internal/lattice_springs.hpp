@@ -47,6 +47,11 @@ class SpringViews {
   /// not seem to be of one building (`PairFeatures`). Needs the option `phases`. Cost: some
   /// milliseconds.
   [[nodiscard]] double direction_probability(NodePair pair) const;
+  /// Returns the pair of the first views that equal those of `pair`; both pairs give the same
+  /// results.
+  [[nodiscard]] NodePair find_first_equal(NodePair pair) const {
+    return {first_equal_.at(pair.first), first_equal_.at(pair.second)};
+  }
 
  private:
   /// Returns the pairs of each view and the `count` most similar ones, without the views that
@@ -58,7 +63,8 @@ class SpringViews {
   const VisualMemory* memory_;
   int components_;
   std::vector<PackedSignature> packed_;
-  std::vector<HomingView> homing_;  // empty without phases
+  std::vector<std::size_t> first_equal_;  // by node
+  std::vector<HomingView> homing_;        // empty without phases
 };
 
 /// True if both views of the spring agree on their relative pose, or if it has no phases.
