@@ -66,7 +66,10 @@ class LeftOutMatches {
  public:
   LeftOutMatches(const ColumnRanking& ranking, const NeighbourSupport& support,
                  const FeatureSource& features)
-      : ranking_(&ranking), support_(&support), features_(&features) {}
+      : ranking_(&ranking), support_(&support), features_(&features) {
+    for (const ViewId view : ranking.memory().views())
+      positions_.push_back(find_position(ranking.memory().info(view)));
+  }
 
   struct Best {
     ViewId by_columns;
@@ -79,12 +82,11 @@ class LeftOutMatches {
     const auto own = (*features_)(view);
     if (!own) return std::nullopt;
     const VisualMemory& memory = ranking_->memory();
+    const auto views = memory.views();
     const auto position = find_position(memory.info(view));
     std::vector<ViewId> excluded;
-    for (const ViewId other : memory.views()) {
-      if (other == view || (position && find_position(memory.info(other)) == position)) {
-        excluded.push_back(other);
-      }
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      if (views[i] == view || (position && positions_[i] == position)) excluded.push_back(views[i]);
     }
     const PackedSignature query = memory.packed(view);
     const auto found = memory.search(
@@ -96,22 +98,25 @@ class LeftOutMatches {
                 ranked[find_most_verified(*own, *features_, ranked)].match.view};
   }
 
+  /// Returns the distance from a view to the nearest one at another position. All views must have
+  /// positions.
+  [[nodiscard]] double distance_to_nearest(ViewId view) const {
+    const FloorPosition here = *find_position(ranking_->memory().info(view));
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const auto& other : positions_) {
+      if (std::abs(other->point.x_m - here.point.x_m) > nearest) continue;  // quick
+      const double distance_m = distance(*other, here);
+      if (distance_m > 0.0) nearest = std::min(nearest, distance_m);
+    }
+    return nearest;
+  }
+
  private:
   const ColumnRanking* ranking_;
   const NeighbourSupport* support_;
   const FeatureSource* features_;
+  std::vector<std::optional<FloorPosition>> positions_;  // of all views
 };
-
-/// Returns the distance from a view to the nearest one at another position.
-double distance_to_nearest(const VisualMemory& memory, ViewId view) {
-  const FloorPosition here = *find_position(memory.info(view));
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const ViewId other : memory.views()) {
-    const double distance_m = distance(*find_position(memory.info(other)), here);
-    if (distance_m > 0.0) nearest = std::min(nearest, distance_m);
-  }
-  return nearest;
-}
 
 }  // namespace
 
@@ -130,7 +135,7 @@ FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupp
   for (const ViewId view : sample_views(views, max_sampled, 1)) {
     const auto best = matches.find(view);
     if (!best) continue;
-    const double nearest = posed ? distance_to_nearest(memory, view) : 0.0;
+    const double nearest = posed ? matches.distance_to_nearest(view) : 0.0;
     const auto is_right = [&](ViewId match, ViewId LeftOutMatches::Best::*kind) {
       if (posed) {
         return distance(*find_position(memory.info(match)), *find_position(memory.info(view))) <=

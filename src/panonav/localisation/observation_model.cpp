@@ -53,16 +53,25 @@ constexpr double max_heading_error_rad = std::numbers::pi / 4.0;
 /// Returns the nearest other sites, ascending by distance.
 std::vector<std::uint32_t> find_nearest_sites(std::span<const PosedView> sites, std::size_t own,
                                               std::size_t count) {
-  std::vector<std::pair<double, std::uint32_t>> found;
-  found.reserve(sites.size());
+  const Point2 here = sites[own].pose.position();
+  std::vector<std::pair<double, std::uint32_t>> found;  // a heap of `count`, the farthest first
   for (std::uint32_t s = 0; s < sites.size(); ++s) {
-    if (s != own)
-      found.emplace_back(distance(sites[s].pose.position(), sites[own].pose.position()), s);
+    if (s == own) continue;
+    const Point2 there = sites[s].pose.position();
+    const bool is_full = found.size() == count;
+    if (is_full && std::abs(there.x_m - here.x_m) > found.front().first) continue;  // quick
+    const std::pair next(distance(there, here), s);
+    if (is_full) {
+      if (!(next < found.front())) continue;
+      std::ranges::pop_heap(found);
+      found.pop_back();
+    }
+    found.push_back(next);
+    std::ranges::push_heap(found);
   }
-  count = std::min(count, found.size());
-  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count), found.end());
+  std::ranges::sort_heap(found);
   std::vector<std::uint32_t> nearest;
-  for (std::size_t i = 0; i < count; ++i) nearest.push_back(found[i].second);
+  for (const auto& [distance_m, site] : found) nearest.push_back(site);
   return nearest;
 }
 

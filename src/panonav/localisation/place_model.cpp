@@ -32,8 +32,10 @@ std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId v
   std::optional<ViewId> nearest;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (const ViewId other : memory.views()) {
-    const auto there = find_position(memory.info(other));
-    if (!there) continue;
+    const ReferenceInfo& info = memory.info(other);
+    if (!info.pose || std::abs(info.pose->x_m - position->point.x_m) > nearest_m)
+      continue;  // quick
+    const auto there = find_position(info);
     const double distance_m = distance(*there, *position);
     if (distance_m > 0.0 && distance_m < nearest_m) {
       nearest_m = distance_m;

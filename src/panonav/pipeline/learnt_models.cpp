@@ -1,7 +1,9 @@
 #include "panonav/pipeline/learnt_models.hpp"
 
+#include <array>
 #include <cmath>
 #include <concepts>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -193,14 +195,30 @@ FeatureSource keep_read_features(const FeatureSource& source) {
   };
 }
 
-LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& features) {
+LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& features,
+                            Executor& executor) {
   constexpr std::size_t max_cached_profiles = 4000;  // 11 MB
   const ColumnRanking ranking(memory, 0, max_cached_profiles);
-  LearntModels models = learn_from(ranking, keep_read_features(features));
-  try {
-    models.observation = learn_observation_model_with_places(ranking, models.place);
-  } catch (const ContractError&) {  // nothing to learn from
-  }
+  LearntModels models;
+  const auto learn_places = [&] {
+    models.place = learn_place_model(ranking);
+    try {
+      models.observation = learn_observation_model_with_places(ranking, models.place);
+    } catch (const ContractError&) {  // nothing to learn from
+    }
+  };
+  const auto learn_positions = [&] { models.position = learn_position_model(ranking); };
+  // The only one that reads the file, which one thread at a time may do.
+  const auto learn_support = [&] {
+    const NeighbourSupport support(ranking);
+    models.spacing_m = support.spacing_m();
+    models.by_features =
+        features &&
+        evaluate_features(ranking, support, keep_read_features(features)).is_significantly_better();
+  };
+  const std::array<std::function<void()>, 3> parts{learn_places, learn_positions, learn_support};
+  executor.for_each_chunk(parts.size(), 1,
+                          [&](std::size_t part, std::size_t, std::size_t) { parts[part](); });
   return models;
 }
 
@@ -234,16 +252,22 @@ ObservationModel learn_tracking_model(const VisualMemory& memory, const Learning
 
 LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features) {
   const LearntViews learnt(memory);
-  return learn_all_from(learnt.memory(), features);
+  Executor alone;
+  return learn_all_from(learnt.memory(), features, alone);
 }
 
 void learn_and_store_models(MemoryFile& file) {
+  Executor alone;
+  learn_and_store_models(file, alone);
+}
+
+void learn_and_store_models(MemoryFile& file, Executor& executor) {
   const std::vector<MemoryFile::ViewPlace> places = file.places();
   if (places.empty()) return;
   const std::string fingerprint = compute_fingerprint(file.header().shape, places);
   if (read_models(file, fingerprint)) return;
   const LearntModels models =
-      learn_all_from(load_learnt_views(file, places), make_feature_source(file));
+      learn_all_from(load_learnt_views(file, places), make_feature_source(file), executor);
   Writer writer;
   writer.word(learning_version);
   writer.word(fingerprint);

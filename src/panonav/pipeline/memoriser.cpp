@@ -335,7 +335,7 @@ Memoriser::Counts Memoriser::finish(Executor& executor, const std::function<void
   if (options_.map && (counts_.appended > 0 || !counts_.map)) {
     counts_.map = map_views(*file_, odometry_, executor, mapped);
   }
-  learn_and_store_models(*file_);
+  learn_and_store_models(*file_, executor);
   return counts_;
 }
 
