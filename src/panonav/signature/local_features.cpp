@@ -12,7 +12,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/kernels/feature_match.hpp"
 
 namespace panonav {
 
@@ -67,68 +66,109 @@ struct Padded {
 
 using Grey = Padded<float>;
 
-// Sums over squares with sides of 2 * radius + 1 pixels. Every column adds in the same order, so a
-// rotated view gives bit-identical sums.
-Grey compute_box_sums(const Grey& from, int radius, int pad_rows, int pad_columns) {
-  Grey columns(from.rows, from.columns, radius, 0);
-  for (int y = 0; y < from.rows; ++y) {
-    const float* const in = from.row(y);
-    float* const out = columns.row(y);
-    for (int x = 0; x < from.columns; ++x) out[x] = in[x - radius];
-    for (int i = 1 - radius; i <= radius; ++i) {
-      for (int x = 0; x < from.columns; ++x) out[x] += in[x + i];
+// Returns the grey levels of 0 .. 255, summed over squares of 3 x 3 pixels. Every column adds in
+// the same order, so a rotated view gives bit-identical sums, here and below.
+Grey smooth_grey_levels(const Panorama& panorama, int pad_rows, int pad_columns) {
+  const int columns = panorama.columns();
+  Grey level(1, columns, 0, 1);  // one row
+  Grey along_rows(panorama.rows(), columns, 1, 0);
+  for (int y = 0; y < panorama.rows(); ++y) {
+    const float* const from = panorama.row(y).data();
+    float* const to = level.row(0);
+    for (int x = 0; x < columns; ++x) {
+      const float value = from[x] < 0.0F ? 0.0F : 1.0F < from[x] ? 1.0F : from[x];
+      to[x] = static_cast<float>(static_cast<int>(value * 255.0F + 0.5F));
     }
+    level.fill_padding();
+    float* const out = along_rows.row(y);
+    for (int x = 0; x < columns; ++x) out[x] = to[x - 1] + to[x] + to[x + 1];
   }
-  columns.fill_padding();
-  Grey sums(from.rows, from.columns, pad_rows, pad_columns);
-  for (int y = 0; y < from.rows; ++y) {
+  along_rows.fill_padding();
+  Grey sums(panorama.rows(), columns, pad_rows, pad_columns);
+  for (int y = 0; y < panorama.rows(); ++y) {
+    const float* const above = along_rows.row(y - 1);
+    const float* const here = along_rows.row(y);
+    const float* const below = along_rows.row(y + 1);
     float* const out = sums.row(y);
-    for (int j = -radius; j <= radius; ++j) {
-      const float* const in = columns.row(y + j);
-      for (int x = 0; x < from.columns; ++x) out[x] += in[x];
-    }
+    for (int x = 0; x < columns; ++x) out[x] = above[x] + here[x] + below[x];
   }
   sums.fill_padding();
   return sums;
 }
 
-// Computes the smaller eigenvalue of the structure tensor [Shi and Tomasi 1994], over 5 x 5 pixels.
-Grey compute_corner_strengths(const Grey& smooth) {
-  const int rows = smooth.rows;
-  const int columns = smooth.columns;
-  Grey xx(rows, columns, 0, 2);
-  Grey xy(rows, columns, 0, 2);
-  Grey yy(rows, columns, 0, 2);
-  for (int y = 0; y < rows; ++y) {
-    const float* const above = smooth.row(y - 1);
-    const float* const here = smooth.row(y);
-    const float* const below = smooth.row(y + 1);
-    float* const xx_row = xx.row(y);
-    float* const xy_row = xy.row(y);
-    float* const yy_row = yy.row(y);
-    for (int x = 0; x < columns; ++x) {
-      const float along = here[x + 1] - here[x - 1];
-      const float down = below[x] - above[x];
-      xx_row[x] = along * along;
-      xy_row[x] = along * down;
-      yy_row[x] = down * down;
+// Sums of the products of the gradients along and down (xx, xy, yy) over 5 x 5 pixels, row by row.
+// Only the rows that the next sum needs are kept, which are in the processor's cache.
+class StructureTensor {
+ public:
+  explicit StructureTensor(const Grey& smooth) : smooth_(smooth) {}
+
+  // Computes the sums around row y; rows must be visited in order. The outer rows are repeated.
+  void compute_row(int y) {
+    for (; next_ < std::min(y + reach + 1, smooth_.rows); ++next_) sum_along_row(next_);
+    for (int i = 0; i < 3; ++i) {
+      std::array<const float*, ring> rows{};
+      for (int j = -reach; j <= reach; ++j) {
+        const int row = std::clamp(y + j, 0, smooth_.rows - 1);
+        rows[static_cast<std::size_t>(j + reach)] = along_rows_.row(i * ring + row % ring);
+      }
+      const auto [r0, r1, r2, r3, r4] = rows;
+      float* const out = sums_.row(i);
+      for (int x = 0; x < smooth_.columns; ++x) out[x] = r0[x] + r1[x] + r2[x] + r3[x] + r4[x];
     }
   }
-  for (Grey* products : {&xx, &xy, &yy}) {
-    products->fill_padding();
-    *products = compute_box_sums(*products, 2, 0, 0);
+  [[nodiscard]] const float* xx() const { return sums_.row(0); }
+  [[nodiscard]] const float* xy() const { return sums_.row(1); }
+  [[nodiscard]] const float* yy() const { return sums_.row(2); }
+
+ private:
+  static constexpr int reach = 2;
+  static constexpr int ring = 2 * reach + 1;
+
+  void sum_along_row(int y) {
+    const float* const above = smooth_.row(y - 1);
+    const float* const here = smooth_.row(y);
+    const float* const below = smooth_.row(y + 1);
+    float* const xx = products_.row(0);
+    float* const xy = products_.row(1);
+    float* const yy = products_.row(2);
+    for (int x = 0; x < smooth_.columns; ++x) {
+      const float along = here[x + 1] - here[x - 1];
+      const float down = below[x] - above[x];
+      xx[x] = along * along;
+      xy[x] = along * down;
+      yy[x] = down * down;
+    }
+    products_.fill_padding();
+    for (int i = 0; i < 3; ++i) {
+      const float* const in = products_.row(i);
+      float* const out = along_rows_.row(i * ring + y % ring);
+      for (int x = 0; x < smooth_.columns; ++x)
+        out[x] = in[x - 2] + in[x - 1] + in[x] + in[x + 1] + in[x + 2];
+    }
   }
-  Grey strengths(rows, columns, 2, 2);
-  for (int y = 0; y < rows; ++y) {
-    const float* const xx_row = xx.row(y);
-    const float* const xy_row = xy.row(y);
-    const float* const yy_row = yy.row(y);
-    float* const strength_row = strengths.row(y);
-    for (int x = 0; x < columns; ++x) {
-      const float a = xx_row[x];
-      const float b = xy_row[x];
-      const float c = yy_row[x];
-      strength_row[x] = 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
+
+  const Grey& smooth_;
+  int next_ = 0;                                 // row, the first that was not summed along itself
+  Grey products_{3, smooth_.columns, 0, reach};  // of one row
+  Grey along_rows_{3 * ring, smooth_.columns, 0, 0};
+  Grey sums_{3, smooth_.columns, 0, 0};
+};
+
+// Computes the smaller eigenvalue of the structure tensor [Shi and Tomasi 1994], over 5 x 5 pixels.
+Grey compute_corner_strengths(const Grey& smooth) {
+  StructureTensor tensor(smooth);
+  Grey strengths(smooth.rows, smooth.columns, 2, 2);
+  for (int y = 0; y < smooth.rows; ++y) {
+    tensor.compute_row(y);
+    const float* const xx = tensor.xx();
+    const float* const xy = tensor.xy();
+    const float* const yy = tensor.yy();
+    float* const strength = strengths.row(y);
+    for (int x = 0; x < smooth.columns; ++x) {
+      const float a = xx[x];
+      const float b = xy[x];
+      const float c = yy[x];
+      strength[x] = 0.5F * (a + c - std::sqrt((a - c) * (a - c) + 4.0F * b * b));
     }
   }
   strengths.fill_padding();
@@ -158,11 +198,20 @@ std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row)
   constexpr float min_strength = 25.0F * (2.0F * 9.0F) * (2.0F * 9.0F);
   const Grey strengths = compute_corner_strengths(smooth);
   std::vector<Corner> all;
+  std::vector<std::uint8_t> candidates(static_cast<std::size_t>(strengths.columns));
   for (int y = first_row; y < end_row; ++y) {
+    const float* const above = strengths.row(y - 1);
     const float* const row = strengths.row(y);
+    const float* const below = strengths.row(y + 1);
+    // Its four neighbours exclude most pixels, without a branch.
     for (int x = 0; x < strengths.columns; ++x) {
-      // Its neighbours in the row exclude most pixels.
-      if (!(row[x] > min_strength && row[x] > row[x - 1] && row[x] >= row[x + 1])) continue;
+      candidates[static_cast<std::size_t>(x)] = static_cast<std::uint8_t>(
+          static_cast<int>(row[x] > min_strength) & static_cast<int>(row[x] > row[x - 1]) &
+          static_cast<int>(row[x] >= row[x + 1]) & static_cast<int>(row[x] > above[x]) &
+          static_cast<int>(row[x] >= below[x]));
+    }
+    for (int x = 0; x < strengths.columns; ++x) {
+      if (candidates[static_cast<std::size_t>(x)] == 0) continue;
       if (is_corner(strengths, y, x)) all.push_back({x, y, row[x]});
     }
   }
@@ -229,114 +278,6 @@ double row_height_rad(PanoramaShape shape, ElevationBand band) {
   return (band.top_rad - band.bottom_rad) / shape.rows;
 }
 
-// Bearings and descriptors of a view's features, as a structure of arrays.
-struct Bearings {
-  explicit Bearings(const LocalFeatures& view) {
-    const double column_rad = 2.0 * std::numbers::pi / view.shape.columns;
-    const double row_rad = row_height_rad(view.shape, view.elevations);
-    descriptor_words.reserve(4 * view.features.size());
-    for (const LocalFeatures::Feature& feature : view.features) {
-      const double azimuth = column_rad * feature.column;
-      azimuths.push_back(azimuth);
-      sines.push_back(static_cast<float>(std::sin(azimuth)));
-      cosines.push_back(static_cast<float>(std::cos(azimuth)));
-      tangents.push_back(
-          static_cast<float>(std::tan(view.elevations.top_rad - (feature.row + 0.5) * row_rad)));
-      descriptor_words.insert(descriptor_words.end(), feature.bits.begin(), feature.bits.end());
-    }
-  }
-  std::vector<double> azimuths;
-  std::vector<float> sines, cosines, tangents;
-  std::vector<std::uint64_t> descriptor_words;
-};
-
-// Features that are each other's nearest, sorted by azimuth in the query minus azimuth in the
-// reference: the pairs that a rotation brings within a right angle of each other are contiguous.
-// The list is stored twice, so that ranges across the wrap are contiguous, too.
-class MutualMatches {
- public:
-  struct Window {
-    int turn, begin, count;
-  };
-
-  MutualMatches(const Bearings& query, const Bearings& reference,
-                std::span<const std::uint16_t> nearest_of_query,
-                std::span<const std::uint16_t> nearest_of_reference) {
-    struct Pair {
-      double azimuth_rad;
-      std::size_t query, reference;
-    };
-    std::vector<Pair> pairs;
-    for (std::size_t i = 0; i < nearest_of_query.size() && !nearest_of_reference.empty(); ++i) {
-      const std::size_t j = nearest_of_query[i];
-      if (nearest_of_reference[j] == i)
-        pairs.push_back({query.azimuths[i] - reference.azimuths[j], i, j});
-    }
-    for (Pair& pair : pairs) {
-      if (pair.azimuth_rad < 0.0) pair.azimuth_rad += 2.0 * std::numbers::pi;
-    }
-    std::ranges::sort(pairs, {}, [](const Pair& p) { return std::pair(p.azimuth_rad, p.query); });
-    for (const double period_offset_rad : {0.0, 2.0 * std::numbers::pi}) {
-      for (const auto& [azimuth_rad, i, j] : pairs) {
-        azimuths_.push_back(azimuth_rad + period_offset_rad);
-        const float numbers[numbers_per_match] = {
-            query.sines[i],
-            query.cosines[i],
-            query.tangents[i],
-            reference.sines[j],
-            reference.cosines[j],
-            reference.tangents[j],
-            query.sines[i] * reference.cosines[j] - query.cosines[i] * reference.sines[j],
-            query.cosines[i] * reference.cosines[j] + query.sines[i] * reference.sines[j]};
-        for (std::size_t n = 0; n < numbers_per_match; ++n) values_[n].push_back(numbers[n]);
-      }
-    }
-  }
-
-  [[nodiscard]] std::size_t size() const { return azimuths_.size() / 2; }
-
-  /// Returns the range of matches whose features a rotation by `turn` steps brings within a right
-  /// angle of each other; 0 <= turn * step_rad < 2 pi.
-  [[nodiscard]] Window select_within_right_angle(int turn, double step_rad) const {
-    constexpr double right_angle = 0.5 * std::numbers::pi;
-    double from = -turn * step_rad - right_angle;
-    while (from < 0.0) from += 2.0 * std::numbers::pi;
-    const auto begin = std::ranges::upper_bound(azimuths_, from);
-    const auto end = std::lower_bound(begin, azimuths_.end(), from + 2.0 * right_angle);
-    return {turn, static_cast<int>(begin - azimuths_.begin()), static_cast<int>(end - begin)};
-  }
-
-  [[nodiscard]] kernels::MatchedBearings bearings(int begin, int count) const {
-    const auto at = [&](std::size_t n) { return values_[n].data() + begin; };
-    return {
-        at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), static_cast<std::size_t>(count)};
-  }
-
- private:
-  static constexpr std::size_t numbers_per_match = 8;
-  std::vector<double> azimuths_;
-  std::array<std::vector<float>, numbers_per_match> values_;  // as MatchedBearings has them
-};
-
-constexpr int rotation_steps = 128;
-constexpr double tolerance_rad = radians(2.0);
-// Largest accepted ratio of the distance between the views to the distance of a feature from either
-// view.
-constexpr float max_ratio = 2.0F;
-
-struct AngleTable {
-  std::array<float, rotation_steps> sines, cosines;
-};
-// Tabulates cosines and sines of the multiples of `step`.
-AngleTable make_angle_table(double step) {
-  AngleTable table{};
-  for (std::size_t i = 0; i < table.sines.size(); ++i) {
-    table.sines[i] = static_cast<float>(std::sin(step * static_cast<double>(i)));
-    table.cosines[i] = static_cast<float>(std::cos(step * static_cast<double>(i)));
-  }
-  return table;
-}
-
 }  // namespace
 
 std::optional<LocalFeatures> extract_features(const Panorama& panorama,
@@ -351,16 +292,7 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
   const int radius_rows = std::clamp(
       static_cast<int>(std::lround(patch_radius_rad / row_height_rad(shape, view.elevations))), 3,
       std::max(3, shape.rows));
-  Grey grey(shape.rows, shape.columns, 1, 1);
-  for (int y = 0; y < shape.rows; ++y) {
-    const std::span<const float> from = panorama.row(y);
-    float* const to = grey.row(y);
-    for (int x = 0; x < shape.columns; ++x) {
-      to[x] = static_cast<float>(static_cast<int>(std::clamp(from[x], 0.0F, 1.0F) * 255.0F + 0.5F));
-    }
-  }
-  grey.fill_padding();
-  const Grey smooth = compute_box_sums(grey, 1, std::max(1, radius_rows), radius_columns);
+  const Grey smooth = smooth_grey_levels(panorama, std::max(1, radius_rows), radius_columns);
   const std::vector<Corner> corners =
       find_corners(smooth, std::max(margin_rows, preprocessing.masked_rows_top),
                    shape.rows - std::max(margin_rows, preprocessing.masked_rows_bottom));
@@ -374,9 +306,13 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
     LocalFeatures::Feature& feature = view.features.emplace_back(LocalFeatures::Feature{
         static_cast<std::uint16_t>(corner.column), static_cast<std::uint16_t>(corner.row), {}});
     const float* const here = smooth.row(corner.row) + corner.column;
-    for (std::size_t i = 0; i < offsets.size(); ++i) {
-      const bool brighter = here[offsets[i].first] < here[offsets[i].second];
-      feature.bits[i / 64] |= std::uint64_t{brighter} << (i % 64);
+    for (std::size_t w = 0; w < feature.bits.size(); ++w) {
+      std::uint64_t word = 0;
+      for (std::size_t i = 0; i < 64; ++i) {
+        const auto& [first, second] = offsets[64 * w + i];
+        word |= std::uint64_t{here[first] < here[second]} << i;
+      }
+      feature.bits[w] = word;
     }
   }
   return view;
@@ -419,64 +355,6 @@ LocalFeatures unpack_features(std::span<const std::uint8_t> bytes, PanoramaShape
     view.features.push_back(feature);
   }
   return view;
-}
-
-LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatures& reference,
-                                    int more_than) {
-  if (query.shape != reference.shape || query.elevations != reference.elevations) {
-    throw ContractError("local features", "of another panorama", "of one shape and band");
-  }
-  const Bearings query_bearings(query);
-  const Bearings reference_bearings(reference);
-  const std::size_t count = query.features.size();
-  std::vector<std::uint16_t> nearest_of_query(count);
-  std::vector<std::uint16_t> nearest_of_reference(reference.features.size());
-  const kernels::Instructions instructions = kernels::chosen_instructions();
-  kernels::nearest_descriptors(query_bearings.descriptor_words, reference_bearings.descriptor_words,
-                               nearest_of_query, nearest_of_reference, instructions);
-  const MutualMatches matched(query_bearings, reference_bearings, nearest_of_query,
-                              nearest_of_reference);
-  if (static_cast<std::int64_t>(matched.size()) <= more_than) return {};
-
-  static const AngleTable full_angles = make_angle_table(2.0 * std::numbers::pi / rotation_steps);
-  static const AngleTable half_angles = make_angle_table(std::numbers::pi / rotation_steps);
-  static const kernels::MotionHypotheses hypotheses = [] {
-    kernels::MotionHypotheses made{};
-    for (int d = 0; d < kernels::motion_axes; ++d) {
-      made.cosine[d] = static_cast<float>(std::cos(std::numbers::pi * d / kernels::motion_axes));
-      made.sine[d] = static_cast<float>(std::sin(std::numbers::pi * d / kernels::motion_axes));
-    }
-    made.tolerance_sine = static_cast<float>(std::sin(tolerance_rad));
-    made.tolerance_cosine = static_cast<float>(std::cos(tolerance_rad));
-    made.max_ratio = max_ratio;
-    return made;
-  }();
-  // A rotation can explain at most the features that it brings within a right angle of each other.
-  std::array<MutualMatches::Window, rotation_steps> windows;
-  for (std::size_t t = 0; t < rotation_steps; ++t) {
-    windows[t] = matched.select_within_right_angle(static_cast<int>(t),
-                                                   2.0 * std::numbers::pi / rotation_steps);
-  }
-  std::ranges::sort(windows, [](const auto& a, const auto& b) {  // the best come first
-    return std::pair(-a.count, a.turn) < std::pair(-b.count, b.turn);
-  });
-
-  LocalFeatures::Match match;
-  std::array<std::int32_t, 2 * std::size_t{kernels::motion_axes}> explained{};
-  for (const auto& [turn, begin, bound] : windows) {
-    if (bound <= std::max(match.verified, more_than)) break;
-    const auto t = static_cast<std::size_t>(turn);
-    kernels::count_explained(matched.bearings(begin, bound),
-                             {full_angles.sines[t], full_angles.cosines[t], half_angles.sines[t],
-                              half_angles.cosines[t]},
-                             hypotheses, explained, instructions);
-    const std::int32_t max_explained = *std::ranges::max_element(explained);
-    if (max_explained > std::max(match.verified, more_than)) {
-      match.verified = max_explained;
-      match.heading_rad = wrap_angle(2.0 * std::numbers::pi * turn / rotation_steps);
-    }
-  }
-  return match;
 }
 
 }  // namespace panonav
