@@ -172,6 +172,19 @@ TEST_F(KeptModels, DoNotDependOnTheStepsInWhichTheMemoryGrew) {
   EXPECT_EQ(Tracker(at_once).localiser().model(), tracker.localiser().model());
 }
 
+TEST_F(KeptModels, DoNotDependOnTheNumberOfThreads) {
+  MemoryFile file = make_file(200);
+  learn_and_store_models(file);
+  const auto alone = file.parameter("learnt models");
+  for (const int threads : {2, 3, 5}) {
+    file.set_parameter("learnt models", "");
+    Executor executor(threads);
+    learn_and_store_models(file, executor);
+    EXPECT_EQ(file.parameter("learnt models"), alone) << threads;
+  }
+  EXPECT_TRUE(load_stored_models(file).value().observation);  // guard
+}
+
 TEST_F(KeptModels, DependOnFloorsButNotOnNames) {
   MemoryFile file = make_file();
   learn_and_store_models(file);

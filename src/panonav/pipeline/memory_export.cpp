@@ -164,7 +164,6 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder, Exe
   const fs::path& out = unfinished.path();
   MemoryExport done{.views = views.size()};
   done.enlarged = thumbnail_columns(header) < header.panorama_columns;
-
   // Positions of a data set are in metres.
   const LengthUnit unit = read_length_unit(memory);
   Dataset dataset;
@@ -183,11 +182,12 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder, Exe
     if (picture.empty()) {
       files[i].clear();
     } else {
-      const fs::path name = unescape_name(files[i]);
-      unfinished.append(name, picture);
-      dataset.entries.push_back({files[i], out / name, info.stamp_s,
-                                 unit == LengthUnit::metres ? info.pose : std::nullopt,
-                                 std::nullopt});
+      unfinished.append(unescape_name(files[i]), picture);
+      // The table does not need the paths, which would take half of the memory.
+      dataset.entries.push_back({.file = files[i],
+                                 .path = {},
+                                 .stamp_s = info.stamp_s,
+                                 .pose = unit == LengthUnit::metres ? info.pose : std::nullopt});
       if (files[i] != info.name) ++done.renamed;
     }
     if (advance) advance();
