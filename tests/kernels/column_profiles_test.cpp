@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <span>
+#include <tuple>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -43,6 +46,62 @@ struct Components {
 
 float value_at(const std::vector<float>& view, std::size_t band, std::size_t column) {
   return view[band * profile_view_stride + column];
+}
+
+TEST(ColumnProfilesKernel, AveragesRowsInBandsOnEveryInstructionSet) {
+  Random random(3);
+  int checked = 0;
+  for (const auto& [rows, components, bands] :
+       {std::tuple{80, 15, 16}, {83, 4, 16}, {7, 1, 5}, {3, 2, 1}}) {
+    const auto size = static_cast<std::size_t>(rows * components);
+    std::vector<std::uint8_t> magnitudes(size), phases(size);
+    for (auto* bytes : {&magnitudes, &phases}) {
+      for (std::uint8_t& byte : *bytes) byte = static_cast<std::uint8_t>(random.index(256));
+    }
+    std::vector<std::uint32_t> used;
+    for (std::uint32_t y = 0; y < static_cast<std::uint32_t>(rows); ++y) {
+      if (y % 10 != 4) used.push_back(y);
+    }
+    const std::size_t values = 16 * static_cast<std::size_t>(components);
+    for (const Instructions set : available_instructions()) {
+      std::vector<float> real(values), imaginary(values);
+      average_bands(magnitudes, phases, static_cast<std::size_t>(rows), used, bands, real,
+                    imaginary, set);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(components); ++k) {
+        for (std::size_t b = 0; b < static_cast<std::size_t>(bands); ++b) {
+          const std::size_t begin = b * used.size() / static_cast<std::size_t>(bands);
+          const std::size_t end = (b + 1) * used.size() / static_cast<std::size_t>(bands);
+          float cosines = 0.0F;
+          float sines = 0.0F;
+          for (std::size_t i = begin; i < end; ++i) {
+            const std::size_t at = k * static_cast<std::size_t>(rows) + used[i];
+            const auto cosine = [](int phase) {
+              return static_cast<float>(std::cos(std::numbers::pi * (phase % 256) / 128.0));
+            };
+            cosines += static_cast<float>(magnitudes[at]) * cosine(phases[at]);
+            sines += static_cast<float>(magnitudes[at]) * cosine(phases[at] + 192);
+          }
+          const float scale = (k == 0 ? 0.5F : 1.0F) / static_cast<float>(end - begin);
+          EXPECT_EQ(real[16 * k + b], cosines * scale) << name(set);
+          EXPECT_EQ(imaginary[16 * k + b], sines * scale) << name(set);
+          ++checked;
+        }
+      }
+    }
+  }
+  EXPECT_GE(checked, 15 * 16 + 4 * 16 + 5 + 2);
+  std::vector<std::uint8_t> bytes(6);
+  std::vector<float> values(16);
+  const std::vector<std::uint32_t> all{0, 1, 2};
+  const std::vector<std::uint32_t> beyond{0, 1, 3};
+  const auto average = [&](std::size_t rows, std::span<const std::uint32_t> used, int bands) {
+    average_bands(bytes, bytes, rows, used, bands, values, values, Instructions::scalar);
+  };
+  EXPECT_THROW(average(3, all, 2), ContractError);     // two components
+  EXPECT_THROW(average(6, beyond, 4), ContractError);  // more bands than rows
+  EXPECT_THROW(average(4, all, 1), ContractError);     // half a component
+  EXPECT_THROW(average(3, beyond, 1), ContractError);
+  EXPECT_NO_THROW(average(6, beyond, 3));
 }
 
 TEST(ColumnProfilesKernel, ReconstructsTheSumOfWavesOnEveryInstructionSet) {

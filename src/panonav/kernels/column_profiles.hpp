@@ -1,11 +1,28 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "panonav/kernels/dispatch.hpp"
 
 namespace panonav::kernels {
+
+/// Computes the components of bands of rows: the means of magnitude * (cosine, sine of the phase)
+/// over nearly equal numbers of `used_rows`, half of it for component 0; real[16 * k + b] of band
+/// b. `magnitudes`, `phases`: packed, index k * rows + row. All instruction sets give the same
+/// bits. Throws ContractError unless 1 <= bands <= 16, bands <= used rows, all used rows exist and
+/// the sizes of the spans fit.
+void average_bands(std::span<const std::uint8_t> magnitudes, std::span<const std::uint8_t> phases,
+                   std::size_t rows, std::span<const std::uint32_t> used_rows, int bands,
+                   std::span<float> real, std::span<float> imaginary, Instructions instructions);
+
+/// Computes the components of bands of a blurred view: sums over all rows, weighted by
+/// weights[16 * row + b] and damping[k]. Otherwise as `average_bands`; also throws unless there are
+/// weights for all rows and dampings for all components.
+void blur_bands(std::span<const std::uint8_t> magnitudes, std::span<const std::uint8_t> phases,
+                std::span<const float> weights, std::span<const float> damping,
+                std::span<float> real, std::span<float> imaginary, Instructions instructions);
 
 /// Computes the brightness of `waves.bands` bands at 128 azimuths: view[b][c] = sum over k of
 /// real[k][b] cos(2 pi k c / 128) - imaginary[k][b] sin(2 pi k c / 128). Even and odd components

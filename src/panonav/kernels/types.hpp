@@ -160,6 +160,20 @@ struct MatchedBearings {
   size_t count;                 ///< matched pairs: values in each array
 };
 
+/// Directions of one elevation above the horizon of a level robot, and the panorama of a tilted
+/// one.
+struct TiltedDirections {
+  double cos_roll,      ///< cosine of the robot's roll (`Tilt`)
+      sin_roll,         ///< its sine
+      cos_pitch,        ///< cosine of the robot's pitch
+      sin_pitch,        ///< its sine
+      flat,             ///< cosine of the elevation
+      z;                ///< its sine
+  double top_rad,       ///< upper edge of the tilted panorama
+      rows_per_rad,     ///< of the tilted panorama
+      columns_per_rad;  ///< the same
+};
+
 /// Number of axes of motion, each tested in both directions.
 inline constexpr int motion_axes = 16;
 /// Candidate axes of motion, and the condition under which one explains a matched bearing.

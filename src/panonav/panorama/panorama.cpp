@@ -1,8 +1,10 @@
 #include "panonav/panorama/panorama.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -39,8 +41,14 @@ Panorama::Panorama(int rows, int columns, std::optional<ElevationBand> elevation
   }
   // 0 times a finite value is 0, and an infinite or NaN value makes the sum NaN: one vectorised
   // loop instead of a test per value.
-  float sum = 0.0F;
-  for (const float value : values_) sum += value * 0.0F;
+  constexpr std::size_t lanes = 8;
+  std::array<float, lanes> sums{};
+  std::size_t i = 0;
+  for (; i + lanes <= size; i += lanes) {
+    for (std::size_t lane = 0; lane < lanes; ++lane) sums[lane] += values_[i + lane] * 0.0F;
+  }
+  for (; i < size; ++i) sums[0] += values_[i] * 0.0F;
+  const float sum = std::accumulate(sums.begin(), sums.end(), 0.0F);
   require(sum == 0.0F, "panorama value", static_cast<double>(sum), "finite");
 }
 

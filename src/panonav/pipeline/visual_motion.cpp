@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -18,6 +20,30 @@ namespace panonav {
 
 namespace {
 
+/// A view with its position.
+struct PosedOnFloor {
+  ViewId view;
+  FloorPosition position;
+};
+
+/// Returns the view nearest to a position at another position of the same floor; null if there is
+/// none.
+const PosedOnFloor* find_nearest(std::span<const PosedOnFloor> posed, const FloorPosition& from) {
+  constexpr double rounding = 1e-9;  // of squares, relative
+  const PosedOnFloor* nearest = nullptr;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const PosedOnFloor& other : posed) {
+    const double x_m = other.position.point.x_m - from.point.x_m;
+    const double y_m = other.position.point.y_m - from.point.y_m;
+    if (x_m * x_m + y_m * y_m > nearest_m * nearest_m * (1.0 + rounding)) continue;
+    const double off_m = distance(other.position, from);
+    if (!(off_m > 0.0 && off_m < nearest_m)) continue;
+    nearest = &other;
+    nearest_m = off_m;
+  }
+  return nearest;
+}
+
 /// Estimates the scale in metres per unit of visual displacement, from nearest pairs of views with
 /// positions.
 double compute_scale(const VisualMemory& memory) {
@@ -25,28 +51,21 @@ double compute_scale(const VisualMemory& memory) {
   // displacements: the scale is 1.2 to 1.5 times too large in six scenes with a view every 0.5 m,
   // with eight iterations 1.06 to 1.25 times. More iterations change nothing.
   const VisualOdometryOptions options{.iterations = 8};
-  std::vector<ViewId> posed;
+  std::vector<PosedOnFloor> posed;
   for (const ViewId view : memory.views()) {
-    if (memory.info(view).pose) posed.push_back(view);
+    if (const auto position = find_position(memory.info(view))) posed.push_back({view, *position});
   }
-  const auto distance_m = [&](ViewId a, ViewId b) {
-    return distance(*find_position(memory.info(a)), *find_position(memory.info(b)));
-  };
   constexpr std::size_t sampled = 64;
   const std::size_t every = std::max<std::size_t>(1, posed.size() / sampled);
   std::vector<KnownLength> known;
   for (std::size_t i = 0; i < posed.size(); i += every) {
-    std::optional<ViewId> nearest;
-    for (const ViewId other : posed) {
-      const double off_m = distance_m(posed[i], other);
-      if (off_m > 0.0 && std::isfinite(off_m) &&
-          (!nearest || off_m < distance_m(posed[i], *nearest)))
-        nearest = other;
+    const PosedOnFloor* const nearest = find_nearest(posed, posed[i].position);
+    if (nearest == nullptr) continue;
+    const auto step = visual_step(OdometryView(memory.signature(posed[i].view)),
+                                  OdometryView(memory.signature(nearest->view)), options);
+    if (step) {
+      known.push_back({step->length_in_views, distance(posed[i].position, nearest->position)});
     }
-    if (!nearest) continue;
-    const auto step = visual_step(OdometryView(memory.signature(posed[i])),
-                                  OdometryView(memory.signature(*nearest)), options);
-    if (step) known.push_back({step->length_in_views, distance_m(posed[i], *nearest)});
   }
   return length_scale_m(known).value_or(options.scale_m);
 }

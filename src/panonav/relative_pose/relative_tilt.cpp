@@ -181,37 +181,60 @@ class TiltProblem {
 
 }  // namespace
 
-Tilt relative_tilt(const HomingView& home, const HomingView& current, double heading_rad) {
-  constexpr int min_rows = 10;
-  Tilt tilt;
-  if (!home.elevations() || home.elevations() != current.elevations() ||
-      home.rows() != current.rows() || home.rows() < min_rows) {
-    return tilt;
+/// The current view as each stage compares it.
+struct TiltEstimator::Stages {
+  int rows;
+  ElevationBand band;
+  std::array<Panorama, tilt_stages.size()> smooth;
+
+  [[nodiscard]] double row_rad() const { return (band.top_rad - band.bottom_rad) / rows; }
+  [[nodiscard]] static Panorama make_smooth(const HomingView& view, const TiltStage& stage,
+                                            double row_rad) {
+    return smooth_rows(synthesise(view, stage.frequencies, columns_per_period * stage.frequencies),
+                       stage.smoothing_rad / row_rad);
   }
-  const auto& band = *home.elevations();
-  const double row_rad = (band.top_rad - band.bottom_rad) / home.rows();
+};
+
+TiltEstimator::TiltEstimator(const HomingView& current) {
+  constexpr int min_rows = 10;
+  if (!current.elevations() || current.rows() < min_rows) return;
+  const auto& band = *current.elevations();
+  const double row_rad = (band.top_rad - band.bottom_rad) / current.rows();
+  stages_ = std::make_unique<const Stages>(
+      Stages{current.rows(),
+             band,
+             {Stages::make_smooth(current, tilt_stages[0], row_rad),
+              Stages::make_smooth(current, tilt_stages[1], row_rad)}});
+}
+
+TiltEstimator::~TiltEstimator() = default;
+
+Tilt TiltEstimator::tilt_from(const HomingView& home, double heading_rad) const {
+  Tilt tilt;
+  if (!stages_ || home.elevations() != stages_->band || home.rows() != stages_->rows) return tilt;
+  const double row_rad = stages_->row_rad();
   const int margin =
       std::clamp(static_cast<int>(std::ceil(tilt_margin_rad / row_rad)), 1, (home.rows() - 2) / 3);
   const HomingView aligned = rotate(home, -heading_rad);
-  for (const TiltStage& stage : tilt_stages) {
-    const double sigma_rows = stage.smoothing_rad / row_rad;
-    const int columns = columns_per_period * stage.frequencies;
-    const Panorama smooth_home =
-        smooth_rows(synthesise(aligned, stage.frequencies, columns), sigma_rows);
-    const Panorama smooth_current =
-        smooth_rows(synthesise(current, stage.frequencies, columns), sigma_rows);
-    TiltProblem problem(smooth_home, smooth_current, margin, tilt);
+  for (std::size_t i = 0; i < tilt_stages.size(); ++i) {
+    const Panorama smooth_home = Stages::make_smooth(aligned, tilt_stages[i], row_rad);
+    TiltProblem problem(smooth_home, stages_->smooth[i], margin, tilt);
     TiltProblem::Equations equations;
     if (!minimise(problem, equations, {.max_steps = tilt_iterations}).solvable) return tilt;
   }
   return tilt;
 }
 
+Tilt relative_tilt(const HomingView& home, const HomingView& current, double heading_rad) {
+  return TiltEstimator(current).tilt_from(home, heading_rad);
+}
+
+Panorama synthesise(const HomingView& view) {
+  return synthesise(view, view.components(), columns_per_period * view.components());
+}
+
 HomingView level_view(const HomingView& view, const Tilt& tilt) {
-  // Enough that interpolation hardly damps the highest frequency.
-  const int columns = columns_per_period * view.components();
-  return homing_view(compute_signature(
-      level_panorama(synthesise(view, view.components(), columns), tilt), view.components()));
+  return homing_view(compute_signature(level_panorama(synthesise(view), tilt), view.components()));
 }
 
 }  // namespace panonav

@@ -20,7 +20,6 @@ namespace {
 constexpr int columns = ColumnProfiles::columns;
 constexpr int bands = ColumnProfiles::bands;
 static_assert(columns == kernels::matched_reference_columns && bands == kernels::matched_bands);
-constexpr std::size_t group = 4;         // bands that are added up together, of one vector
 constexpr std::uint8_t mean_byte = 128;  // byte of a value as high as the column's mean
 // Byte steps for a deviation of one column contrast; 127 / 40 = 3.2 contrasts fit, and larger
 // deviations are rare.
@@ -67,24 +66,6 @@ const Waves& cosine_and_sine_table() {
   return made;
 }
 
-/// The cosine and the sine of a phase.
-struct Direction {
-  float cosine, sine;
-};
-
-/// Directions of the 256 packed phases.
-const std::array<Direction, 256>& phase_table() {
-  static const std::array<Direction, 256> made = [] {
-    const auto cosine = [](std::size_t phase) {
-      return static_cast<float>(std::cos(std::numbers::pi * static_cast<double>(phase) / 128.0));
-    };
-    std::array<Direction, 256> table{};
-    for (std::size_t i = 0; i < table.size(); ++i) table[i] = {cosine(i), cosine((i + 192) % 256)};
-    return table;
-  }();
-  return made;
-}
-
 /// Components of the bands of a signature: means over bands of nearly equal numbers of rows.
 class Bands {
  public:
@@ -92,40 +73,22 @@ class Bands {
         std::span<const std::uint8_t> allowed_rows)
       : components_(components) {
     const auto rows = static_cast<std::size_t>(signature.shape.rows);
-    std::vector<std::size_t> used_rows;
-    if (!allowed_rows.empty()) {
-      for (std::size_t y = 0; y < rows; ++y) {
-        if (allowed_rows[y] != 0) used_rows.push_back(y);
-      }
+    std::vector<std::uint32_t> used_rows;
+    used_rows.reserve(rows);
+    for (std::size_t y = 0; y < rows; ++y) {
+      if (allowed_rows.empty() || allowed_rows[y] != 0)
+        used_rows.push_back(static_cast<std::uint32_t>(y));
     }
-    const std::size_t count = allowed_rows.empty() ? rows : used_rows.size();
-    const auto row = [&](std::size_t i) { return allowed_rows.empty() ? i : used_rows[i]; };
-    const auto& directions = phase_table();
-    const std::size_t used = std::min<std::size_t>(bands, count);
-    used_ = static_cast<int>(used);
-    if (used < bands) {
+    used_ = static_cast<int>(std::min<std::size_t>(bands, used_rows.size()));
+    if (used_ < bands) {
       real_.fill(0.0F);
       imaginary_.fill(0.0F);
     }
-    for (std::size_t band = 0; band < used; ++band) {
-      const std::size_t first = band * count / used;
-      const std::size_t end = (band + 1) * count / used;
-      for (std::size_t k = 0; k < static_cast<std::size_t>(components); ++k) {
-        float real = 0.0F;
-        float imaginary = 0.0F;
-        for (std::size_t i = first; i < end; ++i) {
-          const std::size_t at = k * rows + row(i);
-          const auto magnitude = static_cast<float>(signature.magnitudes[at]);
-          const Direction direction = directions[signature.phases[at]];
-          real += magnitude * direction.cosine;
-          imaginary += magnitude * direction.sine;
-        }
-        // I(phi) = a_0 / 2 + sum_k a_k cos(k phi) + b_k sin(k phi) [S06 eq. 10].
-        const float scale = (k == 0 ? 0.5F : 1.0F) / static_cast<float>(end - first);
-        real_[k * bands + band] = real * scale;
-        imaginary_[k * bands + band] = imaginary * scale;
-      }
-    }
+    if (used_ == 0) return;
+    const std::size_t size = static_cast<std::size_t>(components) * rows;
+    kernels::average_bands(std::span(signature.magnitudes).first(size),
+                           std::span(signature.phases).first(size), rows, used_rows, used_, real_,
+                           imaginary_, kernels::chosen_instructions());
   }
 
   /// Components of the bands of a blurred view. `weights`: of each row, for each band.
@@ -133,40 +96,11 @@ class Bands {
         std::span<const float> damping)
       : components_(std::min(signature.shape.components, max_components)),
         used_(std::min(bands, signature.shape.rows)) {
-    const auto rows = static_cast<std::size_t>(signature.shape.rows);
-    const auto& directions = phase_table();
-    // A row contributes to few bands, which are added up in groups of one vector.
-    std::vector<std::pair<std::size_t, std::size_t>> used_groups;
-    for (std::size_t y = 0; y < rows; ++y) {
-      const std::span row = weights.subspan(y * bands, bands);
-      const auto is_used = [](float weight) { return weight > 0.0F; };
-      const auto first = std::ranges::find_if(row, is_used) - row.begin();
-      const auto end = std::find_if(row.rbegin(), row.rend(), is_used).base() - row.begin();
-      used_groups.emplace_back(static_cast<std::size_t>(first) / group,
-                               (static_cast<std::size_t>(end) + group - 1) / group);
-    }
-    for (std::size_t k = 0; k < static_cast<std::size_t>(components_); ++k) {
-      std::array<float, bands> real{};
-      std::array<float, bands> imaginary{};
-      for (std::size_t y = 0; y < rows; ++y) {
-        const auto magnitude = static_cast<float>(signature.magnitudes[k * rows + y]);
-        const Direction direction = directions[signature.phases[k * rows + y]];
-        const float row_real = magnitude * direction.cosine;
-        const float row_imaginary = magnitude * direction.sine;
-        for (std::size_t g = used_groups[y].first; g < used_groups[y].second; ++g) {
-          const float* const row_weights = weights.data() + y * bands + g * group;
-          for (std::size_t i = 0; i < group; ++i) {
-            real[g * group + i] += row_weights[i] * row_real;
-            imaginary[g * group + i] += row_weights[i] * row_imaginary;
-          }
-        }
-      }
-      const float scale = (k == 0 ? 0.5F : 1.0F) * damping[k];
-      for (std::size_t band = 0; band < bands; ++band) {
-        real_[k * bands + band] = real[band] * scale;
-        imaginary_[k * bands + band] = imaginary[band] * scale;
-      }
-    }
+    const std::size_t size =
+        static_cast<std::size_t>(components_) * static_cast<std::size_t>(signature.shape.rows);
+    kernels::blur_bands(std::span(signature.magnitudes).first(size),
+                        std::span(signature.phases).first(size), weights, damping, real_,
+                        imaginary_, kernels::chosen_instructions());
   }
 
   [[nodiscard]] kernels::BandWaves waves() const noexcept {

@@ -1,9 +1,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <memory>
+#include <mutex>
 #include <numbers>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -14,19 +18,53 @@ namespace panonav {
 
 namespace {
 
-// Bearings and descriptors of a view's features, as a structure of arrays.
-struct Bearings {
-  explicit Bearings(const LocalFeatures& view) {
-    const double column_rad = 2.0 * std::numbers::pi / view.shape.columns;
-    const double row_rad = (view.elevations.top_rad - view.elevations.bottom_rad) / view.shape.rows;
-    descriptor_words.reserve(4 * view.features.size());
-    for (const LocalFeatures::Feature& feature : view.features) {
-      const double azimuth = column_rad * feature.column;
+// Bearings of the columns and rows of a panorama.
+struct BearingTables {
+  BearingTables(PanoramaShape shape_, ElevationBand elevations_)
+      : shape(shape_), elevations(elevations_) {
+    const double column_rad = 2.0 * std::numbers::pi / shape.columns;
+    for (int column = 0; column < shape.columns; ++column) {
+      const double azimuth = column_rad * column;
       azimuths.push_back(azimuth);
       sines.push_back(static_cast<float>(std::sin(azimuth)));
       cosines.push_back(static_cast<float>(std::cos(azimuth)));
-      tangents.push_back(
-          static_cast<float>(std::tan(view.elevations.top_rad - (feature.row + 0.5) * row_rad)));
+    }
+    const double row_rad = (elevations.top_rad - elevations.bottom_rad) / shape.rows;
+    for (int row = 0; row < shape.rows; ++row)
+      tangents.push_back(static_cast<float>(std::tan(elevations.top_rad - (row + 0.5) * row_rad)));
+  }
+  PanoramaShape shape;
+  ElevationBand elevations;
+  std::vector<double> azimuths;                 // of each column
+  std::vector<float> sines, cosines, tangents;  // of each column, of each row
+};
+
+// Returns the tables of a panorama. A program compares features of one shape, so only the last
+// tables are kept.
+std::shared_ptr<const BearingTables> get_or_make_bearing_tables(PanoramaShape shape,
+                                                                ElevationBand elevations) {
+  static std::mutex mutex;
+  static std::shared_ptr<const BearingTables> last;
+  const std::lock_guard lock(mutex);
+  if (!last || last->shape != shape || last->elevations != elevations)
+    last = std::make_shared<const BearingTables>(shape, elevations);
+  return last;
+}
+
+// Bearings and descriptors of a view's features, as a structure of arrays.
+struct Bearings {
+  Bearings(const LocalFeatures& view, const BearingTables& tables) {
+    const std::size_t count = view.features.size();
+    for (auto* const numbers : {&sines, &cosines, &tangents}) numbers->reserve(count);
+    azimuths.reserve(count);
+    descriptor_words.reserve(4 * count);
+    for (const LocalFeatures::Feature& feature : view.features) {
+      require(feature.column < view.shape.columns && feature.row < view.shape.rows,
+              "column of a local feature", feature.column, "within the panorama, as its row");
+      azimuths.push_back(tables.azimuths[feature.column]);
+      sines.push_back(tables.sines[feature.column]);
+      cosines.push_back(tables.cosines[feature.column]);
+      tangents.push_back(tables.tangents[feature.row]);
       descriptor_words.insert(descriptor_words.end(), feature.bits.begin(), feature.bits.end());
     }
   }
@@ -129,8 +167,9 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
   if (query.shape != reference.shape || query.elevations != reference.elevations) {
     throw ContractError("local features", "of another panorama", "of one shape and band");
   }
-  const Bearings query_bearings(query);
-  const Bearings reference_bearings(reference);
+  const auto tables = get_or_make_bearing_tables(query.shape, query.elevations);
+  const Bearings query_bearings(query, *tables);
+  const Bearings reference_bearings(reference, *tables);
   const std::size_t count = query.features.size();
   std::vector<std::uint16_t> nearest_of_query(count);
   std::vector<std::uint16_t> nearest_of_reference(reference.features.size());

@@ -14,8 +14,21 @@ struct ColumnMatchBody {
                                     uint16_t* sums);
 };
 
+struct BandsJob {
+  const uint8_t* magnitudes;     ///< index k * rows + row
+  const uint8_t* phases;         ///< the same
+  const uint32_t* used_rows;     ///< `used_count` of them
+  const float* magnitude_pairs;  ///< each byte twice
+  const float* directions;       ///< cosine and sine of each phase
+  size_t rows, used_count;
+  int components, bands;
+};
+
 template <Instructions set>
 struct ColumnProfilesBody {
+  static void average_bands(const BandsJob& job, float* real, float* imaginary);
+  static void blur_bands(const BandsJob& job, const float* weights, const float* damping,
+                         float* real, float* imaginary);
   static void reconstruct_bands(const BandWaves& waves, float* view);
   static void subtract_column_means(float* view, int bands);
   static bool quantise_columns(const float* view, int bands, const ColumnContrast& contrast,
@@ -49,6 +62,14 @@ struct FeatureMatchBody {
                                   size_t b_count, uint16_t* nearest_of_a, uint16_t* nearest_of_b);
   static void count_explained(const MatchedBearings& matched, const MatchedBearings::Turn& turn,
                               const MotionHypotheses& hypotheses, int32_t* counts);
+};
+
+template <Instructions set>
+struct LevellingBody {
+  static void tilted_positions(const TiltedDirections& directions, const double* cosines,
+                               const double* sines, float* rows, float* columns, int count);
+  static void sample_tilted_row(const float* seen, int seen_rows, const float* rows,
+                                const float* shifts, float* values, int columns);
 };
 
 template <Instructions set>

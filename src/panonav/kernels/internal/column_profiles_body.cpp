@@ -107,7 +107,82 @@ void reconstruct_quarters(const BandWaves& waves, float* view) {
   }
 }
 
+/// Loads two pairs of floats, from any addresses.
+inline Vectors<4>::Floats load_two_pairs(const float* first, const float* second) {
+  typedef double Pairs __attribute__((vector_size(16)));
+  double pairs[2];
+  __builtin_memcpy(pairs, first, sizeof pairs[0]);
+  __builtin_memcpy(pairs + 1, second, sizeof pairs[1]);
+  return reinterpret_cast<Vectors<4>::Floats>(Pairs{pairs[0], pairs[1]});
+}
+
 }  // namespace
+
+// Two components at a time, each with its real and imaginary part: four lanes.
+template <Instructions set>
+void ColumnProfilesBody<set>::average_bands(const BandsJob& job, float* __restrict real,
+                                            float* __restrict imaginary) {
+  using Floats = Vectors<4>::Floats;
+  const auto bands = static_cast<size_t>(job.bands);
+  for (int k = 0; k < job.components; k += 2) {
+    const bool has_next = k + 1 < job.components;
+    const size_t next = has_next ? job.rows : 0;
+    const size_t component = static_cast<size_t>(k) * job.rows;
+    for (size_t band = 0; band < bands; ++band) {
+      const size_t begin = band * job.used_count / bands;
+      const size_t end = (band + 1) * job.used_count / bands;
+      Floats sums = {};
+      for (size_t i = begin; i < end; ++i) {
+        const size_t at = component + job.used_rows[i];
+        const auto magnitudes =
+            load_two_pairs(job.magnitude_pairs + size_t{2} * job.magnitudes[at],
+                           job.magnitude_pairs + size_t{2} * job.magnitudes[at + next]);
+        sums += magnitudes * load_two_pairs(job.directions + size_t{2} * job.phases[at],
+                                            job.directions + size_t{2} * job.phases[at + next]);
+      }
+      // I(phi) = a_0 / 2 + sum_k a_k cos(k phi) + b_k sin(k phi) [S06 eq. 10].
+      const float share = 1.0F / static_cast<float>(end - begin);
+      const float scale = k == 0 ? 0.5F / static_cast<float>(end - begin) : share;
+      const size_t to = static_cast<size_t>(k) * matched_bands + band;
+      real[to] = sums[0] * scale;
+      imaginary[to] = sums[1] * scale;
+      if (!has_next) continue;
+      real[to + matched_bands] = sums[2] * share;
+      imaginary[to + matched_bands] = sums[3] * share;
+    }
+  }
+}
+
+// All bands at a time. Most weights are 0, but choosing costs more than multiplying.
+template <Instructions set>
+void ColumnProfilesBody<set>::blur_bands(const BandsJob& job, const float* __restrict weights,
+                                         const float* __restrict damping, float* __restrict real,
+                                         float* __restrict imaginary) {
+  constexpr int lanes = lanes_of<set>;
+  constexpr int parts = matched_bands / lanes;
+  using Floats = typename Vectors<lanes>::Floats;
+  for (int k = 0; k < job.components; ++k) {
+    Floats reals[parts] = {};
+    Floats imaginaries[parts] = {};
+    for (size_t y = 0; y < job.rows; ++y) {
+      const size_t at = static_cast<size_t>(k) * job.rows + y;
+      const float magnitude = job.magnitude_pairs[size_t{2} * job.magnitudes[at]];
+      const float* const direction = job.directions + size_t{2} * job.phases[at];
+      const float row_real = magnitude * direction[0];
+      const float row_imaginary = magnitude * direction[1];
+      for (int i = 0; i < parts; ++i) {
+        const Floats shares = load<lanes>(weights + y * matched_bands + i * lanes);
+        reals[i] += shares * row_real;
+        imaginaries[i] += shares * row_imaginary;
+      }
+    }
+    const float scale = (k == 0 ? 0.5F : 1.0F) * damping[k];
+    for (int i = 0; i < parts; ++i) {
+      store<lanes>(real + k * matched_bands + i * lanes, reals[i] * scale);
+      store<lanes>(imaginary + k * matched_bands + i * lanes, imaginaries[i] * scale);
+    }
+  }
+}
 
 template <Instructions set>
 void ColumnProfilesBody<set>::reconstruct_bands(const BandWaves& waves, float* view) {

@@ -1,13 +1,14 @@
-#include "panonav/kernels/internal/bodies.hpp"
+#include "panonav/kernels/internal/vector.hpp"
 
 // Loops without branches, which the compiler vectorises for each instruction set.
 
 namespace panonav::kernels {
 
-template <Instructions set>
-void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_count,
-                                                const uint64_t* b, size_t b_count,
-                                                uint16_t* nearest_of_a, uint16_t* nearest_of_b) {
+namespace {
+
+inline void find_nearest_one_by_one(const uint64_t* a, size_t a_count, const uint64_t* b,
+                                    size_t b_count, uint16_t* nearest_of_a,
+                                    uint16_t* nearest_of_b) {
   // Packs the distance in the high and the index in the low bits: the minimum is the nearest
   // descriptor, and the first of equal ones.
   constexpr uint32_t none = ~0U;
@@ -28,6 +29,65 @@ void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_coun
   }
   for (size_t i = 0; i < a_count && b_count > 0; ++i) {
     nearest_of_a[i] = static_cast<uint16_t>(best_of_a[i]);
+  }
+}
+
+/// Compares each descriptor of `b` with one descriptor of `a` in each group of a register.
+template <class Vector>
+void find_nearest_by_vectors(const uint64_t* a, size_t a_count, const uint64_t* b, size_t b_count,
+                             uint16_t* nearest_of_a, uint16_t* nearest_of_b) {
+  using Register = typename Vector::Register;
+  constexpr size_t lanes = sizeof(Register) / sizeof(uint64_t);
+  static_assert(max_descriptors % lanes == 0);
+  constexpr uint8_t bit_counts[16] = {0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4};
+  // Packs distance and index. Descriptors that fill up the last register have an index above all.
+  constexpr uint64_t none = 0xFFFFFFFFU;
+  uint64_t words[4][max_descriptors];
+  uint64_t indices[max_descriptors];
+  uint64_t best_of_a[max_descriptors];
+  const size_t padded = (a_count + lanes - 1) / lanes * lanes;
+  for (size_t i = 0; i < padded; ++i) {
+    for (size_t w = 0; w < 4; ++w) words[w][i] = i < a_count ? a[4 * i + w] : 0;
+    indices[i] = i < a_count ? i : none;
+    best_of_a[i] = none;
+  }
+  for (size_t j = 0; j < b_count; ++j) {
+    const Register index = Vector::broadcast(j);
+    Register best = Vector::broadcast(none);
+    for (size_t i = 0; i < padded; i += lanes) {
+      Register counts = {};
+      for (size_t w = 0; w < 4; ++w) {
+        const Register differing = Vector::load(words[w] + i) ^ Vector::broadcast(b[4 * j + w]);
+        counts = counts + Vector::lookup(bit_counts, differing) +
+                 Vector::lookup_upper(bit_counts, differing);
+      }
+      const Register distance = Vector::sad(counts, Register{}) << 16;
+      best = Vector::smaller(best, distance | Vector::load(indices + i));
+      const Register of_a = Vector::smaller(Vector::load(best_of_a + i), distance | index);
+      __builtin_memcpy(best_of_a + i, &of_a, sizeof of_a);
+    }
+    uint64_t of_lanes[lanes];
+    __builtin_memcpy(of_lanes, &best, sizeof best);
+    uint64_t smallest = none;
+    for (const uint64_t one : of_lanes) smallest = one < smallest ? one : smallest;
+    if (a_count > 0) nearest_of_b[j] = static_cast<uint16_t>(smallest);
+  }
+  for (size_t i = 0; i < a_count && b_count > 0; ++i) {
+    nearest_of_a[i] = static_cast<uint16_t>(best_of_a[i]);
+  }
+}
+
+}  // namespace
+
+template <Instructions set>
+void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_count,
+                                                const uint64_t* b, size_t b_count,
+                                                uint16_t* nearest_of_a, uint16_t* nearest_of_b) {
+  using Vector = ByteVector<set>;
+  if constexpr (requires(typename Vector::Register x) { Vector::smaller(x, x); }) {
+    find_nearest_by_vectors<Vector>(a, a_count, b, b_count, nearest_of_a, nearest_of_b);
+  } else {
+    find_nearest_one_by_one(a, a_count, b, b_count, nearest_of_a, nearest_of_b);
   }
 }
 

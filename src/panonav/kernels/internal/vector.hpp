@@ -45,6 +45,7 @@ constexpr int lanes_of = set == Instructions::avx512 ? 16
 //   add_sad(sums, a, b)    the same added to sums of which only the total counts
 //   total(sums)            of all numbers; below 2^32
 //   product(a, b)          of each group; factors below 2^32
+//   smaller(a, b)          of each number of 32 bits the smaller one, unsigned; not of all sets
 //   narrow(sums, eight)    the eight numbers of 64 / sizeof(Register) registers, each below 2^32
 //   add_products(sums, bytes, weights)   adds to each number of 32 bits its four bytes times their
 //                          weights, which add up to at most 127
@@ -116,6 +117,7 @@ struct ByteVector<Instructions::avx2> {
     return static_cast<uint64_t>(two[0] + two[1]);
   }
   static Register product(Register a, Register b) { return _mm256_mul_epu32(a, b); }
+  static Register smaller(Register a, Register b) { return _mm256_min_epu32(a, b); }
   static void narrow(const Register* sums, EightInts& eight) {
     const Register even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
     const Register low = _mm256_permutevar8x32_epi32(sums[0], even);
@@ -186,6 +188,7 @@ struct ByteVector<Instructions::avx512> {
                                                  _mm512_maskz_extracti64x4_epi64(0xF, sums, 1));
   }
   static Register product(Register a, Register b) { return _mm512_maskz_mul_epu32(0xFF, a, b); }
+  static Register smaller(Register a, Register b) { return _mm512_maskz_min_epu32(0xFFFF, a, b); }
   static void narrow(const Register* sums, EightInts& eight) {
     eight = reinterpret_cast<EightInts>(_mm512_maskz_cvtepi64_epi32(0xFF, sums[0]));
   }

@@ -24,22 +24,6 @@ constexpr std::array<double, 7> compared_blurs_rad{radians(0.7), radians(1.0), r
                                                    radians(2.0), radians(2.8), radians(4.0),
                                                    radians(5.6)};
 
-PackedSignature to_packed(const HomingView& view, float full_scale) {
-  std::vector<float> magnitudes;
-  std::vector<float> phases;
-  for (int k = 0; k < view.components(); ++k) {
-    for (int y = 0; y < view.rows(); ++y) {
-      // a_k = A_k cos psi_k, b_k = -A_k sin psi_k [S06 eq. 12, 13].
-      magnitudes.push_back(std::hypot(view.a(y, k), view.b(y, k)));
-      const float phase = magnitudes.back() > 0.0F ? std::atan2(-view.b(y, k), view.a(y, k)) : 0.0F;
-      phases.push_back(phase >= std::numbers::pi_v<float> ? -std::numbers::pi_v<float> : phase);
-    }
-  }
-  return pack(FourierSignature({view.rows(), view.components()}, std::move(magnitudes),
-                               std::move(phases), view.elevations()),
-              full_scale);
-}
-
 /// Returns the view with adjacent rows averaged, as long as at least `min_rows` remain: enough for
 /// a tilt, in a fraction of the time.
 HomingView average_rows(const HomingView& view) {
@@ -91,12 +75,14 @@ void try_tilts(const RestoredQuery& query, const VisualMemory& memory,
                std::span<const RankedMatch> ranked, Attempt& best) {
   const HomingView current =
       homing_view(unpack(query.signature, memory.full_scale(), memory.elevations()));
-  const HomingView coarse = average_rows(current);
+  const TiltEstimator estimator(average_rows(current));
+  const Panorama tilted = synthesise(current);
   const ColumnProfiles profiles(query.signature);
   for (const RankedMatch& match : ranked) {
     const HomingView home = average_rows(homing_view(memory, match.match.view));
-    const Tilt tilt = relative_tilt(home, coarse, -match.columns.heading_rad);
-    PackedSignature level = to_packed(level_view(current, tilt), memory.full_scale());
+    const Tilt tilt = estimator.tilt_from(home, -match.columns.heading_rad);
+    PackedSignature level = pack(
+        compute_signature(level_panorama(tilted, tilt), current.components()), memory.full_scale());
     const ColumnProfiles levelled(level);
     const ColumnProfiles reference(memory.packed(match.match.view));
     const ColumnMatch found = match_columns(levelled, reference);

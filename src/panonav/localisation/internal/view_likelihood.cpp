@@ -88,40 +88,52 @@ void ViewLikelihood::index_sites() {
     by_cell.emplace_back(cell_of(sites_[s].position), s);
   std::ranges::sort(by_cell);
   // Column by column of cells, so that only the sites near one column are listed at once.
-  std::vector<NearSite> entries;
+  std::vector<std::pair<std::int32_t, std::uint32_t>> near_column;  // cell along y, site
   std::int32_t next_x = std::numeric_limits<std::int32_t>::min();
   for (const auto& [site_cell, unused] : by_cell) {
     for (std::int32_t x = std::max(next_x, site_cell.x - around); x <= site_cell.x + around; ++x) {
-      entries.clear();
+      near_column.clear();
       auto near = std::ranges::lower_bound(by_cell, x - around, {},
                                            [](const auto& entry) { return entry.first.x; });
-      for (; near != by_cell.end() && near->first.x <= x + around; ++near) {
-        const Point2 position = sites_[near->second].position;
-        for (std::int32_t y = near->first.y - around; y <= near->first.y + around; ++y) {
-          const double distance_m = distance(centre_of({x, y}), position);
-          if (distance_m > reach_m + 0.5 * cell_m_) continue;
-          entries.push_back({y, static_cast<float>(distance_m), near->second});
-        }
-      }
-      add_cells(x, entries);
+      for (; near != by_cell.end() && near->first.x <= x + around; ++near)
+        near_column.emplace_back(near->first.y, near->second);
+      std::ranges::sort(near_column);
+      add_cells(x, near_column, around, reach_m + 0.5 * cell_m_);
     }
     next_x = std::max(next_x, site_cell.x + around + 1);
   }
   group_of_cell_.assign(cells_.size() + 1, 0);
 }
 
-void ViewLikelihood::add_cells(std::int32_t x, std::vector<NearSite>& entries) {
-  std::ranges::sort(entries);
-  for (std::size_t i = 0; i < entries.size();) {
-    const GridCell grid_cell{x, entries[i].y};
-    Cell cell{grid_cell, static_cast<std::uint32_t>(near_sites_.size()), 0, 0, 0};
-    std::size_t count = 0;
-    for (; i < entries.size() && entries[i].y == grid_cell.y; ++i) {
-      if (count++ < max_near_sites) near_sites_.push_back(entries[i].site);
+void ViewLikelihood::add_cells(std::int32_t x,
+                               std::span<const std::pair<std::int32_t, std::uint32_t>> near_column,
+                               std::int32_t around, double reach_m) {
+  std::vector<std::pair<float, std::uint32_t>> near;  // distance, site
+  std::int32_t next_y = std::numeric_limits<std::int32_t>::min();
+  auto first = near_column.begin();  // of those near the cell
+  for (const auto& [site_y, unused] : near_column) {
+    for (std::int32_t y = std::max(next_y, site_y - around); y <= site_y + around; ++y) {
+      const Point2 centre = centre_of({x, y});
+      while (first->first < y - around) ++first;
+      near.clear();
+      for (auto at = first; at != near_column.end() && at->first <= y + around; ++at) {
+        const Point2 position = sites_[at->second].position;
+        const double across_m = position.x_m - centre.x_m;
+        const double along_m = position.y_m - centre.y_m;
+        const double distance_m = std::sqrt(across_m * across_m + along_m * along_m);
+        if (distance_m <= reach_m) near.emplace_back(static_cast<float>(distance_m), at->second);
+      }
+      if (near.empty()) continue;
+      const auto end =
+          near.begin() + static_cast<std::ptrdiff_t>(std::min(max_near_sites, near.size()));
+      std::ranges::partial_sort(near, end);
+      Cell cell{{x, y}, static_cast<std::uint32_t>(near_sites_.size()), 0, 0, 0};
+      for (auto at = near.begin(); at != end; ++at) near_sites_.push_back(at->second);
+      cell.end = static_cast<std::uint32_t>(near_sites_.size());
+      table_.find_or_add(cell.grid_cell);
+      cells_.push_back(cell);
     }
-    cell.end = static_cast<std::uint32_t>(near_sites_.size());
-    table_.find_or_add(grid_cell);
-    cells_.push_back(cell);
+    next_y = std::max(next_y, site_y + around + 1);
   }
 }
 

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "panonav/kernels/similarity.hpp"
@@ -96,16 +96,12 @@ class ViewLikelihood {
     std::uint32_t count;
     double weight;
   };
-  /// A site near a cell of a column of cells; the order is that of `Cell` and its sites.
-  struct NearSite {
-    std::int32_t y;    ///< of the cell
-    float distance_m;  ///< of the site from the centre of the cell
-    std::uint32_t site;
-    friend auto operator<=>(const NearSite&, const NearSite&) = default;
-  };
   void index_sites();
-  /// Adds the cells of column `x`.
-  void add_cells(std::int32_t x, std::vector<NearSite>& entries);
+  /// Adds the cells of column `x` with sites within `reach_m` of their centres. `near_column`:
+  /// cells along y and sites of the columns within `around`, ascending.
+  void add_cells(std::int32_t x,
+                 std::span<const std::pair<std::int32_t, std::uint32_t>> near_column,
+                 std::int32_t around, double reach_m);
   /// Keeps the cached profiles of views that still have a site: signatures never change.
   void keep_profiles(std::span<const Site> former_sites);
   void load_profiles(std::span<const std::uint32_t> sites);
