@@ -215,8 +215,8 @@ def print_table(data, rows, sizes):
 START_BOUND = 5.4
 BOUNDS = {
     "localise, first answer": 20,
-    "localise, first answer, unknown": 59,
-    "track, first answer": 1058,
+    "localise, first answer, unknown": 41,
+    "track, first answer": 828,
     "route follow, first answer": 151,
     "route follow, first answer, unknown": 168,
 }

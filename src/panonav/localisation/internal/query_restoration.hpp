@@ -21,7 +21,7 @@ struct RestoredQuery {
 /// the robot, or the blur of an image out of focus. Returns each with which one of the best matches
 /// becomes more similar than the best one is, in most of its columns; the one with the smaller
 /// difference first. None if elevations are unknown. `query`: may already be restored by one of
-/// them. `memory`: of `ranked`. Cost: 0.5 ms for each of five matches.
+/// them. `memory`: of `ranked`. Cost: 0.3 ms for each of five matches.
 [[nodiscard]] std::vector<RestoredQuery> restore_query(const RestoredQuery& query,
                                                        const VisualMemory& memory,
                                                        std::span<const RankedMatch> ranked);
