@@ -44,7 +44,7 @@ ReproductionPlan plan_navigation(const Experiments& context) {
   std::vector<std::string> scenes = simulation::find_worlds(options.data);
   scenes.insert(scenes.begin(), {"loop", "corridor"});
   for (const std::string& scene : scenes) {
-    plan.push_back({6.0, [=] { navigation.reproduce_drive_missions(scene); }});
+    plan.push_back({9.0, [=] { navigation.reproduce_drive_missions(scene); }});
   }
   plan.push_back({4.0, [=] { navigation.reproduce_tours(); }});
   plan.push_back({3.0, [=] { navigation.reproduce_route_missions(); }});

@@ -47,6 +47,8 @@ struct MissionResults {
   std::vector<double> relative_lengths;  // path length over the shortest, of missions that arrived
   std::vector<double> steps;
   double bytes_read = 0.0;  // sum over all steps
+  double travelled_m = 0.0;
+  double contacts = 0.0;  // commands that an obstacle ended
 
   void add(const std::vector<simulation::MissionRun>& missions, double radius_m) {
     for (const simulation::MissionRun& run : missions) {
@@ -56,6 +58,8 @@ struct MissionResults {
       falsely_arrived +=
           static_cast<std::size_t>(!has_arrived && run.end == NavigationDecision::State::arrived);
       ++ends[run.end];
+      travelled_m += run.travelled_m;
+      contacts += static_cast<double>(run.contacts);
       steps.push_back(static_cast<double>(run.decisions.size()));
       for (const NavigationDecision& step : run.decisions) {
         bytes_read += static_cast<double>(step.bytes_read);
@@ -88,6 +92,42 @@ void report(const std::string& id, const std::string& what, const MissionResults
              what + ": end as " + std::string(to_string(end)), count, measured.runs);
   }
   add_median(result, id + ".steps", what + ": steps", "", measured.steps);
+}
+
+// Missions of a robot with one sensor for obstacles.
+struct SensorMissions {
+  simulation::ObstacleSensor sensor;
+  std::string id;
+  std::string what;
+  double min_fraction;  // of the arrivals with the true free space
+  MissionResults measures;
+};
+
+std::vector<SensorMissions> make_sensor_missions() {
+  using enum simulation::ObstacleSensor;
+  return {{truth, "truth", "the true free space, which no robot knows", 1.0, {}},
+          {bumper, "bumper", "a bumper alone", 0.9, {}},
+          {ranges, "ranges", "a bumper and eight noisy ranges", 0.95, {}}};
+}
+
+void report_sensors(const std::string& id, const std::string& what,
+                    const std::vector<SensorMissions>& sensors, Reproduction& result) {
+  const auto arrived = [](const SensorMissions& kind) {
+    return static_cast<double>(kind.measures.arrived);
+  };
+  for (const SensorMissions& kind : sensors) {
+    const std::string named = what + ", the same missions with " + kind.what;
+    add_rate(result, id + "." + kind.id + ".arrived", named + ": arrive", kind.measures.arrived,
+             kind.measures.runs);
+    if (kind.measures.travelled_m > 0.0) {
+      add_row(result, id + "." + kind.id + ".contacts", named + ": contacts in 100 m",
+              100.0 * kind.measures.contacts / kind.measures.travelled_m, "");
+    }
+    if (&kind == &sensors.front() || arrived(sensors.front()) == 0.0) continue;
+    add_row(result, id + "." + kind.id + ".of_truth",
+            named + ": arrivals against those with the true free space",
+            arrived(kind) / arrived(sensors.front()), "", at_least(kind.min_fraction));
+  }
 }
 
 int count_runs(const ReproductionOptions& options, int scene) {
@@ -192,10 +232,10 @@ void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
 }
 
 void NavigationExperiments::reproduce_drive_missions(const std::string& scene) const {
-  MissionResults unchanged;
   MissionResults changed;
   MissionResults kidnapped;
   MissionResults monte_carlo_kidnapped;
+  std::vector<SensorMissions> sensors = make_sensor_missions();
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::SceneVariation variation{.seed = seed};
@@ -222,11 +262,15 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
       const auto runs = simulation::run_missions(where, remembered, missions, mission,
                                                  Random(seed, stream + 1).next(), executor);
       measures.add(runs, radius_m);
-      if (i == 0 && &measures == &unchanged) {
+      if (i == 0 && &measures == &sensors[1].measures) {
         draw_mission(scene, where, remembered, missions.front(), runs.front(), result);
       }
     };
-    run(place, false, 5, unchanged);
+    for (SensorMissions& kind : sensors) {
+      mission.obstacles = kind.sensor;
+      run(place, false, 5, kind.measures);
+    }
+    mission.obstacles = simulation::MissionOptions{}.obstacles;
     run(other, false, 7, changed);
     run(place, true, 9, kidnapped);
     if (scene == "corridor") {
@@ -236,7 +280,8 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
     }
   }
   const std::string what = scene + ", map of a drive of 60 m";
-  report("navigation." + scene, what, unchanged, at_least(0.95), std::nullopt, result);
+  report("navigation." + scene, what, sensors[1].measures, at_least(0.95), std::nullopt, result);
+  report_sensors("navigation." + scene, what, sensors, result);
   const bool has_movable_objects =
       std::ranges::find(simulation::scene_names(), scene) != simulation::scene_names().end();
   report("navigation." + scene + ".changed",

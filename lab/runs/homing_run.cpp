@@ -48,7 +48,7 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
                    const Pose2& start, const HomingRunOptions& options, std::uint64_t seed) {
   HomingPursuit pursuit(home, options.pursuit, options.vector);
   simulation::SimulatedRobot robot(*place.free_space, options.motion, options.obstacles, start,
-                                   seed);
+                                   seed, options.sensor);
   Random noise_of_views(seed, 2);
   HomingRun run;
   run.goal = goal;
@@ -74,11 +74,9 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
       case HomingPursuit::State::exhausted:
         return finish(HomingRunEnd::exhausted);
     }
-    const auto direction_rad = robot.find_free_direction(decision.turn_rad, decision.advance_m);
-    run.met_obstacle = run.met_obstacle || direction_rad != decision.turn_rad;
-    const bool moved = robot.go(direction_rad.value_or(decision.turn_rad), decision.advance_m);
-    if (!direction_rad || (!moved && options.obstacles == simulation::ObstacleRule::stop)) {
-      run.met_obstacle = true;
+    const auto step = robot.drive(decision.turn_rad, decision.advance_m);
+    run.met_obstacle = run.met_obstacle || step.has_met_obstacle;
+    if (step.is_stopped) {
       run.path.push_back(robot.pose());
       return finish(HomingRunEnd::blocked);
     }

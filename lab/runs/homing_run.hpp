@@ -43,6 +43,7 @@ struct HomingRunOptions {
   /// one keeps its heading and drives in any direction.
   OdometryNoise motion;
   simulation::ObstacleRule obstacles = simulation::ObstacleRule::pass;
+  simulation::ObstacleSensor sensor = simulation::ObstacleSensor::bumper;
   HomingPursuitOptions pursuit;
   FourierHomingOptions vector;
 };

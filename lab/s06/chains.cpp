@@ -98,7 +98,8 @@ bool ChainRun::has_arrived_elsewhere(double radius_m) const noexcept {
 }
 
 ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
-                      std::span<const Pose2> route, ChainDirection direction, std::uint64_t seed) {
+                      std::span<const Pose2> route, ChainDirection direction, std::uint64_t seed,
+                      simulation::ObstacleSensor sensor) {
   require(!route.empty(), "poses of the route", 0.0, ">= 1");
   const bool forward = direction == ChainDirection::forward;
   Pose2 start = forward ? route.front() : route.back();
@@ -108,7 +109,7 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
   start.heading_rad = errors.uniform(-std::numbers::pi, std::numbers::pi);
   ChainFollower follower(chain, direction);
   simulation::SimulatedRobot robot(*place.free_space, {}, simulation::ObstacleRule::pass, start,
-                                   seed);
+                                   seed, sensor);
   Random noise_of_views(seed, 2);
   ChainRun run;
   Pose2 moved;
@@ -120,10 +121,8 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
         follower.decide(capture_homing_view(place, robot.pose(), noise_of_views.next()), moved);
     run.state = decision.state;
     if (run.state == ChainState::arrived || run.state == ChainState::lost) break;
-    const auto direction_rad = robot.find_free_direction(decision.turn_rad, decision.advance_m);
-    if (!direction_rad) break;
     const Pose2 before = robot.pose();
-    robot.go(*direction_rad, decision.advance_m);
+    if (robot.drive(decision.turn_rad, decision.advance_m).is_stopped) break;
     moved = odometry.measure(before, robot.pose());
   }
   run.end_distance_m = distance(robot.pose().position(), end.position());

@@ -98,7 +98,10 @@ void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor) {
 
 FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
                      std::optional<Point2> seed)
-    : low_(scene.floor_low), high_(scene.floor_high), cell_m_(options.cell_m) {
+    : low_(scene.floor_low),
+      high_(scene.floor_high),
+      cell_m_(options.cell_m),
+      robot_radius_m_(options.robot_radius_m) {
   validate(options);
   validate(scene);
   require(options.step_height_m < options.robot_height_m, "step_height_m", options.step_height_m,

@@ -60,6 +60,8 @@ class FreeSpace {
   [[nodiscard]] bool is_inside_solid() const noexcept { return is_inside_solid_; }
   /// Returns the largest slope of the scene's ground at a free position; 0 without a ground.
   [[nodiscard]] double max_slope_rad() const noexcept { return max_slope_rad_; }
+  /// Returns the radius of the robot for which the free space is computed.
+  [[nodiscard]] double robot_radius_m() const noexcept { return robot_radius_m_; }
   /// Returns the lower left corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 low() const noexcept { return low_; }
   /// Returns the upper right corner of the map: that of the scene's floor.
@@ -96,6 +98,7 @@ class FreeSpace {
 
   Point2 low_, high_;
   double cell_m_;
+  double robot_radius_m_;
   int columns_ = 0;
   int rows_ = 0;
   bool is_inside_solid_ = false;

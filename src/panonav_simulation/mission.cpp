@@ -18,7 +18,6 @@
 #include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/simulated_odometry.hpp"
-#include "panonav_simulation/simulated_robot.hpp"
 
 namespace panonav::simulation {
 
@@ -189,78 +188,6 @@ RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose
           std::move(routes)};
 }
 
-MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
-                           const OdometryNoise& motion, const Pose2& start, std::uint64_t seed,
-                           int people)
-    : space_(place.free_space.get()),
-      robot_radius_m_(place.scene.robot_radius_m),
-      people_(place.free_space, people, seed),
-      base_(base),
-      motion_(motion),
-      pose_(start),
-      random_(seed, 1) {
-  validate(base_);
-  motion_.drive = base_.drive;
-  validate(motion_);
-}
-
-bool MissionRobot::has_clear_path(Point2 from, Point2 to) const {
-  // A person who already touches the robot must not prevent it from moving away.
-  const bool is_person_in_path = people_.has_person_within(to, robot_radius_m_) &&
-                                 !people_.has_person_within(from, robot_radius_m_);
-  constexpr double fine_m = 0.01;
-  return !is_person_in_path && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
-}
-
-void MissionRobot::wait(double seconds) {
-  people_.advance(seconds, pose_.position(), robot_radius_m_);
-}
-
-Pose2 MissionRobot::take_odometry() noexcept {
-  return std::exchange(odometry_, Pose2{});
-}
-
-void MissionRobot::command(const Velocity& velocity) {
-  wait(base_.period_s);
-  const Pose2 commanded = integrate_velocity(velocity, base_.period_s);
-  const Pose2 step = sample_step(commanded, motion_, random_);
-  const Pose2 there = pose_ * step;
-  if (!has_clear_path(pose_.position(), there.position())) {
-    // In contact, the robot only rotates. A rotation on the spot shows no obstacle ahead.
-    obstacle_ |= commanded.x_m != 0.0 || commanded.y_m != 0.0;
-    pose_.heading_rad = there.heading_rad;
-    odometry_ = odometry_ * Pose2{0.0, 0.0, commanded.heading_rad};
-    return;
-  }
-  odometry_ = odometry_ * commanded;
-  travelled_m_ += std::hypot(step.x_m, step.y_m);
-  pose_ = there;
-}
-
-std::optional<double> MissionRobot::find_free_direction(double direct_rad, double distance_m) {
-  const auto is_open = [&](double direction_rad, double length_m) {
-    const Point2 there =
-        pose_ * Point2{length_m * std::cos(direction_rad), length_m * std::sin(direction_rad)};
-    return has_clear_path(pose_.position(), there);
-  };
-  if (is_open(direct_rad, distance_m)) {
-    detour_side_ = 0;
-    return direct_rad;
-  }
-  // Beyond 90 degrees it would turn back, and the navigator must learn of the blocked path.
-  constexpr int directions_per_side = 6;
-  const auto free_direction = find_open_direction(
-      direct_rad, directions_per_side, detour_side_,
-      [&](double direction_rad) { return is_open(direction_rad, 0.5 * distance_m); });
-  detour_side_ = free_direction ? free_direction->side : -detour_side_;
-  if (!free_direction) return std::nullopt;
-  return wrap_angle(free_direction->direction_rad);
-}
-
-bool MissionRobot::take_contact() noexcept {
-  return std::exchange(obstacle_, false);
-}
-
 namespace {
 
 // Drives to a point until the robot arrives or time runs out; true if contact stopped it.
@@ -279,6 +206,27 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
     target = inverse(integrate_velocity(velocity, base.period_s)) * target;
   }
   return false;
+}
+
+// Drives past obstacles, by the nearest free direction; after a contact before half of the distance
+// it backs off and tries the next one. True if an obstacle stopped the robot for good.
+bool drive_past_obstacles(MissionRobot& robot, const BaseOptions& base, double direct_rad,
+                          double distance_m) {
+  constexpr int max_contacts = 12;  // directions of `find_free_direction`
+  for (int contacts = 0; contacts < max_contacts; ++contacts) {
+    const auto free_rad = robot.find_free_direction(direct_rad, distance_m);
+    if (!free_rad) return true;
+    const double before_m = robot.travelled_m();
+    const double heading_rad = robot.odometry().heading_rad;
+    const double length_m = (*free_rad == direct_rad ? 1.0 : 0.5) * distance_m;
+    if (!drive(robot, base, *free_rad, length_m)) return false;
+    if (robot.obstacle_sensor() == ObstacleSensor::truth) return true;
+    const bool has_advanced = robot.travelled_m() - before_m >= 0.5 * length_m;
+    robot.back_off();
+    if (has_advanced) return false;
+    direct_rad = wrap_angle(direct_rad - (robot.odometry().heading_rad - heading_rad));
+  }
+  return true;
 }
 
 /// Localises by particles; returns the nearest reference, nullopt while it is not localised.
@@ -307,7 +255,7 @@ class MissionRunner {
       : place_(place),
         remembered_(remembered),
         options_(options),
-        robot_(place, options.base, options.motion, start, seed, options.people),
+        robot_(place, options.base, options.motion, start, seed, options.people, options.obstacles),
         noise_of_views_(seed, 2),
         noise_of_lines_(seed, 4) {
     if (options.monte_carlo) estimator_.emplace(remembered.memory, options.motion);
@@ -320,6 +268,7 @@ class MissionRunner {
     MissionRun run;
     run.shortest_m = shortest_path_m(space, robot_.pose().position(), goal);
     const double start_travelled_m = robot_.travelled_m();
+    const std::size_t start_contacts = robot_.contacts();
     const double kidnapping_travelled_m = start_travelled_m + 0.5 * run.shortest_m;
     navigator.set_goal(goal_view);
     for (;;) {
@@ -348,6 +297,7 @@ class MissionRunner {
       }
     }
     run.travelled_m = robot_.travelled_m() - start_travelled_m;
+    run.contacts = robot_.contacts() - start_contacts;
     run.end_distance_m = distance(robot_.pose().position(), goal);
     return run;
   }
@@ -379,13 +329,8 @@ class MissionRunner {
   }
 
   void move(const NavigationDecision& decision) {
-    const auto free_rad = robot_.find_free_direction(decision.direction_rad, decision.advance_m);
-    obstacle_ = !free_rad;
-    if (free_rad) {
-      const bool is_direct = *free_rad == decision.direction_rad;
-      obstacle_ =
-          drive(robot_, options_.base, *free_rad, (is_direct ? 1.0 : 0.5) * decision.advance_m);
-    }
+    obstacle_ =
+        drive_past_obstacles(robot_, options_.base, decision.direction_rad, decision.advance_m);
     // Wait, because a person in the path may move away.
     constexpr double pause_s = 1.0;
     if (obstacle_ || decision.advance_m == 0.0) robot_.wait(pause_s);

@@ -18,6 +18,7 @@
 #include "panonav/navigation/known_route.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/navigation/navigator.hpp"
+#include "panonav_simulation/obstacle_sense.hpp"
 #include "panonav_simulation/people.hpp"
 #include "panonav_simulation/place_recording.hpp"
 
@@ -78,31 +79,40 @@ struct RememberedPlace {
                                              const OdometryNoise& wheels, std::uint64_t seed,
                                              Executor& executor);
 
-/// The simulated robot of a mission: executes commands with the errors of its drive, and stops at
-/// obstacles and people, which it senses nearby. Holds the true pose, and the people around, who
-/// walk while it drives.
+/// The simulated robot of a mission: executes commands with the errors of its drive, stops in
+/// contact with obstacles and people, and senses them by its `ObstacleSensor`. Holds the true pose,
+/// and the people around, who walk while it drives.
 class MissionRobot final : public RobotBase {
  public:
   /// `place` must outlive the robot. Throws OptionError, and ContractError as `People`.
   MissionRobot(const MissionPlace& place, const BaseOptions& base, const OdometryNoise& motion,
-               const Pose2& start, std::uint64_t seed, int people = 0);
+               const Pose2& start, std::uint64_t seed, int people = 0,
+               ObstacleSensor obstacles = ObstacleSensor::bumper);
 
   void command(const Velocity& velocity) override;
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
+  /// Number of commands that ended in contact.
+  [[nodiscard]] std::size_t contacts() const noexcept { return contacts_; }
   /// Finds the direction nearest to `direct_rad`, in steps of 15 degrees up to 90 degrees, in which
-  /// half of the distance is free. While the direct one is blocked, it prefers the side chosen
-  /// before. nullopt if no direction is free.
+  /// half of the distance is free as far as the sensor knows. While the direct one is blocked, it
+  /// prefers the side chosen before. If none is free, directions that only ranges block count as
+  /// free; nullopt if there is none.
   [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double distance_m);
   /// Returns true if the robot was stopped by contact since the last call.
   [[nodiscard]] bool take_contact() noexcept;
+  /// Drives back a little, against the command that led to the last contact.
+  void back_off();
+  [[nodiscard]] ObstacleSensor obstacle_sensor() const noexcept { return sensor_; }
   /// Lets people walk for some seconds while the robot stands.
   void wait(double seconds);
   /// Moves the robot to a pose without its odometry noticing (kidnapping).
   void teleport_to(const Pose2& pose) noexcept { pose_ = pose; }
   /// Returns the motion by odometry since the last call, robot_old_from_robot_new, and resets it.
   [[nodiscard]] Pose2 take_odometry() noexcept;
+  /// Returns the motion by odometry since `take_odometry`, robot_old_from_robot_new.
+  [[nodiscard]] const Pose2& odometry() const noexcept { return odometry_; }
   [[nodiscard]] const People& people() const noexcept { return people_; }
 
  private:
@@ -115,7 +125,12 @@ class MissionRobot final : public RobotBase {
   OdometryNoise motion_;
   Pose2 pose_;
   Random random_;
-  int detour_side_ = 0;  // side of the last detour: 1 left, -1 right, 0 none
+  ObstacleSensor sensor_;
+  Random noise_of_ranges_;
+  ObstacleMemory known_;
+  std::size_t contacts_ = 0;
+  Velocity contact_velocity_;  // the command of the last contact
+  int detour_side_ = 0;        // side of the last detour: 1 left, -1 right, 0 none
   bool obstacle_ = false;
   double travelled_m_ = 0.0;
   Pose2 odometry_;
@@ -127,6 +142,7 @@ struct MissionOptions {
   BaseOptions base;
   OdometryNoise motion;  ///< its drive is replaced by that of `base`
   int people = 0;        ///< number of people who walk about
+  ObstacleSensor obstacles = ObstacleSensor::bumper;
   /// Runs Monte-Carlo localisation over the references with known poses, in parallel to the
   /// navigator. When it is localised and the navigator is in doubt, the navigator uses its
   /// estimate.
@@ -161,6 +177,7 @@ struct MissionRun {
   std::optional<std::size_t> kidnapped_at;  ///< index of the step after which it was kidnapped
   double end_distance_m = 0.0;              ///< from the true pose of the goal's view; NaN: unknown
   double travelled_m = 0.0;
+  std::size_t contacts = 0;  ///< number of commands that an obstacle or a person ended
   /// Length of the shortest free path; the sum of its parts after a kidnapping or a change of the
   /// goal; NaN: unknown.
   double shortest_m = 0.0;

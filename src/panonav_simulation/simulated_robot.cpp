@@ -6,6 +6,8 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/motion/velocity.hpp"
 
 namespace panonav::simulation {
 
@@ -78,8 +80,15 @@ std::optional<OpenDirection> find_open_direction(double direct_rad, int directio
 }
 
 SimulatedRobot::SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion,
-                               ObstacleRule obstacles, const Pose2& start, std::uint64_t seed)
-    : space_(&space), motion_(motion), obstacles_(obstacles), pose_(start), random_(seed, 1) {
+                               ObstacleRule obstacles, const Pose2& start, std::uint64_t seed,
+                               ObstacleSensor sensor)
+    : space_(&space),
+      motion_(motion),
+      obstacles_(obstacles),
+      pose_(start),
+      random_(seed, 1),
+      sensor_(sensor),
+      noise_of_ranges_(seed, 5) {
   validate(motion);
   if (!space.is_free(start.position())) {
     throw ContractError("start of the robot", "an obstacle", "a free place");
@@ -87,6 +96,9 @@ SimulatedRobot::SimulatedRobot(const FreeSpace& space, const OdometryNoise& moti
 }
 
 bool SimulatedRobot::is_open(double direction_rad, double distance_m) const {
+  if (sensor_ != ObstacleSensor::truth) {
+    return known_.is_open(direction_rad, distance_m, space_->robot_radius_m());
+  }
   return space_->is_free_between(pose_.position(), point_ahead(pose_, direction_rad, distance_m));
 }
 
@@ -95,7 +107,6 @@ std::optional<double> SimulatedRobot::find_free_direction(double direct_rad, dou
     detour_side_ = 0;
     return direct_rad;
   }
-  if (obstacles_ == ObstacleRule::stop) return std::nullopt;
   const auto find_on_preferred_side = [&] {
     return find_open_direction(
         direct_rad, directions_per_side, detour_side_,
@@ -111,28 +122,81 @@ std::optional<double> SimulatedRobot::find_free_direction(double direct_rad, dou
   return free_direction->direction_rad;
 }
 
-bool SimulatedRobot::go(double direction_rad, double advance_m) {
+SimulatedRobot::Step SimulatedRobot::drive(double direct_rad, double advance_m) {
+  if (obstacles_ == ObstacleRule::stop) {
+    const bool is_stopped = !drive_until_contact(direct_rad, advance_m);
+    return {is_stopped, is_stopped};
+  }
+  known_.advance(advance_m / BaseOptions{}.speed_m_s);
+  if (sensor_ == ObstacleSensor::ranges) {
+    known_.add_ranges(measure_ranges(*space_, nullptr, pose_, noise_of_ranges_));
+  }
+  Step step;
+  bool has_forgotten = false;
+  constexpr int max_contacts = 2 * directions_per_side + 1;  // directions that it tries
+  for (int contacts = 0; contacts < max_contacts; ++contacts) {
+    const auto free_rad = find_free_direction(direct_rad, advance_m);
+    step.has_met_obstacle |= free_rad != direct_rad;
+    if (!free_rad) {
+      // Contacts are known to 22.5 degrees only, so it feels again before it gives up.
+      if (has_forgotten || sensor_ == ObstacleSensor::truth) break;
+      has_forgotten = true;
+      known_ = {};
+      continue;
+    }
+    const Pose2 before = pose_;
+    if (drive_until_contact(*free_rad, advance_m)) return step;
+    step.has_met_obstacle = true;
+    if (sensor_ == ObstacleSensor::truth) return step;
+    const bool has_advanced = distance(before.position(), pose_.position()) >= 0.5 * advance_m;
+    const bool has_turned = motion_.drive == DriveKind::differential;
+    back_off_from_contact(has_turned ? 0.0 : *free_rad);
+    if (has_advanced) return step;
+    if (has_turned) direct_rad = wrap_angle(direct_rad - *free_rad);
+  }
+  step.is_stopped = true;
+  return step;
+}
+
+bool SimulatedRobot::drive_until_contact(double direction_rad, double advance_m) {
   const Pose2 before = pose_;
+  const bool is_differential = motion_.drive == DriveKind::differential;
+  const Pose2 rotation{0.0, 0.0, is_differential ? wrap_angle(direction_rad) : 0.0};
+  const double course_rad = is_differential ? 0.0 : direction_rad;
+  const Pose2 translation{advance_m * std::cos(course_rad), advance_m * std::sin(course_rad), 0.0};
   Pose2 after;
-  if (motion_.drive == DriveKind::differential) {
-    const Pose2 turned = sample_step({0.0, 0.0, wrap_angle(direction_rad)}, motion_, random_);
+  if (is_differential) {
+    const Pose2 turned = sample_step(rotation, motion_, random_);
     after = Pose2{before.x_m, before.y_m, wrap_angle(before.heading_rad + turned.heading_rad)} *
-            sample_step({advance_m, 0.0, 0.0}, motion_, random_);
+            sample_step(translation, motion_, random_);
   } else {
-    after = before * sample_step({advance_m * std::cos(direction_rad),
-                                  advance_m * std::sin(direction_rad), 0.0},
-                                 motion_, random_);
+    after = before * sample_step(translation, motion_, random_);
   }
   const double step_length_m = distance(before.position(), after.position());
   const double free_m = free_length_m(*space_, before.position(), after.position());
-  if (free_m >= step_length_m) {
+  const double fraction = free_m >= step_length_m ? 1.0 : free_m / step_length_m;
+  // The memory moves by odometry, which measures the part that was driven.
+  known_.move(rotation * Pose2{fraction * translation.x_m, fraction * translation.y_m, 0.0});
+  if (fraction >= 1.0) {
     pose_ = after;
     return true;
   }
-  const double share = free_m / step_length_m;
-  pose_ = {before.x_m + share * (after.x_m - before.x_m),
-           before.y_m + share * (after.y_m - before.y_m), after.heading_rad};
+  pose_ = {before.x_m + fraction * (after.x_m - before.x_m),
+           before.y_m + fraction * (after.y_m - before.y_m), after.heading_rad};
   return false;
+}
+
+void SimulatedRobot::back_off_from_contact(double direction_rad) {
+  const double radius_m = space_->robot_radius_m();
+  const double contact_rad = sense_border_rad(*space_, pose_, direction_rad);
+  known_.add({radius_m * std::cos(contact_rad), radius_m * std::sin(contact_rad)});
+  // A tenth of the radius leaves room for driving along a wall.
+  const double back_m = 0.1 * radius_m;
+  const Pose2 back{-back_m * std::cos(direction_rad), -back_m * std::sin(direction_rad), 0.0};
+  const Pose2 there = pose_ * back;
+  if (!space_->is_free_between(pose_.position(), there.position())) return;
+  pose_ = there;
+  known_.move(back);
 }
 
 }  // namespace panonav::simulation

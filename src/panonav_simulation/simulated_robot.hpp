@@ -9,6 +9,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/obstacle_sense.hpp"
 
 namespace panonav::simulation {
 
@@ -36,37 +37,48 @@ struct OpenDirection {
 enum class ObstacleRule {
   stop,  ///< it stops there, which ends the run
   /// Drives around obstacles: tries directions left and right of the requested one, in steps of 15
-  /// degrees up to 165 degrees, and takes the nearest in which half a step is free. While the
-  /// requested direction stays blocked it keeps the chosen side; if that side is blocked too, it
-  /// tries the other one. If no direction is free, it stops.
+  /// degrees up to 165 degrees, and takes the nearest in which half a step is free as far as its
+  /// sensor knows. While the requested direction stays blocked it keeps the chosen side; if that
+  /// side is blocked too, it tries the other one. After contact it backs off and tries again. If no
+  /// direction is free, it stops.
   pass,
 };
 
 /// A robot in a simulated place that executes motion commands with errors. Holds the true pose and
-/// the random stream of its errors.
+/// the random streams of its errors.
 class SimulatedRobot {
  public:
+  /// Outcome of a step.
+  struct Step {
+    bool has_met_obstacle = false;  ///< it touched or avoided an obstacle
+    bool is_stopped = false;        ///< it does not drive on
+  };
+
   /// `space` must outlive the robot. Throws OptionError, and ContractError if `start` is not free.
   SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion, ObstacleRule obstacles,
-                 const Pose2& start, std::uint64_t seed);
+                 const Pose2& start, std::uint64_t seed,
+                 ObstacleSensor sensor = ObstacleSensor::bumper);
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
 
-  /// Finds the direction, in the robot frame, in which a step of `advance_m` towards `direct_rad`
-  /// avoids obstacles; nullopt if the robot is stopped. Remembers the side of the detour.
-  [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double advance_m);
-
-  /// Drives until an obstacle is reached. Returns true if the whole step was free.
-  bool go(double direction_rad, double advance_m);
+  /// Drives a step of `advance_m` towards `direct_rad`, in the robot frame, by its rule at
+  /// obstacles. Remembers where it felt or measured obstacles, and the side of the detour.
+  Step drive(double direct_rad, double advance_m);
 
  private:
   [[nodiscard]] bool is_open(double direction_rad, double distance_m) const;
+  [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double advance_m);
+  [[nodiscard]] bool drive_until_contact(double direction_rad, double advance_m);
+  void back_off_from_contact(double direction_rad);
 
   const FreeSpace* space_;
   OdometryNoise motion_;
   ObstacleRule obstacles_;
   Pose2 pose_;
   Random random_;
+  ObstacleSensor sensor_;
+  Random noise_of_ranges_;
+  ObstacleMemory known_;
   int detour_side_ = 0;  // side of the last detour: 1 left, -1 right, 0 none
 };
 

@@ -29,6 +29,7 @@ struct NavigateArguments {
   std::optional<std::string> kidnap;
   std::optional<std::string> edges;
   std::optional<std::string> route;
+  std::optional<std::string> obstacles;
   std::optional<std::string> log;
   std::optional<std::string> picture;
   std::optional<std::string> report;
@@ -341,8 +342,11 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
   const auto seed = static_cast<std::uint64_t>(arguments.simulation.simulation.scene.seed);
   const simulation::Mission mission = make_mission(arguments, robot.goal(), place, seed);
   if (!session.json()) print_graph(robot, session);
+  simulation::MissionOptions mission_options = arguments.mission;
+  if (arguments.obstacles == "ranges")
+    mission_options.obstacles = simulation::ObstacleSensor::ranges;
   simulation::MissionRun run = simulation::run_mission(
-      place, remembered, robot.navigator(), mission, arguments.mission, seed,
+      place, remembered, robot.navigator(), mission, mission_options, seed,
       [&](const NavigationDecision& decision, const Pose2& pose) {
         if (record.is_active()) {
           record.add(moments.make(decision, pose, place.scene));
@@ -382,6 +386,10 @@ Run declare_navigate(Arguments& arguments) {
   arguments.option("--route NAME", values->route,
                    "Follow this recorded route where the planned path lies on it; the poses of the "
                    "views and of the route must be from the same data set");
+  arguments.choice(
+      "--obstacles", values->obstacles, {"bumper", "ranges"},
+      "Sensor of the robot for obstacles: a bumper that feels contact and its side, or eight noisy "
+      "ranges in addition (default: bumper)");
   arguments.option("--log FILE", values->log,
                    "Write the decisions of the robot into this file, one per line");
   arguments.option("--picture FILE", values->picture,
@@ -390,7 +398,7 @@ Run declare_navigate(Arguments& arguments) {
   declare_report(arguments, values->report, "a page that replays the drive");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
-  arguments.hide_from_help({"--record", "--view", "--picture"});
+  arguments.hide_from_help({"--obstacles", "--record", "--view", "--picture"});
   arguments.options("simulation", values->simulation.simulation.scene);
   arguments.options("navigator", values->mission.navigator);
   arguments.options("planner", values->mission.planner);
