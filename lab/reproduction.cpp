@@ -24,8 +24,9 @@ ReproductionPlan plan_f11(const Experiments& context) {
                   {"max_views", options.max_views, 100}});
   require(options.columns >= 132, "columns", options.columns, ">= 132, twice the components");
   MappingExperiments f11{context};
-  ReproductionPlan plan{{6.0 * options.scenes, [=] { f11.reproduce_first_set(); }},
-                        {10.0 * options.scenes, [=] { f11.reproduce_second_set(); }},
+  ReproductionPlan plan{{12.0 * options.scenes, [=] { f11.reproduce_first_set(); }},
+                        {14.0 * options.scenes, [=] { f11.reproduce_second_set(); }},
+                        {4.0 * options.scenes, [=] { f11.measure_wide_room(); }},
                         {1.0, [=] { f11.measure_step_time(); }},
                         {15.0, [=] { f11.reproduce_identical_doors(); }}};
   for (const std::string& name : simulation::find_worlds(options.data)) {
@@ -80,7 +81,7 @@ ReproductionPlan plan_elsewhere(const Experiments& context) {
                   {"walks", options.walks, 2},
                   {"walk_pictures", options.walk_pictures, 32}});
   require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
-  const auto elsewhere = std::make_shared<ElsewhereExperiments>(context);
+  const auto elsewhere = std::make_shared<ElsewhereExperiments>(ElsewhereExperiments{context});
   ReproductionPlan plan;
   for (const std::string& name : elsewhere->list_ground_names()) {
     plan.push_back({10.0, [=] { elsewhere->record_ground(name); }});
@@ -130,7 +131,7 @@ ReproductionPlan plan_m03(const Experiments& context) {
     throw ContractError("only", options.only,
                         "office, corridor, garden, leaving, worlds, recordings");
   }
-  const auto m03 = std::make_shared<TrackingExperiments>(context);
+  const auto m03 = std::make_shared<TrackingExperiments>(TrackingExperiments{context});
   ReproductionPlan plan;
   const auto add = [&](std::string_view part, double cost, std::function<void()> run) {
     if (options.only.empty() || options.only == part) plan.push_back({cost, std::move(run)});
@@ -168,8 +169,8 @@ struct Paper {
 const Paper& find_paper(std::string_view name) {
   static const std::array<Paper, 7> papers{{
       {"f11",
-       {.scenes = 20, .runs = 20},
-       {.optics = Optics::panorama, .scenes = 2, .runs = 1, .columns = 256, .max_views = 1000},
+       {.seed = 901, .scenes = 20, .runs = 20},
+       {.seed = 901, .scenes = 2, .runs = 1, .columns = 256, .max_views = 1000},
        plan_f11},
       {"m03",
        {.seed = 601, .scenes = 10, .runs = 4},

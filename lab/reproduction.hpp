@@ -32,7 +32,8 @@ struct ReproductionOptions {
   /// Folder of the recordings and Gazebo worlds (docs/formats.md); if empty, their experiments are
   /// skipped.
   std::filesystem::path data = {};
-  /// Not used by [Y03], whose lines are always those of a mirror, and by the experiments elsewhere.
+  /// Not used by [F11], which measures both, by [Y03], whose lines are always those of a mirror,
+  /// and by the experiments elsewhere.
   Optics optics = Optics::mirror;
   std::uint64_t seed = 1;  ///< of the first scene; each next scene adds 1
   int scenes = 20;         ///< variants of a scene; fewer for some experiments

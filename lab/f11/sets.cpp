@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "lab/experiments.hpp"
+#include "lab/f11/published_rule.hpp"
 #include "lab/rows.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -27,6 +29,8 @@ namespace panonav::lab {
 namespace {
 
 constexpr double loop_spacing_m = 0.1;
+constexpr PublishedFigure first_figure{.shape_difference = 0.04, .k1 = 26, .k2 = 20};
+constexpr PublishedFigure second_figure{.shape_difference = 0.015, .k1 = 4, .k2 = 8};
 // Spacing of the pictures from which the second set captures views, and the image difference that
 // captures one: a view about every 9 cm in rooms of this size, so that 150 views cover about one
 // round.
@@ -108,6 +112,7 @@ struct SetResults {
   std::string id;
   std::string what;
   std::vector<double> open, closed, closed_with_wheels, wheels, known_height_open, known_height;
+  std::vector<double> mirror_open, mirror_closed;
   std::size_t right = 0;
   std::size_t wrong = 0;
   std::size_t unclosed_recordings = 0;  // recordings without a correct closure
@@ -141,16 +146,33 @@ struct SetResults {
     return without;
   }
 
+  /// Drives along a recording again with a mirror camera, maps its images, and adds both recordings
+  /// to `study`.
+  void add_mirror(const simulation::PlaceRecording& place,
+                  const simulation::MappingRecording& recording, PublishedRuleStudy& study,
+                  Executor& executor) {
+    const auto by_mirror =
+        record_by_mirror(place, recording.truth, recording.views.front().components(),
+                         simulation::make_noisy_wheels(), 1000 * place.seed, executor);
+    for (const bool close_loops : {false, true}) {
+      const auto mapped =
+          simulation::map_recording(by_mirror, {.mapping = {.close_loops = close_loops}});
+      auto& errors = close_loops ? mirror_closed : mirror_open;
+      errors.push_back(simulation::shape_error(mapped.estimate, mapped.truth));
+    }
+    study.add(place, recording, by_mirror, executor);
+  }
+
   struct Targets {
     Target open;
-    double published;  ///< shape difference without closure
     Target closed;
     std::optional<Target> closed_with_wheels;
-    std::pair<int, int> components;  ///< k1 and k2 of the published rule
+    PublishedFigure published;  ///< without closure
   };
-  void report(const Targets& targets, const std::string& reason_of_open,
-              Reproduction& result) const {
-    const auto published = std::pair(targets.published, targets.published);
+  void report(const Targets& targets, Reproduction& result) const {
+    const double figure = targets.published.shape_difference;
+    const auto published = std::pair(figure, figure);
+    const std::pair components(targets.published.k1, targets.published.k2);
     const auto add = [&](const std::string& key, const std::string& how,
                          const std::vector<double>& values,
                          std::optional<Target> target = std::nullopt,
@@ -159,13 +181,20 @@ struct SetResults {
                  theirs);
     };
     add("open", "without closure", open, targets.open, published);
-    result.rows.back().reason = reason_of_open;
+    result.rows.back().reason = "the same recordings differ by " +
+                                to_general_text(median(closed), 3) + " with loops closed, and by " +
+                                to_general_text(median(wheels), 3) + " by the wheels alone";
     add("closed", "with closure", closed, targets.closed);
     add("closed_wheels", "with closure and steps from wheels", closed_with_wheels,
         targets.closed_with_wheels);
     add("ground_open", "without closure, height of the camera known", known_height_open);
     add("ground", "with closure, height of the camera known", known_height);
     add("wheels", "of the wheels alone", wheels);
+    const std::string mirror = "from mirror images of 640 x 480, ";
+    add("mirror.open", mirror + "without closure", mirror_open, targets.open, published);
+    result.rows.back().reason = "the same images differ by " +
+                                to_general_text(median(mirror_closed), 3) + " with loops closed";
+    add("mirror.closed", mirror + "with closure", mirror_closed, targets.closed);
     add_rate(result, id + ".right_closures", what + ": closures between views at most 1 m apart",
              right, std::max<std::size_t>(1, right + wrong));
     add_rate(result, id + ".unclosed", what + ": recordings in which no loop was closed",
@@ -174,8 +203,8 @@ struct SetResults {
     const auto with = [](std::pair<int, int> k) {
       return "k1 = " + std::to_string(k.first) + ", k2 = " + std::to_string(k.second);
     };
-    add("published", "by the published rule, " + with(targets.components),
-        grid.at(targets.components), std::nullopt, published);
+    add("published", "by the published rule, " + with(components), grid.at(components),
+        std::nullopt, published);
     add("published_best", "by the published rule, best of figure 6, " + with(best), grid.at(best));
   }
 
@@ -274,13 +303,15 @@ simulation::PlaceRecording MappingExperiments::make_variant(const std::string& s
                                                             int number) const {
   const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(number);
   return simulation::make_empty_place(simulation::make_scene(scene, {.seed = seed}), seed,
-                                      make_rendering(options.rows, options.columns), executor);
+                                      {.columns = options.columns, .rays_per_axis = 1}, executor);
 }
 
 void MappingExperiments::reproduce_first_set() const {
   SetResults set{.id = "f11.loop",
                  .what = "loop, " + std::to_string(options.views) + " views 10 cm apart"};
   FirstSetVariations variations;
+  constexpr std::array offsets_m{-0.3, -0.15, 0.15, 0.3};
+  PublishedRuleStudy published(first_figure);
   for (int s = 0; s < options.scenes; ++s) {
     const simulation::PlaceRecording place = make_variant("loop", s);
     const simulation::MappingRecording recording = simulation::record_for_mapping(
@@ -288,14 +319,19 @@ void MappingExperiments::reproduce_first_set() const {
         max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
     set.add(place, recording, {});
     add_published_errors(recording, set.grid);
+    set.add_mirror(place, recording, published, executor);
+    published.add_spacings(recording, loop_spacing_m, executor);
+    if (s % 2 == 0)
+      published.add_offset_tours(place, offsets_m, loop_spacing_m, recording.views.size(),
+                                 executor);
     variations.add_variations(recording, set.open.back(), set.closed.back());
   }
   set.report({.open = at_most(0.02),
-              .published = 0.04,
               .closed = at_most(0.006),
               .closed_with_wheels = at_most(0.002),
-              .components = {26, 20}},
-             "", result);
+              .published = first_figure},
+             result);
+  published.report(set.id, set.what, result);
   variations.report(set.what, result);
   add_plot(result, "f11_figure6a.svg", "Figure 6 (a): shape difference against k1, for several k2",
            plot_grid(set.grid, "First set: shape difference by the published rule, median"));
@@ -308,6 +344,8 @@ void MappingExperiments::reproduce_first_set() const {
 void MappingExperiments::reproduce_second_set() const {
   SetResults set{.id = "f11.lab", .what = "lab, views captured by threshold"};
   const auto views = static_cast<std::size_t>(options.views);
+  constexpr std::array offsets_m{-0.2, 0.0, 0.2, 0.4, 0.6};
+  PublishedRuleStudy published(second_figure);
   std::vector<double> nodes;
   std::vector<double> path_lengths_m;
   for (int s = 0; s < options.scenes; ++s) {
@@ -329,26 +367,46 @@ void MappingExperiments::reproduce_second_set() const {
       captured.views.push_back(recording.views[i]);
     }
     add_published_errors(captured, set.grid);
+    set.add_mirror(place, captured, published, executor);
+    published.add_spacings(recording, capture_spacing_m, executor);
+    if (s % 2 == 0)
+      published.add_offset_tours(place, offsets_m, loop_spacing_m, views * 3 / 5, executor);
   }
   add_median(result, "f11.lab.views", set.what + ": views", "views", nodes, std::nullopt,
              std::pair(150.0, 150.0));
   add_median(result, "f11.lab.way", set.what + ": path length", "m", path_lengths_m);
-  // Loop closures correct errors of length as well as errors of heading.
   set.report({.open = at_most(0.01),
-              .published = 0.015,
               .closed = at_most(0.01),
               .closed_with_wheels = std::nullopt,
-              .components = {4, 8}},
-             median(set.closed) <= 0.01
-                 ? "the unit of length of the views changes beside every piece of furniture; loop "
-                   "closures correct it"
-                 : "",
+              .published = second_figure},
              result);
+  published.report(set.id, set.what, result);
   add_plot(result, "f11_figure6b.svg", "Figure 6 (b): shape difference against k1, for several k2",
            plot_grid(set.grid, "Second set: shape difference by the published rule, median"));
   add_plot(result, "f11_figure5.svg",
            "Figure 5: maps of the second set beside the truth and the wheels, laid over the truth",
            set.maps, 2);
+}
+
+void MappingExperiments::measure_wide_room() const {
+  constexpr std::array offsets_m{-0.6, 0.6, 1.2, 1.8};
+  PublishedRuleStudy published(first_figure);
+  for (int s = 0; s < options.scenes; ++s) {
+    const simulation::PlaceRecording place = make_variant("hall", s);
+    const simulation::MappingRecording recording = simulation::record_for_mapping(
+        place, drive(place, {}, loop_spacing_m, static_cast<std::size_t>(options.views)),
+        max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
+    const auto by_mirror =
+        record_by_mirror(place, recording.truth, max_components + 2,
+                         simulation::make_noisy_wheels(), 1000 * place.seed, executor);
+    published.add(place, recording, by_mirror, executor);
+    published.add_spacings(recording, loop_spacing_m, executor);
+    if (s % 2 == 0)
+      published.add_offset_tours(place, offsets_m, loop_spacing_m, recording.views.size(),
+                                 executor);
+  }
+  published.report("f11.hall", "hall, " + std::to_string(options.views) + " views 10 cm apart",
+                   result);
 }
 
 }  // namespace panonav::lab

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "lab/experiments.hpp"
+#include "lab/f11/published_rule.hpp"
 #include "lab/rows.hpp"
 #include "panonav/camera/camera.hpp"
 #include "panonav/core/random.hpp"
@@ -201,12 +202,7 @@ struct MirrorImages {
 
 MirrorImages capture_mirror_images(const MappingExperiments& f11) {
   const simulation::PlaceRecording place = f11.make_variant("loop", 0);
-  Camera camera;
-  camera.model = HyperboloidalModel{};
-  camera.image_size = {640, 480};
-  camera.centre = {320.0, 240.0};
-  camera.rim_radius_px = 230.0;
-  camera.inner_radius_px = 40.0;
+  const Camera camera = make_mirror_camera();
   std::vector<Image> images;
   for (const Pose2& pose :
        drive(place, {}, 0.1, static_cast<std::size_t>(std::min(60, f11.options.views)))) {
@@ -359,7 +355,7 @@ void MappingExperiments::reproduce_world(const std::string& name) const {
   constexpr double spacing_m = 0.15;
   const simulation::PlaceRecording place =
       simulation::make_empty_place(simulation::read_gazebo_world(options.data, name), options.seed,
-                                   make_rendering(options.rows, options.columns), executor);
+                                   {.columns = options.columns, .rays_per_axis = 1}, executor);
   WorldErrors errors;
   for (int run = 0; run < options.runs; ++run) {
     Random random(options.seed, 300 + static_cast<std::uint64_t>(run));
@@ -420,9 +416,9 @@ void MappingExperiments::reproduce_recordings() const {
 void MappingExperiments::measure_large_maps() const {
   // Each round has its own small lateral offset, so that no view repeats exactly.
   constexpr int columns = 256;
-  const simulation::PlaceRecording place =
-      simulation::make_empty_place(simulation::make_scene("loop", {.seed = options.seed}),
-                                   options.seed, make_rendering(options.rows, columns), executor);
+  const simulation::PlaceRecording place = simulation::make_empty_place(
+      simulation::make_scene("loop", {.seed = options.seed}), options.seed,
+      {.columns = columns, .rays_per_axis = 1}, executor);
   Random random(options.seed, 400);
   std::vector<Point2> path;
   const auto rounds = options.max_views / 180 + 2;

@@ -224,7 +224,7 @@ std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
     const std::uint64_t seed =
         mix_seeds(mix_seeds(options.seed, place.seed), static_cast<std::uint64_t>(v));
     Random random(seed);
-    simulation::SimulatedPlace now = place;
+    auto now = static_cast<const simulation::SimulatedPlace&>(place);
     if (changed) {
       now = simulation::make_place(
           simulation::make_scene(place.scene.name,

@@ -75,6 +75,14 @@ TEST_F(Reproductions, MappingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   expect_same_on_one_and_two_threads(
       "f11", {.scenes = 2, .runs = 1, .columns = 132, .views = 16, .max_views = 100}, 30, 0);
+  for (const char* const id :
+       {"f11.loop.published", "f11.loop.published_chosen", "f11.loop.published_fixed.mirror",
+        "f11.loop.published_chosen.as_written", "f11.loop.published_heading.true_turns",
+        "f11.loop.published_chosen.spacing_40cm", "f11.loop.published_chosen.inside_15cm",
+        "f11.loop.sidedness.inside_15cm", "f11.loop.mirror.open", "f11.lab.mirror.closed",
+        "f11.lab.published_chosen.mirror_true_lengths", "f11.lab.clearance"}) {
+    EXPECT_TRUE(ids.contains(id)) << id;
+  }
 }
 
 TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {

@@ -13,7 +13,7 @@ namespace {
 
 std::string describe_f11(const lab::ReproductionOptions& options) {
   return "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
-         " variants of two simulated places. Additional experiments: loop closures, which the "
+         " variants of simulated places. Additional experiments: loop closures, which the "
          "authors left to future work; a corridor of identical doors; Gazebo worlds and recordings "
          "if they are available; maps of up to " +
          std::to_string(options.max_views) +
@@ -86,7 +86,6 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .subject = "visual odometry and maps",
      .runs = true,
      .data = true,
-     .optics = true,
      .lead = describe_f11},
     {.name = "m03",
      .title = "Monte-Carlo localisation: the experiments of [M03]",

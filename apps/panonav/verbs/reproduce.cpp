@@ -116,7 +116,7 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
                    "For m03: run only this part of the experiments (default: all parts)");
   arguments.choice("--optics", values->optics, {"mirror", "panorama"},
-                   "For f11, m03, m04, navigation, s06: unwarp the views from images of a mirror "
+                   "For m03, m04, navigation, s06: unwarp the views from images of a mirror "
                    "camera, or render them directly, which is some times as fast (default: mirror, "
                    "with --quick panorama)");
   arguments.hide_from_help({"--queries", "--rows", "--only", "--optics"});
