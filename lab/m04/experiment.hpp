@@ -44,6 +44,9 @@ class Experiment {
 /// [M04] section 3: views arranged by their similarity (figures 12, 15, 16 and 17), in the hall, a
 /// small room and the periodic hall.
 void reproduce_lattice(const Experiments& context);
+/// [M04] section 3.2 in `lab`, `hall` and `office`: springs between all pairs, springs to few
+/// neighbours, magnitudes alone by `arrange_by_magnitudes`, and phases, on the same views.
+void reproduce_magnitudes_alone(const Experiments& context);
 
 /// Adds [M03] table 1: bits of the raw image, the panorama and the signature, computed from the
 /// sizes of these objects.

@@ -65,6 +65,7 @@ ReproductionPlan plan_m04(const Experiments& context) {
                     reproduce_memory_table(context.result);
                     for (const auto& experiment : *experiments) experiment->report(context.result);
                     reproduce_lattice(context);
+                    reproduce_magnitudes_alone(context);
                   }});
   for (const MissionGrid& grid : options.mission_grids) {
     plan.push_back(
