@@ -129,7 +129,7 @@ ReproductionPlan plan_m03(const Experiments& context) {
   const auto parts = tracking_reproduction_parts();
   if (!options.only.empty() && std::ranges::find(parts, options.only) == parts.end()) {
     throw ContractError("only", options.only,
-                        "office, corridor, garden, leaving, worlds, recordings");
+                        "office, corridor, sparse, garden, leaving, worlds, recordings");
   }
   const auto m03 = std::make_shared<TrackingExperiments>(TrackingExperiments{context});
   ReproductionPlan plan;
@@ -143,6 +143,7 @@ ReproductionPlan plan_m03(const Experiments& context) {
   add("office", scenes, [=] { m03->reproduce_kidnapping(); });
   add("office", 10.0 * scenes, [=] { m03->reproduce_sweeps(); });
   add("corridor", 10.0 * scenes, [=] { m03->reproduce_corridor(); });
+  add("sparse", scenes, [=] { m03->reproduce_sparse_corridor(); });
   add("garden", 10.0 * scenes, [=] { m03->reproduce_garden(); });
   for (const char* const scene : {"hall", "loop"}) {
     add("leaving", 5.0 * scenes, [=] { m03->reproduce_leaving(scene); });

@@ -69,7 +69,8 @@ struct ReproductionOptions {
 /// and runs. Throws ContractError on an unknown paper.
 [[nodiscard]] ReproductionOptions default_options(std::string_view paper, bool quick = false);
 
-/// Parts of the experiments of [M03]: office, corridor, garden, leaving, worlds, recordings.
+/// Parts of the experiments of [M03]: office, corridor, sparse, garden, leaving, worlds,
+/// recordings.
 [[nodiscard]] std::span<const std::string_view> tracking_reproduction_parts();
 
 struct ReproductionPicture {

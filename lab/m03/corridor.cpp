@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,9 +22,14 @@ namespace panonav::lab {
 namespace {
 
 constexpr std::uint64_t corridor_seed = 70'000;
+constexpr std::uint64_t sparse_seed = 71'000;
 constexpr int max_images = 64;  // 16 m: longer than any stretch of the ring without distinct object
 constexpr std::size_t max_images_after = 10;
 constexpr double correct_radius_m = 0.5;
+// Spacings of the references of sparse memories; with the default number of scenes, 20 runs each.
+constexpr std::array<double, 3> sparse_spacings_m{0.5, 1.0, 2.0};
+constexpr int sparse_runs_each = 4;
+constexpr int sparse_images = 40;  // 10 m
 
 // Half a period of the highest of 15 components: smaller objects contribute hardly anything to
 // them.
@@ -81,7 +88,7 @@ bool is_distinct_object_visible(const simulation::PlaceRecording& place,
 
 /// Plans a drive along the ring from a random start in a random direction, with a lateral offset of
 /// up to 0.3 m.
-std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& random) {
+std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, int images, Random& random) {
   const double lateral_offset_m = random.uniform(-0.3, 0.3);
   const bool backwards = random.index(2) == 1;
   Point2 middle;
@@ -104,7 +111,7 @@ std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& rando
   const auto lap = dense.size() / 2;
   const auto start = static_cast<std::size_t>(random.index(lap));
   std::vector<Pose2> poses;
-  for (int i = 0; i < max_images; ++i) {
+  for (int i = 0; i < images; ++i) {
     const std::size_t at = start + 25 * static_cast<std::size_t>(i);
     if (at + 1 >= dense.size()) break;
     Pose2 pose = dense[at];
@@ -121,27 +128,36 @@ struct CorridorRuns {
   std::vector<viewer::MapLayer> things;                    ///< map layers of the first scene
 };
 
-CorridorRuns record_corridors(const TrackingExperiments& m03) {
+/// Drives of a robot through the corridor and the memory that it uses.
+struct CorridorPlan {
+  double spacing_m = m03_spacing_m;  ///< of the references
+  int runs_each = 1;                 ///< in each scene
+  int images = max_images;           ///< per run
+  bool ends_after_distinct = true;   ///< runs end `max_images_after` images after a distinct view
+};
+
+CorridorRuns record_corridors(const TrackingExperiments& m03, const CorridorPlan& plan) {
   const ReproductionOptions& options = m03.options;
   Executor& executor = m03.executor;
   CorridorRuns corridors;
   const int scenes = std::max(1, (options.scenes + 1) / 2);
-  const int runs_each = 2 * options.variants * options.runs;
   for (int s = 0; s < scenes; ++s) {
     const simulation::PlaceRecording place =
-        m03.record_variant("corridor", s, m03_spacing_m, options.columns / 2);
+        m03.record_variant("corridor", s, plan.spacing_m, options.columns / 2);
     const std::uint64_t seed = place.seed;
     const auto remembered = make_tracking_place(place, executor);
     const auto things = find_distinct_objects(place.scene);
-    std::vector<std::vector<Pose2>> paths(static_cast<std::size_t>(runs_each));
+    std::vector<std::vector<Pose2>> paths(static_cast<std::size_t>(plan.runs_each));
     std::vector<std::optional<std::size_t>> first(paths.size());
     executor.for_each_chunk(paths.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
       Random random(seed * 1000003U + 70U, r);
-      paths[r] = plan_ring_drive(place.scene, random);
+      paths[r] = plan_ring_drive(place.scene, plan.images, random);
       for (std::size_t i = 0; i < paths[r].size(); ++i) {
         if (!is_distinct_object_visible(place, things, paths[r][i].position())) continue;
         first[r] = i;
-        paths[r].resize(std::min(paths[r].size(), i + max_images_after));
+        if (plan.ends_after_distinct) {
+          paths[r].resize(std::min(paths[r].size(), i + max_images_after));
+        }
         break;
       }
     });
@@ -197,10 +213,73 @@ struct CorridorMeasures {
   }
 };
 
+/// Adds the images until localised and the wrong localisations of runs through the corridor.
+void add_headline_rows(const CorridorRuns& corridors, std::span<const TrackedRun> runs,
+                       const std::string& id, const std::string& what, bool with_targets,
+                       Reproduction& result) {
+  std::vector<double> images;
+  std::size_t wrong_runs = 0;
+  std::size_t found_runs = 0;
+  for (const TrackedRun& run : runs) {
+    const auto count = images_until_localised(run, m03_wrong_m);
+    images.push_back(count ? *count : static_cast<double>(run.size()) + 1.0);
+    found_runs += count ? 1 : 0;
+    wrong_runs +=
+        std::ranges::any_of(
+            run, [](const TrackedImage& image) { return image.is_confidently_wrong(m03_wrong_m); })
+            ? 1
+            : 0;
+  }
+  add_median(result, id + ".until_localised",
+             what +
+                 ": images until the error is below 1 m from then on (one more than there are "
+                 "if never)",
+             "images", images, with_targets ? std::optional(at_most(6.0)) : std::nullopt);
+  const RunRows rows{result, id, what, corridors.sets, runs};
+  rows.append_single_image_rates();
+  add_rate(result, id + ".found", what + ": runs whose error is below 1 m at the end", found_runs,
+           runs.size());
+  add_rate(result, id + ".wrong_runs",
+           what + ": runs that report localised at least once while off by more than 1 m",
+           wrong_runs, runs.size(), with_targets ? std::optional(at_most(0.0)) : std::nullopt);
+  rows.add_rate_of_wrong_answers();
+}
+
+/// Returns the largest log-likelihood ratio that an image can give a position, by the model that
+/// each memory learnt; near 0 if no reference resembles its neighbours.
+std::vector<double> max_log_ratios(std::span<const RunSet> sets) {
+  std::vector<double> ratios;
+  for (const RunSet& set : sets) {
+    const ObservationModel& model = set.place->model();
+    ratios.push_back(model.sharpness * std::pow(model.far_difference, 4));
+  }
+  return ratios;
+}
+
 }  // namespace
 
+void TrackingExperiments::reproduce_sparse_corridor() {
+  for (const double spacing_m : sparse_spacings_m) {
+    const CorridorRuns corridors = record_corridors(*this, {.spacing_m = spacing_m,
+                                                            .runs_each = sparse_runs_each,
+                                                            .images = sparse_images,
+                                                            .ends_after_distinct = false});
+    const std::string every = format_centimetres(spacing_m);
+    const std::string id = "m03.corridor.sparse." + every.substr(0, every.find(' '));
+    const std::string what = "corridor, references every " + every + ", ";
+    add_headline_rows(corridors, track(corridors.sets, {}, sparse_seed), id,
+                      what + "heading unknown", true, result);
+    add_median(result, id + ".max_log_ratio",
+               what + "largest log-likelihood ratio of an image at a place, by the learnt model",
+               "", max_log_ratios(corridors.sets));
+    add_headline_rows(corridors, track_as_published(corridors.sets, {}, sparse_seed),
+                      id + ".published", what + "heading known, weights by eq. 1", false, result);
+  }
+}
+
 void TrackingExperiments::reproduce_corridor() {
-  const CorridorRuns corridors = record_corridors(*this);
+  const CorridorRuns corridors =
+      record_corridors(*this, {.runs_each = 2 * options.variants * options.runs});
   const FilterSetting setting;
   const auto runs = track(corridors.sets, setting, corridor_seed);
   CorridorMeasures measures;
@@ -223,6 +302,11 @@ void TrackingExperiments::reproduce_corridor() {
              "corridor: modes kept before the first distinct place", "modes", measures.hypotheses);
   }
   rows.add_rate_of_wrong_answers(at_most(0.0));
+  add_headline_rows(corridors, track_as_published(corridors.sets, {}, corridor_seed),
+                    "m03.corridor.published", "corridor, heading known, weights by eq. 1", false,
+                    result);
+  add_headline_rows(corridors, runs, "m03.corridor.ours", "corridor, heading unknown", false,
+                    result);
   if (measures.distinct_runs > 0) {
     add_rate(result, "m03.corridor.right_after",
              "corridor: runs whose heaviest mode is within 0.5 m of the truth at the first "

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/worlds.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
 
@@ -206,6 +208,21 @@ std::vector<TrackedRun> TrackingExperiments::track(std::span<const RunSet> sets,
   return all;
 }
 
+std::vector<TrackedRun> TrackingExperiments::track_as_published(
+    std::span<const RunSet> sets, const PublishedFilterSetting& setting, std::uint64_t seed) const {
+  std::vector<TrackedRun> all;
+  for (const RunSet& set : sets) {
+    const std::uint64_t first_seed = seed + all.size();
+    std::ranges::move(simulation::make_each(executor, set.runs.size(),
+                                            [&](std::size_t i) {
+                                              return track_run_as_published(
+                                                  *set.place, set.runs[i], setting, first_seed + i);
+                                            }),
+                      std::back_inserter(all));
+  }
+  return all;
+}
+
 std::vector<RunSet> TrackingExperiments::collect_sets(RunSet OfficeRuns::*set) const {
   std::vector<RunSet> sets;
   for (const OfficeRuns& office : offices) sets.push_back(office.*set);
@@ -213,8 +230,8 @@ std::vector<RunSet> TrackingExperiments::collect_sets(RunSet OfficeRuns::*set) c
 }
 
 std::span<const std::string_view> tracking_reproduction_parts() {
-  static constexpr std::array<std::string_view, 6> parts{"office",  "corridor", "garden",
-                                                         "leaving", "worlds",   "recordings"};
+  static constexpr std::array<std::string_view, 7> parts{
+      "office", "corridor", "sparse", "garden", "leaving", "worlds", "recordings"};
   return parts;
 }
 

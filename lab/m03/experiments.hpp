@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lab/experiments.hpp"
+#include "lab/runs/published_filter.hpp"
 #include "lab/runs/tracking_filter.hpp"
 #include "lab/runs/tracking_run.hpp"
 
@@ -104,6 +105,9 @@ struct TrackingExperiments : Experiments {
   void reproduce_sweeps();
   /// Reproduces "a long indoor corridor with a loop where we face many false hypothesis".
   void reproduce_corridor();
+  /// Localises in the same corridor with references every 0.5, 1 and 2 m, by our filter and as
+  /// published.
+  void reproduce_sparse_corridor();
   /// Reproduces "a large outdoor environment where we are investigating the different nature of
   /// brightness variations".
   void reproduce_garden();
@@ -122,6 +126,10 @@ struct TrackingExperiments : Experiments {
   [[nodiscard]] std::vector<TrackedRun> track(std::span<const RunSet> sets,
                                               const FilterSetting& setting,
                                               std::uint64_t seed) const;
+  /// Tracks all runs of all sets by the filter as published, in order. Each run has its own seed.
+  [[nodiscard]] std::vector<TrackedRun> track_as_published(std::span<const RunSet> sets,
+                                                           const PublishedFilterSetting& setting,
+                                                           std::uint64_t seed) const;
   /// Returns the run set `set` of each office.
   [[nodiscard]] std::vector<RunSet> collect_sets(RunSet OfficeRuns::*set) const;
 };

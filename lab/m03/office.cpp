@@ -59,6 +59,17 @@ void add_paper_rows(const TrackingExperiments& m03) {
     rows.add_error_after(10, at_most(m03_spacing_m));
     rows.add_rate_of_wrong_answers();
   }
+  const auto published =
+      m03.track_as_published(sets, {.particles_per_reference = 1.0}, seed_of_clean);
+  const RunRows rows{.result = m03.result,
+                     .id = "m03.global.clean.published",
+                     .what = "global localisation, clean, the paper's weights (eq. 1)",
+                     .sets = sets,
+                     .runs = published};
+  rows.add_images_until_localised(std::nullopt, std::pair{5.0, 6.0});
+  rows.add_images_mean();
+  rows.add_rate_localised_within(10);
+  rows.add_error_after(10);
 }
 
 void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
