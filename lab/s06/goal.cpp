@@ -215,11 +215,11 @@ void draw_catchments_by_rule(GoalFigures& figures, Reproduction& result) {
     panels.push_back(make_map(strategy.label, figures.shade_cells(ends, distance_limits),
                               figures.outline_catchment(ends), figures.mark_goal()));
   }
-  add_plot(
-      result, "figure_15_areas.svg",
-      "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
-      "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm.",
-      panels, 3);
+  add_plot(result, "figure_15_areas.svg",
+           "[S06] figure 15: where runs to this goal end, coarse to fine, by a chain of 20 stages "
+           "and by expected "
+           "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm.",
+           panels, 3);
 }
 
 // Draws figure 16, left.

@@ -132,11 +132,13 @@ void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
     staged.series.push_back(make_area_series(surveys, make_published_strategy(sequence)));
   }
   staged.series.push_back(make_area_series(surveys, make_expected_image_strategy()));
+  staged.series.push_back(make_area_series(surveys, make_library_strategy()));
   staged.series.push_back(make_area_series(surveys, make_own_strategy()));
-  add_plot(result, "figure_13_stages.svg",
-           "[S06] figure 13: the same when more frequencies count where homing stops, and our rule "
-           "in its stages.",
-           staged);
+  add_plot(
+      result, "figure_13_stages.svg",
+      "[S06] figure 13: the same when more frequencies count where homing stops, the library's "
+      "rule and a chain of 20 stages.",
+      staged);
 }
 
 // Draws figure 12.

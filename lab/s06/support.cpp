@@ -1,5 +1,9 @@
 #include "lab/s06/support.hpp"
 
+#include <cstdint>
+
+#include "panonav/homing/homing_pursuit.hpp"
+
 namespace panonav::lab {
 
 namespace {
@@ -24,7 +28,11 @@ HomingStrategy make_published_strategy(std::vector<int> highest) {
 }
 
 HomingStrategy make_own_strategy() {
-  return {"our rule", HomingStrategy::Rule::own, {}};
+  return {"a chain of 20 stages", HomingStrategy::Rule::own, {}};
+}
+
+HomingStrategy make_library_strategy() {
+  return {"the library's rule", HomingStrategy::Rule::library, {}};
 }
 
 HomingStrategy make_expected_image_strategy() {
@@ -80,11 +88,47 @@ std::vector<const HomingSurvey*> ArenaSurveys::survey_stages(const HomingStrateg
     }
     stages.push_back(&survey_own(own_highest));
   }
+  if (strategy.rule == HomingStrategy::Rule::library) {
+    const HomingPursuitOptions options;
+    for (const int highest : {0, options.coarse, options.middle, 0}) {
+      stages.push_back(&survey_own(highest));
+    }
+  }
   for (const int highest : strategy.highest) stages.push_back(&survey_published(highest));
   return stages;
 }
 
+std::vector<float> ArenaSurveys::compute_library_distances() {
+  const auto stages = survey_stages(make_library_strategy());
+  const double arrived_difference = HomingPursuitOptions{}.arrived_difference;
+  const HomingSurvey& first = *stages.front();
+  const std::size_t places = first.places.size();
+  std::vector<float> distances(first.goals.size() * places);
+  executor_.for_each_chunk(
+      first.goals.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t g = begin; g < end; ++g) {
+          const HomingView& home = arena_.homes.views[g * goal_stride_].view;
+          std::vector<std::vector<std::uint32_t>> ends;
+          for (std::size_t k = 1; k <= stages.size(); ++k) {
+            ends.push_back(final_places(std::span(stages).first(k), g, survey_options(arena_)));
+          }
+          for (std::size_t p = 0; p < places; ++p) {
+            std::size_t stage = 0;
+            while (stage + 1 < stages.size() &&
+                   image_difference(home, arena_.currents.views[ends[stage][p]].view) >
+                       arrived_difference) {
+              ++stage;
+            }
+            distances[g * places + p] = static_cast<float>(
+                distance(first.goals[g].position(), first.places[ends[stage][p]].position()));
+          }
+        }
+      });
+  return distances;
+}
+
 std::vector<float> ArenaSurveys::compute_final_distances(const HomingStrategy& strategy) {
+  if (strategy.rule == HomingStrategy::Rule::library) return compute_library_distances();
   return final_distances(survey_stages(strategy), survey_options(arena_), executor_);
 }
 
@@ -95,9 +139,8 @@ std::vector<float> ArenaSurveys::compute_final_distances(
 
 std::vector<double> ArenaSurveys::compute_areas(const HomingStrategy& strategy,
                                                 std::span<const double> accepted_m) {
-  const auto stages = survey_stages(strategy);
-  return mean_catchment_areas(final_distances(stages, survey_options(arena_), executor_),
-                              stages[0]->goals.size(), accepted_m);
+  return mean_catchment_areas(compute_final_distances(strategy),
+                              survey_stages(strategy).front()->goals.size(), accepted_m);
 }
 
 }  // namespace panonav::lab

@@ -27,17 +27,20 @@ inline constexpr double s06_max_similar_difference = 0.1;
 
 /// A homing strategy: a sequence of rules; whenever homing stops, the next rule continues.
 struct HomingStrategy {
-  enum class Rule { published, own, expected_images };
+  enum class Rule { published, own, library, expected_images };
   std::string label;
   Rule rule = Rule::published;
   std::vector<int> highest;  ///< K of each stage; only for the published rule
 };
 [[nodiscard]] HomingStrategy make_published_strategy(std::vector<int> highest);
-/// Returns our strategy: home vectors with default options and K = 10; then, where runs stop at a
-/// place that is not similar to home, three rounds of coarse to fine without displacement search;
-/// finally the default options again. A place is similar to home below an image difference of
-/// `s06_max_similar_difference`. Chosen on arenas of seeds 1 to 4.
+/// Returns the chain of stages, which exists only in this experiment: home vectors with default
+/// options and K = 10; then, where runs stop at a place that is not similar to home, three rounds
+/// of coarse to fine without displacement search; finally the default options again. A place is
+/// similar to home below an image difference of `s06_max_similar_difference`. Chosen on arenas of
+/// seeds 1 to 4.
 [[nodiscard]] HomingStrategy make_own_strategy();
+/// Returns the strategy of the library as a user calls it: `HomingPursuit` with default options.
+[[nodiscard]] HomingStrategy make_library_strategy();
 [[nodiscard]] HomingStrategy make_expected_image_strategy();
 
 /// The surveys of one arena, computed on first use and cached.
@@ -55,6 +58,8 @@ class ArenaSurveys {
   /// similar to home.
   [[nodiscard]] const HomingSurvey& survey_own_without_search(int highest);
   [[nodiscard]] const HomingSurvey& survey_expected_images();
+  /// Returns the surveys of all stages. A run of the library's strategy ends before the first stage
+  /// that begins where the views differ by at most `HomingPursuitOptions::arrived_difference`.
   [[nodiscard]] std::vector<const HomingSurvey*> survey_stages(const HomingStrategy& strategy);
   /// Returns the distances from the goal at which all runs end, goal by goal.
   [[nodiscard]] std::vector<float> compute_final_distances(const HomingStrategy& strategy);
@@ -64,6 +69,7 @@ class ArenaSurveys {
                                                   std::span<const double> accepted_m);
 
  private:
+  [[nodiscard]] std::vector<float> compute_library_distances();
   template <typename Rule>
   [[nodiscard]] const HomingSurvey& survey(const std::string& key, const Rule& rule);
 
