@@ -30,6 +30,9 @@ const std::vector<std::size_t> thinnings{1, 2, 5, 10, 15, 25};
 constexpr std::size_t synthesised_offset_index = 3;
 const std::vector<double> margins_m{0.04, 0.08, 0.14, 0.24, 0.34};
 
+// An error above this puts the prediction near the margin from which contours start (14 cm).
+constexpr double lost_cm = 10.0;
+
 // Errors of one localisation method over all variants.
 struct MethodErrors {
   std::vector<double> mean_cm;                 // per variant
@@ -57,6 +60,12 @@ struct MethodErrors {
     std::size_t count = 0;
     for (const auto& one : images_cm) count += one.size();
     return count;
+  }
+  /// Counts the variants with an error above `limit_cm` in at least one image.
+  [[nodiscard]] std::size_t count_variants_above(double limit_cm) const {
+    return count_where(images_cm, [&](const std::vector<double>& images) {
+      return std::ranges::any_of(images, [&](double error) { return error > limit_cm; });
+    });
   }
 };
 
@@ -245,6 +254,9 @@ class LabResults {
             "cm", sigma_target, range(&Published::second));
     add_rate(result_, "y03." + id + ".missed", what + ": images without an answer", errors.missed,
              errors.images());
+    add_rate(result_, "y03." + id + ".lost",
+             what + ": drives with an error above 10 cm in at least one image",
+             errors.count_variants_above(lost_cm), errors.images_cm.size());
   }
 
   void report_changed_images(const std::string& id, const std::string& scene,
