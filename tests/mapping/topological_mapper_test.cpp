@@ -89,6 +89,25 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
   EXPECT_EQ(count_components(map), 1U);
 }
 
+TEST(TopologicalMapper, ClosesTheLoopOfADriveThatEndsWhereItBegan) {
+  const ToyWorld world = round_room(radius_m, 5);
+  const auto truth = rounds(round + 1);
+  Mapping open({.close_loops = false});
+  Mapping closed;
+  for (const Pose2& pose : truth) {
+    open.add(round_room_signature(world, pose));
+    EXPECT_TRUE(closed.add(round_room_signature(world, pose)).closures.empty());
+  }
+  closed.mapper.finish();
+  const TopologicalMap map = closed.mapper.map();
+  EXPECT_EQ(map.edges.size(), truth.size());
+  const Pose2 gap = inverse(map.nodes.front().pose) * map.nodes.back().pose;
+  const Pose2 open_gap = inverse(open.mapper.poses().front()) * open.mapper.poses().back();
+  EXPECT_LT(std::hypot(gap.x_m, gap.y_m), std::hypot(open_gap.x_m, open_gap.y_m));
+  closed.mapper.finish();
+  EXPECT_EQ(closed.mapper.map().edges.size(), truth.size());  // the loop is closed once
+}
+
 TEST(TopologicalMapper, WheelsSetTheScale) {
   const ToyWorld world = round_room(radius_m, 6);
   const auto truth = rounds(round + 20);

@@ -128,9 +128,13 @@ class TopologicalMapper::Implementation {
     return update;
   }
 
-  void begin_path() { odometry_.begin_path(); }
+  void begin_path() {
+    close_last_loops();
+    odometry_.begin_path();
+  }
 
   void finish() {
+    close_last_loops();
     if (changed_) optimise();
   }
 
@@ -226,23 +230,34 @@ class TopologicalMapper::Implementation {
                               variances->in_frame_of(closure.earlier));
     };
     update.closures = finder_.find(nodes_, poses_, *odometry_.last(), scale_m, is_possible);
-    for (const LoopClosure& closure : update.closures) {
-      join_components(closure);
-      edges_.push_back(make_closure_edge(closure, scale_m));
-      weights_.push_back(1.0);
-    }
     if (update.closures.empty()) return;
-    changed_ = true;
-    optimise_latest();
-    for (std::size_t i = edges_.size() - update.closures.size(); i < edges_.size(); ++i) {
-      if (normalised_residual(edges_[i], poses_) > max_closure_deviations)
-        needs_optimisation_ = true;
-    }
+    add_closures(update.closures, scale_m);
     if (needs_optimisation_ &&
         size() >=
             optimised_size_ + std::max<std::size_t>(1, optimised_size_ / min_growth_divisor)) {
       optimise();
       update.optimised = true;
+    }
+  }
+
+  /// Closes the loops of the last nodes of a path, which no later node can make certain.
+  void close_last_loops() {
+    if (!options_.close_loops) return;
+    const auto closures = finder_.finish(nodes_, poses_);
+    if (!closures.empty()) add_closures(closures, scale_m());
+  }
+
+  void add_closures(std::span<const LoopClosure> closures, double scale_m) {
+    for (const LoopClosure& closure : closures) {
+      join_components(closure);
+      edges_.push_back(make_closure_edge(closure, scale_m));
+      weights_.push_back(1.0);
+    }
+    changed_ = true;
+    optimise_latest();
+    for (std::size_t i = edges_.size() - closures.size(); i < edges_.size(); ++i) {
+      if (normalised_residual(edges_[i], poses_) > max_closure_deviations)
+        needs_optimisation_ = true;
     }
   }
 

@@ -79,7 +79,8 @@ class TopologicalMapper {
   /// component unless its motion is given. Its turns and speed are learnt again.
   void begin_path();
 
-  /// Optimises the map if it has changed since the last time.
+  /// Closes the loops that the last views of a path make certain, and optimises the map if it has
+  /// changed since the last time.
   void finish();
 
   [[nodiscard]] std::size_t size() const noexcept;  ///< Number of nodes.

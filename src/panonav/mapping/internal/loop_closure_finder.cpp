@@ -198,8 +198,27 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PathNode> nodes
   while (!pending_.empty() && here - pending_.front().later > 2 * reach) pending_.pop_front();
   const auto found = find_best_closure(nodes, poses, view, is_possible);
   if (found && is_reciprocal(nodes, poses, *found)) pending_.push_back(*found);
-  const auto closure = std::ranges::find(pending_, here - reach, &LoopClosure::later);
-  if (here < reach || closure == pending_.end()) return {};
+  if (here < reach) return {};
+  const auto closure = decide(nodes, poses, here - reach);
+  if (!closure) return {};
+  return {*closure};
+}
+
+std::vector<LoopClosure> LoopClosureFinder::finish(std::span<const PathNode> nodes,
+                                                   std::span<const Pose2> poses) {
+  std::vector<LoopClosure> closures;
+  const auto undecided = static_cast<std::size_t>(options_.sequence - 1);
+  for (std::size_t i = nodes.size() - std::min(undecided, nodes.size()); i < nodes.size(); ++i) {
+    if (const auto closure = decide(nodes, poses, i)) closures.push_back(*closure);
+  }
+  return closures;
+}
+
+std::optional<LoopClosure> LoopClosureFinder::decide(std::span<const PathNode> nodes,
+                                                     std::span<const Pose2> poses,
+                                                     std::size_t node) {
+  const auto closure = std::ranges::find(pending_, node, &LoopClosure::later);
+  if (closure == pending_.end()) return std::nullopt;
   // The displacement between views is the more certain the smaller it is, so a passage through a
   // known place is closed where the views explain each other best. Matches of other components are
   // checked by their number.
@@ -207,15 +226,16 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PathNode> nodes
   for (const LoopClosure& other : pending_) {
     if (!agree(std::min(other, *closure, is_before), std::max(other, *closure, is_before), poses))
       continue;
-    if (scope_ == ClosureScope::everywhere && other.residual < closure->residual) return {};
+    if (scope_ == ClosureScope::everywhere && other.residual < closure->residual)
+      return std::nullopt;
     ++agreeing;
   }
-  const double closed_m = nodes[closure->later].path_m;
+  const double closed_m = nodes[node].path_m;
   if (agreeing < options_.sequence || closed_m - last_closure_path_m_ < options_.spacing_m) {
-    return {};
+    return std::nullopt;
   }
   last_closure_path_m_ = closed_m;
-  return {*closure};
+  return *closure;
 }
 
 }  // namespace panonav

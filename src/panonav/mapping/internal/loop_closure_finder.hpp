@@ -52,6 +52,12 @@ class LoopClosureFinder {
                                               const OdometryView& view, double scale_m,
                                               const IsPossible& is_possible);
 
+  /// Returns the closures of the last `sequence - 1` nodes, which `find` decides only after later
+  /// nodes: call it at the end of a path, with the nodes and poses of the last `find`. A drive that
+  /// ends where it began has its closure here.
+  [[nodiscard]] std::vector<LoopClosure> finish(std::span<const PathNode> nodes,
+                                                std::span<const Pose2> poses);
+
   /// Returns the closure of two nodes if home vectors in both directions and the compass agree on
   /// it; nullopt otherwise. Cost: 0.6 ms.
   [[nodiscard]] std::optional<LoopClosure> verify_closure(std::size_t earlier, std::size_t later,
@@ -63,6 +69,9 @@ class LoopClosureFinder {
                            std::span<const Pose2> poses) const;
 
  private:
+  /// Returns the closure of a node if it is certain by those of the nodes around it.
+  [[nodiscard]] std::optional<LoopClosure> decide(std::span<const PathNode> nodes,
+                                                  std::span<const Pose2> poses, std::size_t node);
   [[nodiscard]] std::optional<LoopClosure> find_best_closure(std::span<const PathNode> nodes,
                                                              std::span<const Pose2> poses,
                                                              const OdometryView& view,
