@@ -34,7 +34,7 @@ struct ReproductionOptions {
   std::filesystem::path data = {};
   /// Not used by [F11], which measures both, by [Y03], whose lines are always those of a mirror,
   /// and by the experiments elsewhere.
-  Optics optics = Optics::mirror;
+  Optics optics = Optics::panorama;
   std::uint64_t seed = 1;  ///< of the first scene; each next scene adds 1
   int scenes = 20;         ///< variants of a scene; fewer for some experiments
   int runs = 20;           ///< missions, paths, walks or homing runs in each place

@@ -24,8 +24,7 @@ TEST(NavigationReproduction, RefusesTooFewScenesAndRuns) {
 TEST_F(Reproductions, SignaturesAreTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   expect_same_on_one_and_two_threads("m04",
-                                     {.optics = Optics::panorama,
-                                      .seed = 5,
+                                     {.seed = 5,
                                       .scenes = 2,
                                       .queries = 3,
                                       .rows = 6,
@@ -38,8 +37,7 @@ TEST_F(Reproductions, SignaturesAreTheSameOnOneAndTwoThreads) {
 TEST_F(Reproductions, TrackingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   expect_same_on_one_and_two_threads("m03",
-                                     {.optics = Optics::panorama,
-                                      .seed = 705,
+                                     {.seed = 705,
                                       .scenes = 1,
                                       .runs = 2,
                                       .rows = 4,
@@ -60,8 +58,7 @@ TEST_F(Reproductions, TrackingIsTheSameOnOneAndTwoThreads) {
 TEST_F(Reproductions, HomingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   expect_same_on_one_and_two_threads("s06",
-                                     {.optics = Optics::panorama,
-                                      .seed = 7,
+                                     {.seed = 7,
                                       .scenes = 2,
                                       .goals_every = 8,
                                       .goals_every_further = 16,

@@ -45,8 +45,7 @@ TEST(S06Worlds, AWorldGivesItsRowsAndAPictureOfEachFailure) {
   const TemporaryFolder out;
   Executor executor(2);
   Reproduction result{.out = out.path()};
-  const ReproductionOptions options{
-      .data = scenes->parent_path(), .optics = Optics::panorama, .seed = 5, .starts = 30};
+  const ReproductionOptions options{.data = scenes->parent_path(), .seed = 5, .starts = 30};
   reproduce_homing_in_world("small_warehouse", {options, executor, result});
   ASSERT_GE(result.rows.size(), 6U);
   EXPECT_EQ(result.rows.front().id, "s06.world.small_warehouse.success");

@@ -117,8 +117,8 @@ Run declare_reproduce(Arguments& arguments) {
                    "For m03: run only this part of the experiments (default: all parts)");
   arguments.choice("--optics", values->optics, {"mirror", "panorama"},
                    "For m03, m04, navigation, s06: unwarp the views from images of a mirror "
-                   "camera, or render them directly, which is some times as fast (default: mirror, "
-                   "with --quick panorama)");
+                   "camera, or render them directly, which takes a fourth to a ninth of the time "
+                   "(default: panorama)");
   arguments.hide_from_help({"--queries", "--rows", "--only", "--optics"});
   arguments.declare_outputs({"--out"});
   arguments.explain_interruption(
