@@ -28,7 +28,7 @@ namespace {
 constexpr std::array<int, 7> k1_grid{2, 4, 8, 16, 26, 40, 64};
 constexpr std::array<int, 6> k2_grid{4, 8, 14, 20, 40, 64};
 constexpr double max_spacing_m = 0.4;
-constexpr double min_way_m = 1e-9;  ///< of a drive; below it the robot stands
+constexpr double min_way_m = 1e-9;  ///< shortest drive; below it the robot stands
 
 using TravelDirection = PublishedRuleVariant::TravelDirection;
 using UsedRows = PublishedRuleVariant::UsedRows;

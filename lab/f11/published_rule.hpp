@@ -27,7 +27,7 @@ struct PublishedRuleVariant {
   enum class TravelDirection { first_heading, middle, last_heading };
   enum class UsedRows { all, above_horizon, below_horizon };
 
-  bool unit_phases = false;      ///< phases count alike, whatever their magnitude
+  bool unit_phases = false;      ///< all phases have the same weight
   bool unit_signatures = false;  ///< distance of signatures of norm 1
   UsedRows rows = UsedRows::all;
   int rows_per_band = 1;  ///< rows that are averaged to one, >= 1

@@ -130,7 +130,7 @@ struct CorridorRuns {
 
 /// Drives of a robot through the corridor and the memory that it uses.
 struct CorridorPlan {
-  double spacing_m = m03_spacing_m;  ///< of the references
+  double spacing_m = m03_spacing_m;  ///< between neighbouring references
   int runs_each = 1;                 ///< in each scene
   int images = max_images;           ///< per run
   bool ends_after_distinct = true;   ///< runs end `max_images_after` images after a distinct view

@@ -228,7 +228,7 @@ class CovarianceModel {
   }
 
   double count_ = 0.0;     // features of a view
-  MatrixXd products_;      // of the features of two views, less their mean
+  MatrixXd products_;      // features of two views, less their mean
   double variance_ = 0.0;  // mean over features
 };
 

@@ -99,7 +99,7 @@ struct SensorMissions {
   simulation::ObstacleSensor sensor;
   std::string id;
   std::string what;
-  double min_fraction;  // of the arrivals with the true free space
+  double min_fraction;  // share of the arrivals with the true free space
   MissionResults measures;
 };
 

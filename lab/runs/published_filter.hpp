@@ -11,7 +11,7 @@ namespace panonav::lab {
 
 /// Settings of the filter as published [M03 section 4].
 struct PublishedFilterSetting {
-  OdometryNoise odometry{.drive = DriveKind::holonomic};  ///< of the robot, and as assumed
+  OdometryNoise odometry{.drive = DriveKind::holonomic};  ///< true and assumed
   int particles = 5000;  ///< >= 1; the largest number of our filter, too
   /// If set, used instead of `particles`; the paper needs about 1 particle per reference.
   std::optional<double> particles_per_reference;

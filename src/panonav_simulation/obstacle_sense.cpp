@@ -67,14 +67,14 @@ std::array<double, sensor_directions> measure_ranges(const FreeSpace& space, con
 double sense_contact_rad(const FreeSpace& space, const People& people, const Pose2& robot,
                          double robot_radius_m) {
   // Averages the directions of the parts of the hull that are deepest in obstacles.
-  double least_m = std::numeric_limits<double>::infinity();
+  double nearest_m = std::numeric_limits<double>::infinity();
   Point2 sum;
   for (const double direction_rad : hull_directions()) {
     const Point2 hull = find_point_at(robot, direction_rad, robot_radius_m);
     const double clearance_m = people.has_person_within(hull, 0.0) ? 0.0 : space.clearance_m(hull);
-    if (clearance_m > least_m) continue;
-    if (clearance_m < least_m) sum = {};
-    least_m = clearance_m;
+    if (clearance_m > nearest_m) continue;
+    if (clearance_m < nearest_m) sum = {};
+    nearest_m = clearance_m;
     sum = {sum.x_m + std::cos(direction_rad), sum.y_m + std::sin(direction_rad)};
   }
   return round_to_sensor_rad(std::atan2(sum.y_m, sum.x_m));

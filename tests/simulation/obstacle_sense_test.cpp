@@ -188,7 +188,7 @@ TEST(SimulatedRobot, DrivesAlongAWallThatItTouchedTwice) {
       exact.drive = drive;
       SimulatedRobot robot(space, exact, ObstacleRule::pass, {1.2, 0.0, 0.0}, 1, sensor);
       int touched = 0;
-      // It is asked to drive obliquely into the wall again and again.
+      // It drives obliquely into the wall again and again.
       for (int i = 0; i < 4; ++i) {
         const double course_rad = 0.5 - robot.pose().heading_rad;
         const auto step = robot.drive(wrap_angle(course_rad), 0.4);

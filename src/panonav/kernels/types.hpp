@@ -170,7 +170,7 @@ struct TiltedDirections {
       flat,             ///< cosine of the elevation
       z;                ///< its sine
   double top_rad,       ///< upper edge of the tilted panorama
-      rows_per_rad,     ///< of the tilted panorama
+      rows_per_rad,     ///< rows of the tilted panorama per radian
       columns_per_rad;  ///< the same
 };
 

@@ -115,7 +115,7 @@ class LeftOutMatches {
   const ColumnRanking* ranking_;
   const NeighbourSupport* support_;
   const FeatureSource* features_;
-  std::vector<std::optional<FloorPosition>> positions_;  // of all views
+  std::vector<std::optional<FloorPosition>> positions_;  // positions of all views
 };
 
 }  // namespace

@@ -29,7 +29,7 @@ struct PosedOnFloor {
 /// Returns the view nearest to a position at another position of the same floor; null if there is
 /// none.
 const PosedOnFloor* find_nearest(std::span<const PosedOnFloor> posed, const FloorPosition& from) {
-  constexpr double rounding = 1e-9;  // of squares, relative
+  constexpr double rounding = 1e-9;  // relative error of squares
   const PosedOnFloor* nearest = nullptr;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (const PosedOnFloor& other : posed) {

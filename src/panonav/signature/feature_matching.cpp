@@ -2,8 +2,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <memory>
-#include <mutex>
 #include <numbers>
 #include <span>
 #include <utility>
@@ -20,8 +18,7 @@ namespace {
 
 // Bearings of the columns and rows of a panorama.
 struct BearingTables {
-  BearingTables(PanoramaShape shape_, ElevationBand elevations_)
-      : shape(shape_), elevations(elevations_) {
+  BearingTables(PanoramaShape shape, ElevationBand elevations) {
     const double column_rad = 2.0 * std::numbers::pi / shape.columns;
     for (int column = 0; column < shape.columns; ++column) {
       const double azimuth = column_rad * column;
@@ -33,23 +30,9 @@ struct BearingTables {
     for (int row = 0; row < shape.rows; ++row)
       tangents.push_back(static_cast<float>(std::tan(elevations.top_rad - (row + 0.5) * row_rad)));
   }
-  PanoramaShape shape;
-  ElevationBand elevations;
-  std::vector<double> azimuths;                 // of each column
-  std::vector<float> sines, cosines, tangents;  // of each column, of each row
+  std::vector<double> azimuths;                 // one per column
+  std::vector<float> sines, cosines, tangents;  // one per column, tangents one per row
 };
-
-// Returns the tables of a panorama. A program compares features of one shape, so only the last
-// tables are kept.
-std::shared_ptr<const BearingTables> get_or_make_bearing_tables(PanoramaShape shape,
-                                                                ElevationBand elevations) {
-  static std::mutex mutex;
-  static std::shared_ptr<const BearingTables> last;
-  const std::lock_guard lock(mutex);
-  if (!last || last->shape != shape || last->elevations != elevations)
-    last = std::make_shared<const BearingTables>(shape, elevations);
-  return last;
-}
 
 // Bearings and descriptors of a view's features, as a structure of arrays.
 struct Bearings {
@@ -138,7 +121,7 @@ class MutualMatches {
  private:
   static constexpr std::size_t numbers_per_match = 8;
   std::vector<double> azimuths_;
-  std::array<std::vector<float>, numbers_per_match> values_;  // as MatchedBearings has them
+  std::array<std::vector<float>, numbers_per_match> values_;  // in the order of MatchedBearings
 };
 
 constexpr int rotation_steps = 128;
@@ -167,9 +150,9 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
   if (query.shape != reference.shape || query.elevations != reference.elevations) {
     throw ContractError("local features", "of another panorama", "of one shape and band");
   }
-  const auto tables = get_or_make_bearing_tables(query.shape, query.elevations);
-  const Bearings query_bearings(query, *tables);
-  const Bearings reference_bearings(reference, *tables);
+  const BearingTables tables(query.shape, query.elevations);
+  const Bearings query_bearings(query, tables);
+  const Bearings reference_bearings(reference, tables);
   const std::size_t count = query.features.size();
   std::vector<std::uint16_t> nearest_of_query(count);
   std::vector<std::uint16_t> nearest_of_reference(reference.features.size());

@@ -149,7 +149,7 @@ class StructureTensor {
 
   const Grey& smooth_;
   int next_ = 0;                                 // row, the first that was not summed along itself
-  Grey products_{3, smooth_.columns, 0, reach};  // of one row
+  Grey products_{3, smooth_.columns, 0, reach};  // one row
   Grey along_rows_{3 * ring, smooth_.columns, 0, 0};
   Grey sums_{3, smooth_.columns, 0, 0};
 };

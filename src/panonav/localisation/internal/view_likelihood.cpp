@@ -110,7 +110,7 @@ void ViewLikelihood::add_cells(std::int32_t x,
                                std::int32_t around, double reach_m) {
   std::vector<std::pair<float, std::uint32_t>> near;  // distance, site
   std::int32_t next_y = std::numeric_limits<std::int32_t>::min();
-  auto first = near_column.begin();  // of those near the cell
+  auto first = near_column.begin();  // first view near the cell
   for (const auto& [site_y, unused] : near_column) {
     for (std::int32_t y = std::max(next_y, site_y - around); y <= site_y + around; ++y) {
       const Point2 centre = centre_of({x, y});
