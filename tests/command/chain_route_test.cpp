@@ -7,7 +7,10 @@
 #include <numbers>
 
 #include "command/room_run.hpp"
+#include "panonav/io/trajectory_file.hpp"
 #include "support/command_runner.hpp"
+#include "support/recorded_messages.hpp"
+#include "support/report_pages.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -56,6 +59,42 @@ TEST_F(ChainVerbs, AChainIsRecordedListedAndFollowedInBothDirections) {
     EXPECT_TRUE(state == "arrived" || (way == "back" && state == "homing")) << steps.back();
     EXPECT_EQ(steps.back()["snapshot"], way == "back" ? json(1) : chain["snapshots"]) << way;
     EXPECT_NEAR(steps.back()["pose"]["x_m"].get<double>(), way == "back" ? 0.0 : 4.0, 0.4) << way;
+  }
+}
+
+// The trajectory, the record and the page of a run hold the same poses as its answers.
+TEST_F(ChainVerbs, OutputsHoldThePosesOfTheAnswers) {
+  (void)record({"--name", "home", "--method", "chain"});
+  const std::string memory = folder_ / "m.panonav";
+  const std::string tum = folder_ / "run.csv";
+  const std::string mcap = folder_ / "run.mcap";
+  const std::vector<json> steps =
+      answers_of({"route", "follow", memory, folder_ / "teach", "--json", "--tum", tum, "--record",
+                  mcap, "--report", folder_ / "followed"});
+  ASSERT_GT(steps.size(), 10U);
+
+  const auto trajectory = read_trajectory(tum);
+  ASSERT_EQ(trajectory.size(), steps.size());
+  std::vector<Pose2> recorded;
+  for_each_message<recordings::ros::PoseWithCovarianceStamped>(
+      mcap, "/pose", [&](const recordings::ros::PoseWithCovarianceStamped& pose) {
+        recorded.push_back(recordings::ros::to_pose2(pose.pose.pose));
+      });
+  ASSERT_EQ(recorded.size(), steps.size());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const double x_m = steps[i]["pose"]["x_m"];
+    EXPECT_NEAR(trajectory[i].pose.x_m, x_m, 1e-9);
+    EXPECT_EQ(recorded[i].x_m, x_m);
+  }
+  for_each_message<recordings::ros::Path>(
+      mcap, "/plan", [](const recordings::ros::Path& path) { EXPECT_GE(path.poses.size(), 2U); });
+
+  const std::string page = bytes_of(folder_ / "followed/index.html");
+  EXPECT_EQ(plots_of(page), (std::vector<std::string>{"Map", "Snapshot to which the robot moves"}));
+  const json run = panels_of(page).front().data;
+  ASSERT_EQ(run["moments"].size(), steps.size());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    EXPECT_EQ(run["moments"][i]["state"], steps[i]["state"]);
   }
 }
 

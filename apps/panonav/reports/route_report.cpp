@@ -1,6 +1,7 @@
 #include "reports/route_report.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -183,6 +184,43 @@ std::vector<viewer::RouteMark> make_marks(const std::vector<FollowedImage>& imag
   return marks;
 }
 
+viewer::MapPlot draw_chain(const SnapshotChain& chain, const std::vector<ChainStep>& steps) {
+  viewer::MapLayer legs{.label = "stored route", .colour = viewer::PlotColour::grey};
+  viewer::MapLayer snapshots{.label = "snapshots", .colour = viewer::PlotColour::black};
+  legs.lines.emplace_back();
+  for (const ChainNode& node : chain.nodes()) {
+    legs.lines.back().push_back(node.position);
+    if (node.has_snapshot()) snapshots.squares.push_back(node.position);
+  }
+  constexpr std::array colours{viewer::PlotColour::blue, viewer::PlotColour::green,
+                               viewer::PlotColour::orange, viewer::PlotColour::purple,
+                               viewer::PlotColour::vermilion};
+  constexpr std::array states{ChainState::travelling, ChainState::homing, ChainState::searching,
+                              ChainState::arrived, ChainState::lost};
+  viewer::MapPlot plot{.title = "Map", .layers = {legs, snapshots}};
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    viewer::MapLayer layer{.label = to_string(states[i]), .colour = colours[i]};
+    const bool is_end = states[i] == ChainState::arrived || states[i] == ChainState::lost;
+    for (const ChainStep& step : steps) {
+      if (step.decision.state != states[i]) continue;
+      (is_end ? layer.crosses : layer.dots).push_back(step.pose.position());
+    }
+    plot.layers.push_back(std::move(layer));
+  }
+  return plot;
+}
+
+viewer::LinePlot draw_snapshot_numbers(const std::vector<ChainStep>& steps) {
+  viewer::Series series{.label = "", .style = viewer::SeriesStyle::lines_and_points};
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    series.add(static_cast<double>(i + 1), static_cast<double>(steps[i].snapshot));
+  }
+  return {.title = "Snapshot to which the robot moves",
+          .x_label = "image",
+          .y_label = "snapshot",
+          .series = {series}};
+}
+
 void add_median_figure(std::vector<std::pair<std::string, std::string>>& figures,
                        const std::vector<double>& errors, double scale, int digits,
                        const std::string& unit, const std::string& meaning) {
@@ -293,6 +331,34 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
     }
     page.add_table({"from", "to"}, rows);
   }
+  page.write(folder, "index.html", "panonav route follow");
+}
+
+void write_chain_report(const std::filesystem::path& folder, const std::string& name,
+                        const SnapshotChain& chain, const std::vector<ChainStep>& steps,
+                        const viewer::RunPage& replay_page) {
+  const ChainStep& last = steps.back();
+  const ChainSummary summary = summarise_chain(chain);
+  viewer::ReportPage page(
+      "Following route '" + name + "'",
+      "A robot drove along a chain of snapshots: a few small views, with straight legs by odometry "
+      "between them. It travels by odometry to the next snapshot, and then compares its view with "
+      "the stored one to move to the place where that was taken. A snapshot that is not where "
+      "odometry expects it is searched for along a spiral.");
+  page.add_figures({{to_string(last.decision.state), "after the last image"},
+                    {std::to_string(last.snapshot) + " of " + std::to_string(summary.snapshots),
+                     "snapshot to which it moved"},
+                    {format_fixed(summary.length_m, 1) + " m", "long"},
+                    {std::to_string(summary.bytes) + " bytes", "for the whole route"}});
+  page.begin_section("The run, image by image");
+  page.add_text(
+      "The map shows the chain, its snapshots and the estimated path of the robot; the facts name "
+      "the snapshot to which it moves, and its next motion.");
+  page.add_run(replay_page);
+  page.begin_section("Route");
+  page.add_plots({{draw_chain(chain, steps),
+                   "The chain, and the positions of the robot by odometry and snapshots"},
+                  {draw_snapshot_numbers(steps), "Progress along the chain"}});
   page.write(folder, "index.html", "panonav route follow");
 }
 

@@ -8,6 +8,7 @@
 #include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav_viewer/page.hpp"
+#include "runs/chain_run.hpp"
 #include "runs/followed_run.hpp"
 
 namespace panonav::command {
@@ -30,5 +31,12 @@ struct FollowedRoute {
 void write_follow_report(const std::filesystem::path& folder, const FollowedRoute& route,
                          const std::vector<FollowedImage>& images, const FollowSummary& summary,
                          viewer::RunPage replay_page);
+
+/// Writes a page with a replay of a run along a chain of snapshots, a map with the chain and the
+/// estimated path, and the snapshot of each image. `replay_page` has a moment for each step. Throws
+/// FileError.
+void write_chain_report(const std::filesystem::path& folder, const std::string& name,
+                        const SnapshotChain& chain, const std::vector<ChainStep>& steps,
+                        const viewer::RunPage& replay_page);
 
 }  // namespace panonav::command

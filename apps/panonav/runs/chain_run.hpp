@@ -1,11 +1,15 @@
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/chain_route.hpp"
+#include "runs/run_record.hpp"
 
 namespace panonav::command {
 
@@ -25,10 +29,21 @@ struct NamedChain {
 void record_chain_run(const NamedChain& chain, MemoryFile& memory, const DrivePoses& drive,
                       std::size_t images, const ChainSpacing& spacing, Session& session);
 
+/// One image of a run along a chain, and the motion that follows from it.
+struct ChainStep {
+  std::size_t index = 0;  ///< in the data set, from 0
+  std::string file;
+  std::optional<double> stamp_s;
+  ChainDecision decision;
+  std::size_t snapshot = 0;  ///< from 1
+  Pose2 pose;                ///< in the frame of the chain
+};
+
 /// Prints for every N-th image of a run the motion of a robot that follows the chain, until it has
-/// arrived or is lost. Images without odometry are skipped. Throws FileError if fewer than two
-/// images have odometry. Exit code: no answer if lost.
-[[nodiscard]] ExitCode follow_chain_run(ChainGuide& guide, const Dataset& run, int every_nth,
-                                        Session& session);
+/// arrived or is lost, and adds it to the record. Images without odometry are skipped. Throws
+/// FileError if fewer than two images have odometry.
+[[nodiscard]] std::vector<ChainStep> follow_chain_run(ChainGuide& guide, const Dataset& run,
+                                                      int every_nth, RunRecord& record,
+                                                      Session& session);
 
 }  // namespace panonav::command

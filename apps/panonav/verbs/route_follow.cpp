@@ -151,12 +151,32 @@ void write_fixes(const std::string& path, const std::vector<FollowedImage>& imag
 ExitCode follow_chain(const Arguments& declared, const FollowArguments& arguments,
                       const MemoryFile& memory, const std::string& name, const Dataset& run,
                       Session& session) {
-  declared.reject_options({"--no-odometry", "--tum", "--report", "--record", "--view",
-                           "[route_tracker]", "[route_fit]"},
+  declared.reject_options({"--no-odometry", "[route_tracker]", "[route_fit]"},
                           "as the route '" + name + "' is a chain of snapshots");
   ChainGuide guide(memory, run.source, name,
                    arguments.back ? ChainDirection::back : ChainDirection::forward);
-  return follow_chain_run(guide, run, arguments.every, session);
+  std::vector<double> seconds;
+  if (arguments.tum)
+    seconds = trajectory_stamps(run, "route follow", arguments.dataset, *arguments.tum, session);
+  if (arguments.report) prepare_report_folder(*arguments.report, "route follow");
+  RunRecord record(arguments.record, std::array{arguments.dataset, arguments.memory}, false,
+                   session, {});
+  viewer::RunPage replay_page("", run.entries.size() / static_cast<std::size_t>(arguments.every));
+  if (arguments.report) record.copy_to(replay_page);
+  const std::vector<ChainStep> steps =
+      follow_chain_run(guide, run, arguments.every, record, session);
+  if (arguments.tum) {
+    std::vector<StampedPose> trajectory;
+    for (const ChainStep& step : steps) {
+      append_pose(trajectory, {seconds[step.index], step.pose}, *arguments.tum, step.file);
+    }
+    write_trajectory(*arguments.tum, trajectory, find_trajectory_units(run, LengthUnit::metres));
+  }
+  if (arguments.report) {
+    write_chain_report(*arguments.report, name, guide.chain(), steps, replay_page);
+    print_report_path(*arguments.report, session);
+  }
+  return steps.back().decision.state == ChainState::lost ? ExitCode::no_answer : ExitCode::done;
 }
 
 ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments, Session& session) {
