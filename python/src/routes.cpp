@@ -285,8 +285,40 @@ void bind_chain_records(py::module_& m) {
       .field("pose", &ChainStep::pose, "Estimated pose in the frame of the chain.");
 }
 
+void bind_chain_guide(py::module_& m) {
+  using SharedGuide = Shared<ChainGuide>;
+  py::class_<SharedGuide>(m, "ChainGuide",
+                          "Leads a robot along a chain of snapshots: takes an image with its "
+                          "odometry, returns the next motion.")
+      .def(py::init([](const std::filesystem::path& memory, const std::optional<std::string>& name,
+                       const std::optional<PictureSource>& source, bool back,
+                       const py::kwargs& keywords) {
+             ChainFollowerOptions options;
+             Keywords(keywords).options(options).finish();
+             const py::gil_scoped_release free;
+             return std::make_unique<SharedGuide>(MemoryFile::open(memory, Access::read_only),
+                                                  source, name, choose_direction(back), options);
+           }),
+           py::arg("memory"), py::arg("name") = py::none(), py::arg("source") = py::none(),
+           py::kw_only(), py::arg("back") = false,
+           append_option_list("`name`: of the route; None: the only one. `back`: from its end to "
+                              "its beginning.",
+                              {options_of<ChainFollowerOptions>()})
+               .c_str())
+      .def(
+          "step",
+          [](SharedGuide& guide, const py::object& observation) {
+            const Observation current = to_observation(observation);
+            return guide.change([&](ChainGuide& g) { return make_chain_step(g, current); });
+          },
+          py::arg("observation"),
+          "Decides the next motion, to be carried out before the next observation. The "
+          "observation needs odometry. After 'arrived' or 'lost' all decisions are the same.");
+}
+
 void bind_chains(py::module_& m) {
   bind_chain_records(m);
+  bind_chain_guide(m);
   m.def(
       "record_chain",
       [](const std::filesystem::path& memory, const py::object& recording, const std::string& name,

@@ -402,6 +402,10 @@ def test_chains(tmp_path):
             line["name"] = line.pop("file")
             del line["stamp_s"]
         assert steps == followed
+        # A live robot gets the same motions, one observation at a time.
+        entries = panonav.Dataset(drive)
+        guide = panonav.ChainGuide(memory, source=entries.source, back=back)
+        assert [guide.step(entry).to_dict() for entry in entries][: len(steps)] == followed
     with pytest.raises(panonav.FileError, match="is a chain of snapshots"):
         panonav.follow_route(memory, drive)
 
