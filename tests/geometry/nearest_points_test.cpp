@@ -32,5 +32,22 @@ TEST(NearestPoints, AreThoseOfAFullScan) {
   }
 }
 
+TEST(NearestPoints, CopiesOfAPositionCountOnce) {
+  // Copies differ by rounding, also across a border of cells of the comparison (at 0).
+  const std::vector<Point2> points{{0.0, 0.0}, {-1e-17, 1e-17}, {1e-17, 0.0},
+                                   {3.0, 4.0}, {3.0, 4.0},      {3.0, 10.0},
+                                   {0.0, 1.0}, {3.0, 5.0},      {3.0 + 1e-12, 4.0}};
+  const std::vector<std::size_t> groups{0, 0, 0, 0, 0, 0, 1, 2, 0};
+  std::vector<double> distances = distances_between_nearest_positions(points, groups);
+  std::ranges::sort(distances);
+  ASSERT_EQ(distances.size(), 3U);
+  EXPECT_NEAR(distances[0], 5.0, 1e-9);
+  EXPECT_NEAR(distances[1], 5.0, 1e-9);
+  EXPECT_NEAR(distances[2], 6.0, 1e-9);
+  EXPECT_TRUE(distances_between_nearest_positions({}, {}).empty());
+  const std::vector<Point2> origin(5);
+  EXPECT_TRUE(distances_between_nearest_positions(origin, std::vector<std::size_t>(5, 0)).empty());
+}
+
 }  // namespace
 }  // namespace panonav

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
+#include <tuple>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -47,6 +49,37 @@ std::vector<std::vector<std::size_t>> nearest_points(std::span<const Point2> poi
     for (const auto& [unused, other] : best) result[here].push_back(other);
   }
   return result;
+}
+
+std::vector<double> distances_between_nearest_positions(std::span<const Point2> points,
+                                                        std::span<const std::size_t> group) {
+  require(group.size() == points.size(), "size of group", static_cast<double>(group.size()),
+          "the number of points");
+  constexpr double relative_tolerance = 1e-6;  // a millimetre in a kilometre (chosen)
+  double largest = 0.0;
+  for (const Point2& point : points)
+    largest = std::max({largest, std::abs(point.x_m), std::abs(point.y_m)});
+  const double tolerance = relative_tolerance * largest;
+  if (!(tolerance > 0.0)) return {};  // all points are at 0
+  std::vector<Point2> positions;
+  std::vector<std::size_t> groups;
+  std::set<std::tuple<std::size_t, double, double>> known;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::tuple cell{group[i], std::round(points[i].x_m / tolerance),
+                          std::round(points[i].y_m / tolerance)};
+    if (!known.insert(cell).second) continue;
+    positions.push_back(points[i]);
+    groups.push_back(group[i]);
+  }
+  const auto nearest = nearest_points(positions, groups, 1);
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    if (nearest[i].empty()) continue;
+    const double apart = distance(positions[i], positions[nearest[i].front()]);
+    // Points of one position may lie on both sides of a border between cells.
+    if (apart > tolerance) distances.push_back(apart);
+  }
+  return distances;
 }
 
 }  // namespace panonav

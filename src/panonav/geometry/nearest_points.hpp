@@ -14,4 +14,11 @@ namespace panonav {
 [[nodiscard]] std::vector<std::vector<std::size_t>> nearest_points(
     std::span<const Point2> points, std::span<const std::size_t> group, std::size_t count);
 
+/// Returns, for each position of a group, its distance from the nearest other one, in no order.
+/// Several points at one position count once: those that differ by no more than 1e-6 of the largest
+/// coordinate, as a solver leaves between equal views that springs hold together. Throws and costs
+/// as `nearest_points`.
+[[nodiscard]] std::vector<double> distances_between_nearest_positions(
+    std::span<const Point2> points, std::span<const std::size_t> group);
+
 }  // namespace panonav

@@ -353,7 +353,7 @@ class Arranger {
   }
 
   /// Scales the layout to metres where there is motion, else to a median distance of 1 between
-  /// nearest views.
+  /// nearest positions.
   void rescale_layout() {
     const auto scale = lattice_.metric ? motions_.layout_scale(layout_.poses) : unit_scale();
     if (!scale) return;
@@ -364,14 +364,8 @@ class Arranger {
     for (auto& spring : lattice_.springs) spring.length *= *scale;
   }
   [[nodiscard]] std::optional<double> unit_scale() const {
-    std::vector<double> nearest;
-    const auto near = nearest_nodes(1);
-    for (std::size_t i = 0; i < near.size(); ++i) {
-      if (near[i].empty()) continue;
-      const double length =
-          distance(layout_.poses[i].position(), layout_.poses[near[i].front()].position());
-      if (length > 0.0) nearest.push_back(length);
-    }
+    const std::vector<double> nearest =
+        distances_between_nearest_positions(positions_of(layout_.poses), layout_.components);
     if (nearest.empty()) return std::nullopt;
     return 1.0 / upper_median(nearest);
   }

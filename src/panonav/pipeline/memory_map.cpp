@@ -317,12 +317,7 @@ std::optional<double> compute_view_step(const TopologicalMap& map) {
     points.push_back(node.pose.position());
     components.push_back(node.component);
   }
-  const auto nearest = nearest_points(points, components, 1);
-  std::vector<double> distances;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!nearest[i].empty()) distances.push_back(distance(points[i], points[nearest[i].front()]));
-  }
-  std::erase(distances, 0.0);
+  std::vector<double> distances = distances_between_nearest_positions(points, components);
   if (distances.empty()) return std::nullopt;
   return upper_median_in_place(std::span(distances));
 }
