@@ -79,6 +79,10 @@ TEST_P(ExactSearch, FindsWhatAFullScanFinds) {
     expect_exact(filled, query, top, components, {excluded, {}});
     expect_exact(filled, query, top, components, {{}, rows});
     expect_exact(filled, query, top, components, {excluded, rows});
+
+    const int wide_top = 64 + static_cast<int>(random.index(400));
+    expect_exact(filled, query, wide_top, components, {});
+    expect_exact(filled, query, wide_top, components, {excluded, rows});
   }
 }
 

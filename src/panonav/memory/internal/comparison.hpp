@@ -9,6 +9,7 @@
 #include "panonav/kernels/distance.hpp"
 #include "panonav/memory/internal/aligned_vector.hpp"
 #include "panonav/memory/internal/exact_search.hpp"
+#include "panonav/memory/internal/sketch_index.hpp"
 
 namespace panonav {
 
@@ -46,9 +47,12 @@ class Comparison {
                ? kernels_.l1(view, query_.data() + first, count)
                : kernels_.masked_l1(view, query_.data() + first, mask_.data() + first, count);
   }
-  void prefetch(ViewStore::Row row) const noexcept {
+  void prefetch(ViewStore::Row row) const noexcept { prefetch(row, 0, components_); }
+  /// Prefetches components begin .. end - 1.
+  void prefetch(ViewStore::Row row, int begin, int end) const noexcept {
     const std::uint8_t* const magnitudes = store_.magnitudes(row);
-    for (std::size_t i = 0; i < bytes(); i += 64) __builtin_prefetch(magnitudes + i);
+    for (std::size_t i = begin * component_bytes_; i < end * component_bytes_; i += 64)
+      __builtin_prefetch(magnitudes + i);
   }
 
   [[nodiscard]] const std::uint8_t* query() const noexcept { return query_.data(); }
@@ -110,6 +114,41 @@ class NearestMatches {
   std::size_t top_;
   std::uint32_t limit_;
   std::vector<Match> heap_;  // the furthest in front
+};
+
+/// The nearest views of many, at most `top`: the same as `NearestMatches` in a list that is cut
+/// when it has twice as many, so that each view costs a constant number of steps.
+class NearestMatchList {
+ public:
+  explicit NearestMatchList(std::size_t top) : top_(top) { matches_.reserve(2 * top); }
+
+  void insert_if_nearer(const Match& match) {
+    if (match.dissimilarity > limit_) return;
+    matches_.push_back(match);
+    if (matches_.size() == 2 * top_) keep_nearest();
+  }
+  /// Ignores views beyond `limit`, within which there are at least `top`.
+  void lower_limit(std::uint32_t limit) noexcept { limit_ = std::min(limit_, limit); }
+  /// Drops all but the `top` nearest views.
+  void keep_nearest() {
+    if (matches_.size() < top_) return;
+    const auto last = matches_.begin() + static_cast<std::ptrdiff_t>(top_ - 1);
+    std::ranges::nth_element(matches_, last, is_nearer);
+    limit_ = last->dissimilarity;
+    matches_.erase(last + 1, matches_.end());
+  }
+  /// Largest distance at which a view can still be among the nearest.
+  [[nodiscard]] std::uint32_t limit() const noexcept { return limit_; }
+  [[nodiscard]] std::vector<Match> sorted() && {
+    keep_nearest();
+    std::ranges::sort(matches_, is_nearer);
+    return std::move(matches_);
+  }
+
+ private:
+  std::size_t top_;
+  std::uint32_t limit_ = SketchIndex::no_view;
+  std::vector<Match> matches_;
 };
 
 }  // namespace panonav

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <memory>
+#include <numeric>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -35,6 +37,174 @@ class FineBenefit {
   std::size_t tested_ = 0, passed_ = 0;
 };
 
+/// A search whose limit is beyond the bounds of many views, as that for many views, or for a query
+/// that resembles none: then the views themselves are most of what is read. They are compared in
+/// thirds of their components, the strongest first, with bounds for the rest.
+class WideSearch {
+ public:
+  WideSearch(const SearchedViews& searched, const Comparison& comparison,
+             const SketchIndex::Query& query, const kernels::DistanceKernels& kernels,
+             std::size_t top, SearchResult& result)
+      : searched_(searched),
+        comparison_(comparison),
+        kernels_(kernels),
+        top_(top),
+        result_(result) {
+    for (std::size_t part = 0; part < parts; ++part) {
+      const int first = comparison.components() * static_cast<int>(part) / int{parts};
+      first_component_[part] = first;
+      queries_[part] = query;
+      const std::size_t done = static_cast<std::size_t>(first) * BlockSums::blocks_per_component;
+      std::fill_n(queries_[part].fine_mask.begin(), done, std::uint8_t{0});
+    }
+    first_component_[parts] = comparison.components();
+    bounds_of_rest_.reserve(parts);
+    for (const SketchIndex::Query& rest : queries_)
+      bounds_of_rest_.emplace_back(searched.index, kernels, rest);
+  }
+
+  /// True if there are bounds for parts of the components.
+  [[nodiscard]] static bool is_possible(const SearchedViews& searched,
+                                        const Comparison& comparison) {
+    return searched.index.layout().fine_blocks > 0 && comparison.components() >= int{parts};
+  }
+
+  /// Returns the nearest views, all within `limit`.
+  std::vector<Match> run(std::uint32_t limit) {
+    nearest_.lower_limit(limit);
+    const std::size_t rows = searched_.index.blocks() * SketchIndex::rows_per_block;
+    bounds_.resize(rows);
+    std::vector<std::uint32_t> all(std::min(rows, chunk));
+    std::iota(all.begin(), all.end(), 0U);
+    for (std::size_t first = 0; first < rows; first += chunk) {
+      const std::span here = std::span(all).first(std::min(chunk, rows - first));
+      compute_bounds_of_rest(0, static_cast<Row>(first), here, bounds_.data() + first);
+    }
+    for (const Row row : comparison_.excluded_rows()) bounds_[row] = SketchIndex::no_view;
+
+    // The views with the smallest bounds show the limit; the others are compared with it.
+    constexpr std::size_t min_likely = 512;  // for a small limit
+    const std::uint32_t likely = find_bound_of(std::max(2 * top_, min_likely));
+    for (std::size_t first = 0; first < rows; first += chunk) compare_up_to(likely, first);
+    nearest_.keep_nearest();
+    for (std::size_t first = 0; first < rows; first += chunk) compare_beyond(likely, first);
+    return std::move(nearest_).sorted();
+  }
+
+ private:
+  static constexpr std::size_t parts = 3;
+  static constexpr std::size_t chunk = 1024;
+  static_assert(SketchIndex::rows_per_segment % chunk == 0);
+  /// Distances are below 2^28, bounds of rows without a view `no_view` less the query's rounding.
+  static constexpr std::uint32_t min_bound_without_view = SketchIndex::no_view / 2;
+
+  /// Sets bounds[i] to a lower bound of the distance of row `first` + places[i] over the components
+  /// from part `part` on.
+  void compute_bounds_of_rest(std::size_t part, Row first, std::span<const std::uint32_t> places,
+                              std::uint32_t* bounds) {
+    result_.bytes_read += places.size() * bounds_of_rest_[part].bytes();
+    bounds_of_rest_[part](first, places, bounds);
+  }
+
+  /// Returns a bound that at least `count` rows do not exceed, and not many more.
+  [[nodiscard]] std::uint32_t find_bound_of(std::size_t count) const {
+    std::uint32_t largest = 0;
+    for (const std::uint32_t bound : bounds_) {
+      if (bound < min_bound_without_view) largest = std::max(largest, bound);
+    }
+    constexpr int counted_bits = 12;
+    const int shift = std::max(0, static_cast<int>(std::bit_width(largest)) - counted_bits);
+    std::vector<std::size_t> counts((largest >> shift) + 1);
+    for (const std::uint32_t bound : bounds_) {
+      if (bound < min_bound_without_view) ++counts[bound >> shift];
+    }
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      found += counts[i];
+      if (found >= count) return static_cast<std::uint32_t>(((i + 1) << shift) - 1);
+    }
+    return largest;
+  }
+
+  void insert(Row row, std::uint32_t distance) {
+    ++result_.views_in_full;
+    nearest_.insert_if_nearer({searched_.view_of_row[row], distance});
+  }
+
+  /// Compares the rows of a chunk with bounds of at most `likely`.
+  void compare_up_to(std::uint32_t likely, std::size_t first) {
+    const std::size_t count = std::min(chunk, bounds_.size() - first);
+    const std::size_t found =
+        kernels_.collect_at_most(bounds_.data() + first, count, likely, places_.data());
+    for (std::size_t i = 0; i < found; ++i) {
+      if (i + 1 < found) comparison_.prefetch(static_cast<Row>(first + places_[i + 1]));
+      const Row row = static_cast<Row>(first + places_[i]);
+      result_.bytes_read += comparison_.bytes();
+      insert(row, comparison_.distance(row));
+    }
+  }
+
+  /// Compares the rows of a chunk with bounds above `likely` and within the limit.
+  void compare_beyond(std::uint32_t likely, std::size_t first) {
+    const std::size_t count = std::min(chunk, bounds_.size() - first);
+    std::size_t found =
+        kernels_.collect_at_most(bounds_.data() + first, count, nearest_.limit(), places_.data());
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < found; ++i) {
+      if (bounds_[first + places_[i]] > likely) places_[left++] = places_[i];
+    }
+    std::fill_n(distances_.begin(), left, 0U);
+    for (std::size_t part = 0; part < parts && left > 0; ++part)
+      left = compare_part(part, first, left);
+    for (std::size_t i = 0; i < left; ++i) {
+      insert(static_cast<Row>(first + places_[i]), distances_[i]);
+    }
+  }
+
+  /// Adds the distances over a part of the components to the first `count` rows, and keeps those
+  /// that may be within the limit; returns their number.
+  std::size_t compare_part(std::size_t part, std::size_t first, std::size_t count) {
+    const int begin = first_component_[part];
+    const int end = first_component_[part + 1];
+    result_.bytes_read +=
+        count * static_cast<std::size_t>(end - begin) * comparison_.component_bytes();
+    std::fill_n(rest_.begin(), count, 0U);
+    // Tries bounds again from time to time, as the limit falls.
+    constexpr std::size_t retry = 16;
+    const bool has_rest = part + 1 < parts && (is_worthwhile_[part] || first / chunk % retry == 0);
+    if (has_rest) {
+      compute_bounds_of_rest(part + 1, static_cast<Row>(first), std::span(places_).first(count),
+                             rest_.data());
+    }
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (i + 1 < count) comparison_.prefetch(static_cast<Row>(first + places_[i + 1]), begin, end);
+      const std::uint32_t distance =
+          distances_[i] +
+          comparison_.partial_distance(static_cast<Row>(first + places_[i]), begin, end);
+      if (distance + rest_[i] > nearest_.limit()) continue;
+      places_[left] = places_[i];
+      distances_[left++] = distance;
+    }
+    if (has_rest) is_worthwhile_[part] = 8 * left <= 7 * count;
+    return left;
+  }
+
+  const SearchedViews& searched_;
+  const Comparison& comparison_;
+  const kernels::DistanceKernels& kernels_;
+  std::size_t top_;
+  SearchResult& result_;
+  std::array<int, parts + 1> first_component_{};
+  std::array<SketchIndex::Query, parts> queries_;  // of the components from each part on
+  std::vector<SketchIndex::FineBounds> bounds_of_rest_;
+  std::vector<std::uint32_t> bounds_;  // of rows
+  NearestMatchList nearest_{top_};
+  std::array<std::uint32_t, chunk + 16> places_{};  // of rows in a chunk
+  std::array<std::uint32_t, chunk> distances_{}, rest_{};
+  std::array<bool, parts> is_worthwhile_{};  // bounds after a part saved an eighth of the views
+};
+
 class Search {
  public:
   Search(const SearchedViews& searched, const Comparison& comparison,
@@ -60,7 +230,12 @@ class Search {
     result_.bytes_read += std::uint64_t{rows} * searched_.index.coarse_bytes_per_row(query_);
     for (const Row row : comparison_.excluded_rows()) bounds_[row] = SketchIndex::no_view;
 
-    NearestMatches nearest(top_, find_first_limit());
+    const std::uint32_t limit = find_first_limit();
+    if (WideSearch::is_possible(searched_, comparison_) && is_beyond_coarse_bounds(limit) &&
+        can_exclude_by_fine_bounds(limit)) {
+      return WideSearch(searched_, comparison_, query_, kernels_, top_, result_).run(limit);
+    }
+    NearestMatches nearest(top_, limit);
     scan(nearest);
     return std::move(nearest).sorted();
   }
@@ -70,6 +245,28 @@ class Search {
     result_.bytes_read += comparison_.bytes();
     ++result_.views_in_full;
     return comparison_.distance(row);
+  }
+
+  /// True if more than an eighth (chosen) of all coarse bounds are within the limit.
+  [[nodiscard]] bool is_beyond_coarse_bounds(std::uint32_t limit) const {
+    const auto within =
+        std::ranges::count_if(bounds_, [limit](std::uint32_t bound) { return bound <= limit; });
+    return 8 * static_cast<std::size_t>(within) > bounds_.size();
+  }
+
+  /// True if fine bounds exclude more than an eighth of the rows that coarse ones do not, judged by
+  /// rows in the middle. Those of random numbers exclude none.
+  [[nodiscard]] bool can_exclude_by_fine_bounds(std::uint32_t limit) {
+    constexpr std::size_t tested = 256;
+    const std::size_t first = bounds_.size() / 2 / tested * tested;
+    std::array<std::uint32_t, tested + 16> places{};
+    std::array<std::uint32_t, tested> bounds{};
+    const std::size_t found = kernels_.collect_at_most(
+        bounds_.data() + first, std::min(tested, bounds_.size() - first), limit, places.data());
+    compute_fine_bounds(static_cast<Row>(first), std::span(places).first(found), bounds.data());
+    const auto within = std::ranges::count_if(
+        std::span(bounds).first(found), [limit](std::uint32_t bound) { return bound <= limit; });
+    return 8 * static_cast<std::size_t>(within) < 7 * found;
   }
 
   /// Computes the fine bounds of rows first + places[i], all in one segment.
@@ -204,10 +401,15 @@ SearchResult exact_search(const SearchedViews& searched, const PackedSignature& 
   if (searched.index.layout().has_sketches() && views / min_views_per_match >= top) {
     const SketchIndex::Query sketch =
         searched.index.make_query(comparison.query(), comparison.components(), mask.allowed_rows);
-    result.matches = Search(searched, comparison, sketch, kernels, top, result).run();
+    // For so many matches the limit is beyond most bounds (chosen).
+    constexpr std::size_t min_wide_top = 64;
+    result.matches = top >= min_wide_top && WideSearch::is_possible(searched, comparison)
+                         ? WideSearch(searched, comparison, sketch, kernels, top, result)
+                               .run(SketchIndex::no_view)
+                         : Search(searched, comparison, sketch, kernels, top, result).run();
     return result;
   }
-  NearestMatches nearest(top, SketchIndex::no_view);
+  NearestMatchList nearest(top);
   for (std::size_t i = 0; i < searched.views.size(); ++i) {
     const Row row = searched.rows[i];
     if (comparison.is_excluded(row)) continue;
