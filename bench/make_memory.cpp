@@ -95,6 +95,8 @@ class Room {
   /// Renders the view of a camera at a pose in the room; `noise` draws the noise of the camera.
   [[nodiscard]] Panorama render(const Pose2& pose, Random& noise) const {
     Panorama view(rows, columns, elevations);
+    std::vector<double> slopes;  // of the rows
+    for (int y = 0; y < rows; ++y) slopes.push_back(std::tan(view.elevation_rad(y)));
     for (int c = 0; c < columns; ++c) {
       const double azimuth_rad = pose.heading_rad + view.azimuth_rad(c);
       const double along_x = std::cos(azimuth_rad);
@@ -107,7 +109,7 @@ class Room {
           is_x_wall ? (along_x > 0.0 ? 0.0 : side_m) + pose.y_m + wall_m * along_y
                     : (along_y > 0.0 ? 2.0 : 3.0) * side_m + pose.x_m + wall_m * along_x;
       for (int y = 0; y < rows; ++y) {
-        const double slope = std::tan(view.elevation_rad(y));
+        const double slope = slopes[static_cast<std::size_t>(y)];
         const double at_wall_m = camera_height_m + wall_m * slope;
         const double surface_m =
             at_wall_m < 0.0 ? -camera_height_m / slope : (height_m - camera_height_m) / slope;

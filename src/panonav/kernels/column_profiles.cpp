@@ -16,7 +16,7 @@ namespace {
 void require_view(std::size_t values, int bands) {
   constexpr auto view_size = static_cast<std::size_t>(profile_view_stride * matched_bands);
   require(values == view_size, "values of the view", static_cast<double>(values),
-          to_text(static_cast<double>(view_size)));
+          "16 bands with their stride");
   require(bands >= 0 && bands <= matched_bands, "bands", bands, "0 to 16");
 }
 

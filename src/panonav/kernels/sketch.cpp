@@ -8,7 +8,7 @@ namespace panonav::kernels {
 EncodedSums encode_sums(std::span<const std::int32_t> sums, const SumScale& scale,
                         std::uint8_t* codes, std::size_t stride, Instructions instructions) {
   require(sums.size() == 8 * scale.groups, "sums", static_cast<double>(sums.size()),
-          to_text(static_cast<double>(8 * scale.groups)));
+          "8 for each group");
   return with_body<SketchBody>(
       instructions, [&](auto body) { return body.encode_sums(sums.data(), scale, codes, stride); });
 }

@@ -163,14 +163,17 @@ void VisualMemory::append_with_id(ViewId id, std::span<const std::uint8_t> magni
   Implementation& memory = *implementation_;
   require_signature(magnitudes, phases, memory.shape);
   validate(info);
+  if (id.value < memory.next_id) {
+    throw ContractError("view id", id.value, ">= " + std::to_string(memory.next_id) + ", ids grow");
+  }
+  // The slot of the name is in no cache when a memory is loaded: it arrives while bytes are copied.
+  memory.names.prefetch(info.name);
+  const Row row = memory.store.add(magnitudes, phases);
   if (memory.names.find(info.name, memory.name_of_row())) {
+    memory.store.free(row);
     throw ContractError("view name", "\"" + info.name + "\", which the memory already contains",
                         "a name that is unique");
   }
-  require(id.value >= memory.next_id, "view id", id.value,
-          ">= " + std::to_string(memory.next_id) + ", ids grow");
-
-  const Row row = memory.store.add(magnitudes, phases);
   if (row == memory.records.size()) {
     memory.records.push_back(std::move(info));
     memory.view_of_row.push_back(id);

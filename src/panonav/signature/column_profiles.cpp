@@ -186,19 +186,24 @@ ProfileBlur::ProfileBlur(int rows, const ElevationBand& elevations, double blur_
 
 ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
                                std::span<const std::uint8_t> allowed_rows) {
-  require(components >= 0 && components <= signature.shape.components, "components", components,
-          "0 (all) or 1 .. " + to_text(signature.shape.components));
-  require(
-      allowed_rows.empty() || allowed_rows.size() == static_cast<std::size_t>(signature.shape.rows),
-      "allowed rows", static_cast<double>(allowed_rows.size()), to_text(signature.shape.rows));
+  // Texts are made only for errors: a search makes the profiles of thousands of views.
+  if (components < 0 || components > signature.shape.components) {
+    throw ContractError("components", components,
+                        "0 (all) or 1 .. " + to_text(signature.shape.components));
+  }
+  const auto rows = static_cast<std::size_t>(signature.shape.rows);
+  if (!allowed_rows.empty() && allowed_rows.size() != rows) {
+    throw ContractError("allowed rows", static_cast<double>(allowed_rows.size()),
+                        to_text(signature.shape.rows));
+  }
   if (components == 0) components = signature.shape.components;
   fill(Bands(signature, std::min(components, max_components), allowed_rows).waves());
 }
 
 ColumnProfiles::ColumnProfiles(const PackedSignature& signature, const ProfileBlur& blur) {
   const auto rows = static_cast<int>(blur.weights_.size()) / bands;
-  require(signature.shape.rows == rows, "rows of a blurred view", signature.shape.rows,
-          to_text(rows));
+  if (signature.shape.rows != rows)
+    throw ContractError("rows of a blurred view", signature.shape.rows, to_text(rows));
   fill(Bands(signature, blur.weights_, blur.damping_).waves());
 }
 

@@ -23,10 +23,14 @@ void require_signature(const PackedSignature& signature, SignatureShape shape) {
 
 void require_signature(std::span<const std::uint8_t> magnitudes,
                        std::span<const std::uint8_t> phases, SignatureShape shape) {
-  require(magnitudes.size() == shape.size(), "number of packed magnitudes",
-          static_cast<double>(magnitudes.size()), to_text(static_cast<double>(shape.size())));
-  require(phases.size() == shape.size(), "number of packed phases",
-          static_cast<double>(phases.size()), to_text(static_cast<double>(shape.size())));
+  // The text is made only for an error, as a memory is loaded view by view.
+  const auto require_size = [&](std::size_t size, const char* name) {
+    if (size == shape.size()) return;
+    throw ContractError(name, static_cast<double>(size),
+                        to_text(static_cast<double>(shape.size())));
+  };
+  require_size(magnitudes.size(), "number of packed magnitudes");
+  require_size(phases.size(), "number of packed phases");
 }
 
 int resolve_components(int components, SignatureShape shape) {

@@ -16,6 +16,10 @@ class NameIndex {
  public:
   using Row = std::uint32_t;
 
+  /// Starts to load the slot of a name, which is found soon.
+  void prefetch(std::string_view name) const noexcept {
+    if (!slots_.empty()) __builtin_prefetch(&slots_[hash_name(name) & (slots_.size() - 1)]);
+  }
   template <class NameOf>
   [[nodiscard]] std::optional<Row> find(std::string_view name, const NameOf& name_of) const {
     if (slots_.empty()) return std::nullopt;

@@ -1,6 +1,7 @@
 #include "panonav/memory/internal/sketch_index.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 #include <cstring>
 #include <numeric>
@@ -20,19 +21,41 @@ std::size_t group_count(std::size_t dimensions) {
   return (dimensions + group_bytes - 1) / group_bytes;
 }
 
+/// The sums of two neighbours of eight bytes each, in 16 bits.
+std::uint64_t sum_pairs(std::uint64_t eight) {
+  constexpr std::uint64_t even = 0x00FF00FF00FF00FFU;
+  return (eight & even) + ((eight >> 8U) & even);
+}
+
+std::uint64_t load_eight(const std::uint8_t* bytes) {
+  std::uint64_t eight = 0;
+  std::memcpy(&eight, bytes, sizeof eight);
+  return eight;
+}
+
 /// The sum of `count` bytes.
 std::int32_t sum_bytes(const std::uint8_t* bytes, int count) {
+  constexpr int width = 8;
   std::int32_t sum = 0;
-  int i = 0;
-  for (; i + 8 <= count; i += 8) {
-    // Adds eight bytes at once in pairs; the product gathers the four pairs in the highest 16 bits.
-    std::uint64_t eight = 0;
-    std::memcpy(&eight, bytes + i, 8);
-    constexpr std::uint64_t even = 0x00FF00FF00FF00FFU;
-    const std::uint64_t pairs = (eight & even) + ((eight >> 8U) & even);
-    sum += static_cast<std::int32_t>((pairs * 0x0001000100010001U) >> 48U);
+  if (count < width) {
+    for (int i = 0; i < count; ++i) sum += bytes[i];
+    return sum;
   }
-  for (; i < count; ++i) sum += bytes[i];
+  // A product gathers the four pairs in the highest 16 bits.
+  constexpr std::uint64_t each_pair = 0x0001000100010001U;
+  const int rest = count % width;
+  std::uint64_t pairs = 0;
+  if (rest > 0) {
+    // Eight bytes that end with the last one, without those that the words below contain.
+    const std::uint64_t last = load_eight(bytes + count - width);
+    const int others = 8 * (width - rest);
+    pairs = sum_pairs(std::endian::native == std::endian::little ? last >> others : last << others);
+  }
+  for (int i = 0; i + width <= count; i += width) {
+    pairs += sum_pairs(load_eight(bytes + i));
+    sum += static_cast<std::int32_t>((pairs * each_pair) >> 48U);
+    pairs = 0;
+  }
   return sum;
 }
 
