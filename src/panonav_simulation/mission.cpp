@@ -190,24 +190,6 @@ RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose
 
 namespace {
 
-// Drives to a point until the robot arrives or time runs out; true if contact stopped it.
-bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, double distance_m) {
-  Point2 target{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
-  constexpr double near_m = 0.003;
-  const double max_duration_s =
-      2.0 * (std::numbers::pi / base.turn_rad_s + distance_m / base.speed_m_s) + 1.0;
-  for (double time_s = 0.0; time_s < max_duration_s; time_s += base.period_s) {
-    const double left_m = std::hypot(target.x_m, target.y_m);
-    if (left_m <= near_m) return false;
-    const Velocity velocity =
-        compute_command_towards(std::atan2(target.y_m, target.x_m), left_m, base);
-    robot.command(velocity);
-    if (robot.take_contact()) return true;
-    target = inverse(integrate_velocity(velocity, base.period_s)) * target;
-  }
-  return false;
-}
-
 // Drives past obstacles, by the nearest free direction; after a contact before half of the distance
 // it backs off and tries the next one. True if an obstacle stopped the robot for good.
 bool drive_past_obstacles(MissionRobot& robot, const BaseOptions& base, double direct_rad,
@@ -219,7 +201,7 @@ bool drive_past_obstacles(MissionRobot& robot, const BaseOptions& base, double d
     const double before_m = robot.travelled_m();
     const double heading_rad = robot.odometry().heading_rad;
     const double length_m = (*free_rad == direct_rad ? 1.0 : 0.5) * distance_m;
-    if (!drive(robot, base, *free_rad, length_m)) return false;
+    if (!drive_step(robot, base, *free_rad, length_m)) return false;
     if (robot.obstacle_sensor() == ObstacleSensor::truth) return true;
     const bool has_advanced = robot.travelled_m() - before_m >= 0.5 * length_m;
     robot.back_off();

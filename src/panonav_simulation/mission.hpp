@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -102,6 +103,11 @@ class MissionRobot final : public RobotBase {
   [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double distance_m);
   /// Returns true if the robot was stopped by contact since the last call.
   [[nodiscard]] bool take_contact() noexcept;
+  /// Returns the direction of the last contact in the robot frame, as one of the bumper's eight.
+  [[nodiscard]] double contact_rad() const noexcept { return contact_rad_; }
+  /// Measures the ring of ranges (`measure_ranges`). The border of the map is a wall that touches a
+  /// robot whose centre is on it.
+  [[nodiscard]] std::array<double, sensor_directions> read_ranges();
   /// Drives back a little, against the command that led to the last contact.
   void back_off();
   [[nodiscard]] ObstacleSensor obstacle_sensor() const noexcept { return sensor_; }
@@ -130,11 +136,16 @@ class MissionRobot final : public RobotBase {
   ObstacleMemory known_;
   std::size_t contacts_ = 0;
   Velocity contact_velocity_;  // the command of the last contact
+  double contact_rad_ = 0.0;   // its direction
   int detour_side_ = 0;        // side of the last detour: 1 left, -1 right, 0 none
   bool obstacle_ = false;
   double travelled_m_ = 0.0;
   Pose2 odometry_;
 };
+
+/// Drives `distance_m` towards `direct_rad`, in the robot frame, until time runs out or contact
+/// ends the step, which returns true.
+bool drive_step(MissionRobot& robot, const BaseOptions& base, double direct_rad, double distance_m);
 
 struct MissionOptions {
   NavigatorOptions navigator;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "panonav/geometry/angles.hpp"
@@ -56,8 +57,9 @@ void MissionRobot::command(const Velocity& velocity) {
     pose_.heading_rad = there.heading_rad;
     odometry_ = odometry_ * rotation;
     known_.move(rotation);
-    const double contact_rad = sense_contact_rad(*space_, people_, there, robot_radius_m_);
-    known_.add({robot_radius_m_ * std::cos(contact_rad), robot_radius_m_ * std::sin(contact_rad)});
+    contact_rad_ = sense_contact_rad(*space_, people_, there, robot_radius_m_);
+    known_.add(
+        {robot_radius_m_ * std::cos(contact_rad_), robot_radius_m_ * std::sin(contact_rad_)});
     contact_velocity_ = velocity;
     return;
   }
@@ -80,6 +82,10 @@ void MissionRobot::back_off() {
     command(back);
   }
   obstacle_ = false;
+}
+
+std::array<double, sensor_directions> MissionRobot::read_ranges() {
+  return measure_ranges(*space_, &people_, pose_, noise_of_ranges_, robot_radius_m_);
 }
 
 std::optional<double> MissionRobot::find_free_direction(double direct_rad, double distance_m) {
@@ -116,6 +122,24 @@ std::optional<double> MissionRobot::find_free_direction(double direct_rad, doubl
 
 bool MissionRobot::take_contact() noexcept {
   return std::exchange(obstacle_, false);
+}
+
+bool drive_step(MissionRobot& robot, const BaseOptions& base, double direct_rad,
+                double distance_m) {
+  Point2 target{distance_m * std::cos(direct_rad), distance_m * std::sin(direct_rad)};
+  constexpr double near_m = 0.003;
+  const double max_duration_s =
+      2.0 * (std::numbers::pi / base.turn_rad_s + distance_m / base.speed_m_s) + 1.0;
+  for (double time_s = 0.0; time_s < max_duration_s; time_s += base.period_s) {
+    const double left_m = std::hypot(target.x_m, target.y_m);
+    if (left_m <= near_m) return false;
+    const Velocity velocity =
+        compute_command_towards(std::atan2(target.y_m, target.x_m), left_m, base);
+    robot.command(velocity);
+    if (robot.take_contact()) return true;
+    target = inverse(integrate_velocity(velocity, base.period_s)) * target;
+  }
+  return false;
 }
 
 }  // namespace panonav::simulation

@@ -46,7 +46,16 @@ double sensor_direction_rad(std::size_t sensor) {
 }
 
 std::array<double, sensor_directions> measure_ranges(const FreeSpace& space, const People* people,
-                                                     const Pose2& robot, Random& random) {
+                                                     const Pose2& robot, Random& random,
+                                                     double border_m) {
+  const auto is_within_border = [&](Point2 position) {
+    const auto outside_m = [](double value, double low, double high) {
+      return std::max({low - value, value - high, 0.0});
+    };
+    const double away_m = std::hypot(outside_m(position.x_m, space.low().x_m, space.high().x_m),
+                                     outside_m(position.y_m, space.low().y_m, space.high().y_m));
+    return away_m > 0.0 && away_m < border_m;
+  };
   constexpr double step_m = 0.01;
   std::array<double, sensor_directions> ranges_m{};
   for (std::size_t sensor = 0; sensor < sensor_directions; ++sensor) {
@@ -54,7 +63,7 @@ std::array<double, sensor_directions> measure_ranges(const FreeSpace& space, con
     double range_m = 0.0;
     while (range_m < max_range_m) {
       const Point2 there = find_point_at(robot, direction_rad, range_m);
-      if (space.clearance_m(there) <= 0.0) break;
+      if (space.clearance_m(there) <= 0.0 && !is_within_border(there)) break;
       if (people != nullptr && people->has_person_within(there, 0.0)) break;
       range_m += step_m;
     }

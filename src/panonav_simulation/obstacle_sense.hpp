@@ -32,11 +32,12 @@ inline constexpr double range_noise_m = 0.01;
 
 /// Measures the distance from the robot's centre to the first obstacle or person in each direction
 /// of the ring, with noise; 0 to `max_range_m`. Without noise, at most 2 cells of `space` below the
-/// truth. `people` may be null.
+/// truth. `people` may be null. `border_m`: distance outside of the map at which a range ends.
 [[nodiscard]] std::array<double, sensor_directions> measure_ranges(const FreeSpace& space,
                                                                    const People* people,
                                                                    const Pose2& robot,
-                                                                   Random& random);
+                                                                   Random& random,
+                                                                   double border_m = 0.0);
 
 /// Returns the direction of contact in the robot frame, as one of the bumper's eight, of a robot
 /// that would touch an obstacle or a person at this pose.
