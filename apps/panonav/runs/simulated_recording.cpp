@@ -1,8 +1,27 @@
 #include "runs/simulated_recording.hpp"
 
 #include "cli/option_values.hpp"
+#include "panonav/core/number_text.hpp"
+#include "panonav/geometry/angles.hpp"
 
 namespace panonav::command {
+
+namespace {
+
+/// Parses "X,Y,HEADING_DEG". Throws UsageError.
+Pose2 parse_pose(const std::string& flag, const std::string& text) {
+  const std::size_t first = text.find(',');
+  const std::size_t second = first == std::string::npos ? first : text.find(',', first + 1);
+  if (second == std::string::npos) {
+    throw UsageError(flag + " is '" + text +
+                     "'; allowed: X,Y,HEADING_DEG in metres, metres and degrees");
+  }
+  return {parse_number(flag, text.substr(0, first)),
+          parse_number(flag, text.substr(first + 1, second - first - 1)),
+          wrap_angle(radians(parse_number(flag, text.substr(second + 1))))};
+}
+
+}  // namespace
 
 void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions& values) {
   arguments.options("recording", values.recording);
@@ -11,6 +30,11 @@ void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions&
   arguments.options("sensor", values.sensor);
   arguments.options("free_space", values.free_space);
   arguments.options("odometry", values.odometry, "odometry");
+  reject_ineffective_camera_options(arguments, values);
+}
+
+void reject_ineffective_camera_options(Arguments& arguments,
+                                       const simulation::SimulatedWorldOptions& values) {
   reject_ineffective_options(arguments, values);
   const auto& simulation = values.simulation;
   arguments.reject_options_unless(
@@ -50,6 +74,19 @@ simulation::FindSetOption make_option_lookup(const Arguments& arguments) {
     if (!arguments.is_set(section, name)) return std::nullopt;
     return to_flag(name);
   };
+}
+
+Pose2 parse_free_pose(const std::string& flag, const std::string& text,
+                      const simulation::FreeSpace& space) {
+  const Pose2 pose = parse_pose(flag, text);
+  if (!space.is_free(pose.position())) {
+    throw UsageError(
+        flag + " is at x " + format_number(pose.x_m) + " m, y " + format_number(pose.y_m) +
+        " m, where the robot cannot stand; allowed: free places between x " +
+        format_number(space.low().x_m) + " to " + format_number(space.high().x_m) + " m and y " +
+        format_number(space.low().y_m) + " to " + format_number(space.high().y_m) + " m");
+  }
+  return pose;
 }
 
 }  // namespace panonav::command

@@ -39,32 +39,6 @@ struct NavigateArguments {
   KnownRouteOptions known_route;
 };
 
-/// Parses "X,Y,HEADING_DEG". Throws UsageError.
-Pose2 parse_pose(const std::string& flag, const std::string& text) {
-  const std::size_t first = text.find(',');
-  const std::size_t second = first == std::string::npos ? first : text.find(',', first + 1);
-  if (second == std::string::npos) {
-    throw UsageError(flag + " is '" + text +
-                     "'; allowed: X,Y,HEADING_DEG in metres, metres and degrees");
-  }
-  return {parse_number(flag, text.substr(0, first)),
-          parse_number(flag, text.substr(first + 1, second - first - 1)),
-          wrap_angle(radians(parse_number(flag, text.substr(second + 1))))};
-}
-
-Pose2 parse_free_pose(const std::string& flag, const std::string& text,
-                      const simulation::FreeSpace& space) {
-  const Pose2 pose = parse_pose(flag, text);
-  if (!space.is_free(pose.position())) {
-    throw UsageError(
-        flag + " is at x " + format_number(pose.x_m) + " m, y " + format_number(pose.y_m) +
-        " m, where the robot cannot stand; allowed: free places between x " +
-        format_number(space.low().x_m) + " to " + format_number(space.high().x_m) + " m and y " +
-        format_number(space.low().y_m) + " to " + format_number(space.high().y_m) + " m");
-  }
-  return pose;
-}
-
 /// Returns the name of the view as JSON; null if there is no view.
 ordered_json view_name_or_null(const std::optional<ViewId>& view, const RobotNavigator& robot) {
   return view ? ordered_json(robot.info(*view).name) : ordered_json();
