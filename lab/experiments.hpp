@@ -87,6 +87,10 @@ struct NavigationExperiments : Experiments {
   /// Measures missions in variants of `loop` with one path blocked, which leaves a detour, and with
   /// two blocked, which leaves none.
   void reproduce_blocked_missions() const;
+  /// Measures explorations of a built-in scene or a Gazebo world of `options.data` by a robot with
+  /// noisy odometry and with ranges or a bumper: share of the free floor that its views cover, and
+  /// path length against a boustrophedon path with true poses.
+  void reproduce_explorations(const std::string& scene) const;
 
   /// Makes a place for missions whose robot has the optics of the options. Its mirror images have
   /// 320 x 240 pixels, because a mission takes ten a second.

@@ -50,6 +50,11 @@ ReproductionPlan plan_navigation(const Experiments& context) {
   plan.push_back({4.0, [=] { navigation.reproduce_tours(); }});
   plan.push_back({3.0, [=] { navigation.reproduce_route_missions(); }});
   plan.push_back({2.0, [=] { navigation.reproduce_blocked_missions(); }});
+  std::vector<std::string> explored{"office", "lab", "loop"};
+  if (simulation::has_scene(options.data, "small_house")) explored.emplace_back("small_house");
+  for (const std::string& scene : explored) {
+    plan.push_back({2.0, [=] { navigation.reproduce_explorations(scene); }});
+  }
   return plan;
 }
 
