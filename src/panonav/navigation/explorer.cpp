@@ -2,17 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/geometry/angles.hpp"
 #include "panonav/homing/homing_pursuit.hpp"
-#include "panonav/mapping/pose_graph.hpp"
 #include "panonav/navigation/coverage_map.hpp"
-#include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav/navigation/internal/explorer_pose.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
-#include "panonav/relative_pose/pair_evidence.hpp"
 
 namespace panonav {
 
@@ -26,22 +22,6 @@ constexpr double near_m = 0.05;
 constexpr int max_contacts = 8;
 // Observations after which the map is made again: a metre of ranges.
 constexpr int max_map_age = 4;
-// Views to which an observation is compared: the nearest ones.
-constexpr std::size_t max_compared_views = 4;
-// Distance of compared views, in catchment radii: home vectors are reliable in it.
-constexpr double compared_radii = 1.6;
-// Below this distance, a home vector shows no direction that can be compared.
-constexpr double min_direction_m = 0.12;
-// Standard deviations of the turn and the direction of a home vector within a catchment area.
-constexpr double turn_deviation_rad = 0.2;
-constexpr double direction_deviation_rad = 0.2;
-// Largest error of the turn of a recognised view, in addition to that of the odometry.
-constexpr double max_turn_error_rad = 0.35;
-// Largest error of the direction of a recognised view: that of a right home vector.
-constexpr double max_direction_error_rad = std::numbers::pi / 4.0;
-// Probability from which a view is recognised anywhere.
-constexpr double min_probability = 0.9;
-
 }  // namespace
 
 void visit_options(ExplorationOptions& options, OptionVisitor& visitor) {
@@ -82,7 +62,7 @@ class Explorer::Implementation {
 
   Implementation(const ExplorationOptions& options, double robot_radius_m, bool has_ranges,
                  const OdometryNoise& odometry)
-      : options_(options), odometry_(odometry) {
+      : options_(options), robot_(options.radius_m, odometry) {
     validate(options);
     validate(odometry);
     require(robot_radius_m >= 0.0 && std::isfinite(robot_radius_m), "robot_radius_m",
@@ -98,14 +78,19 @@ class Explorer::Implementation {
             "finite numbers");
     const HomingView current = homing_view(view);
     if (state_ == State::done || state_ == State::lost) return {.state = state_};
-    move(report.moved);
-    if (views_.empty()) memorise(current, {});
-    const auto recognised = correct_pose(current);
-    if (is_near_a_view() && std::ranges::none_of(recognised, [this](const Recognition& seen) {
+    before_ = robot_.pose();
+    robot_.move(report.moved);
+    if (robot_.views().empty()) {
+      robot_.add_view(current, {});
+      is_new_ = true;
+    }
+    const auto recognised = robot_.correct(current);
+    if (robot_.is_near_a_view() &&
+        std::ranges::none_of(recognised, [this](const ExplorerPose::Recognition& seen) {
           return std::hypot(seen.robot_from_view.x_m, seen.robot_from_view.y_m) <=
                  options_.radius_m;
         })) {
-      unrecognised_.emplace_back(anchor(pose_.position()), views_.size());
+      unrecognised_.emplace_back(anchor(robot_.pose().position()), robot_.views().size());
     }
     store_sensed(report);
     update_map(report.contact_rad.has_value());
@@ -116,44 +101,22 @@ class Explorer::Implementation {
     if (state_ == State::exploring) {
       if (is_new_ || has_reached_view_point()) {
         decision.memorise = true;
-        if (!is_new_) memorise(current, recognised);
+        if (!is_new_) robot_.add_view(current, recognised);
         is_new_ = false;
         target_.reset();
         map_ = make_map();
       }
-      if (!choose_target() || travelled_m_ >= options_.max_metres) state_ = State::returning;
+      if (!choose_target() || robot_.travelled_m() >= options_.max_metres)
+        state_ = State::returning;
     }
     decide_motion(current, decision);
     decision.state = state_;
     return decision;
   }
 
-  [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
-  [[nodiscard]] std::span<const Pose2> poses() const noexcept { return poses_; }
-  [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
-
-  [[nodiscard]] TopologicalMap map(std::span<const ViewId> ids) const {
-    require(ids.size() == views_.size(), "ids", static_cast<double>(ids.size()),
-            "one for each view");
-    TopologicalMap map;
-    for (std::size_t i = 0; i < views_.size(); ++i) map.nodes.push_back({ids[i], poses_[i], 0});
-    for (std::size_t i = 0; i < edges_.size(); ++i) {
-      const PoseEdge& edge = edges_[i];
-      const bool is_driven = !edge.doubtful;
-      map.edges.push_back({ids[edge.a], ids[edge.b], edge.a_from_b,
-                           is_driven ? Link::Kind::sequence : Link::Kind::closure,
-                           edge_weights_[i]});
-    }
-    validate(map);
-    return map;
-  }
+  [[nodiscard]] const ExplorerPose& robot() const noexcept { return robot_; }
 
  private:
-  // A view that the current observation shows.
-  struct Recognition {
-    std::size_t view;
-    Pose2 robot_from_view;  // direction and turn from the images, length as expected
-  };
   // A position that moves with the pose of a view when the map is corrected.
   struct AnchoredPoint {
     std::size_t view;
@@ -164,146 +127,18 @@ class Explorer::Implementation {
     AnchoredPoint to;
   };
 
-  void move(const Pose2& moved) {
-    before_ = pose_;
-    pose_ = pose_ * moved;
-    const double length_m = std::hypot(moved.x_m, moved.y_m);
-    const double turn_rad = std::abs(moved.heading_rad);
-    travelled_m_ += length_m;
-    unrecognised_m_ += length_m;
-    since_view_ = since_view_ * moved;
-    since_view_m_ += length_m;
-    since_view_rad_ += turn_rad;
-    const auto square = [](double value) { return value * value; };
-    position_variance_m2_ += square(odometry_.translation_from_translation) * length_m +
-                             square(odometry_.translation_scale_error * length_m) +
-                             heading_variance_rad2_ * square(length_m);
-    heading_variance_rad2_ += square(odometry_.rotation_from_translation) * length_m +
-                              square(odometry_.rotation_from_rotation) * turn_rad;
-  }
-
-  // Returns the nearest views by the estimated pose.
-  [[nodiscard]] std::vector<std::size_t> find_near_views() const {
-    std::vector<std::pair<double, std::size_t>> near;
-    for (std::size_t i = 0; i < poses_.size(); ++i) {
-      const double away_m = distance(poses_[i].position(), pose_.position());
-      if (away_m <= compared_radii * options_.radius_m) near.emplace_back(away_m, i);
-    }
-    std::ranges::sort(near);
-    near.resize(std::min(near.size(), max_compared_views));
-    std::vector<std::size_t> views;
-    for (const auto& [away_m, view] : near) views.push_back(view);
-    return views;
-  }
-
-  // Corrects the pose by the home vectors to the views around. Returns those that it recognises:
-  // turn and direction are where the pose expects them.
-  std::vector<Recognition> correct_pose(const HomingView& current) {
-    std::vector<Recognition> recognised;
-    for (const std::size_t i : find_near_views()) {
-      const HomeVector vector = home_vector(views_[i], current);
-      const Pose2 expected = inverse(pose_) * poses_[i];
-      const double away_m = std::hypot(expected.x_m, expected.y_m);
-      const double turn_error_rad = wrap_angle(vector.heading_rad - expected.heading_rad);
-      if (std::abs(turn_error_rad) > max_turn_error_rad + 2.0 * std::sqrt(heading_variance_rad2_)) {
-        continue;
-      }
-      if (away_m < min_direction_m) {
-        correct_heading(turn_error_rad);
-        recognised.push_back({i, {expected.x_m, expected.y_m, vector.heading_rad}});
-        continue;
-      }
-      const double direction_rad = std::atan2(expected.y_m, expected.x_m);
-      const double error_rad = wrap_angle(vector.direction_rad() - direction_rad);
-      if (std::abs(error_rad) > max_direction_error_rad) continue;
-      correct_heading(turn_error_rad);
-      correct_position(poses_[i].position(), pose_.heading_rad + vector.direction_rad());
-      recognised.push_back({i,
-                            {away_m * std::cos(vector.direction_rad()),
-                             away_m * std::sin(vector.direction_rad()), vector.heading_rad}});
-    }
-    if (!recognised.empty()) {
-      anchor_ = recognised.front().view;
-      unrecognised_m_ = 0.0;
-    }
-    return recognised;
-  }
-
-  void correct_heading(double turn_error_rad) {
-    const double gain =
-        heading_variance_rad2_ / (heading_variance_rad2_ + turn_deviation_rad * turn_deviation_rad);
-    pose_.heading_rad = wrap_angle(pose_.heading_rad - gain * turn_error_rad);
-    heading_variance_rad2_ *= 1.0 - gain;
-  }
-
-  // Moves the position towards the line through a view in the direction of its home vector.
-  void correct_position(Point2 view, double world_direction_rad) {
-    const Point2 normal{-std::sin(world_direction_rad), std::cos(world_direction_rad)};
-    const Point2 away{view.x_m - pose_.x_m, view.y_m - pose_.y_m};
-    const double lateral_m = away.x_m * normal.x_m + away.y_m * normal.y_m;
-    const double deviation_m = near_m + direction_deviation_rad * std::hypot(away.x_m, away.y_m);
-    const double gain = position_variance_m2_ / (position_variance_m2_ + deviation_m * deviation_m);
-    pose_.x_m += gain * lateral_m * normal.x_m;
-    pose_.y_m += gain * lateral_m * normal.y_m;
-    position_variance_m2_ *= 1.0 - 0.5 * gain;  // one of two directions
-  }
-
-  void memorise(HomingView current, const std::vector<Recognition>& recognised) {
-    const std::size_t number = views_.size();
-    views_.push_back(std::move(current));
-    poses_.push_back(pose_);
-    if (number == 0) {
-      is_new_ = true;
-    } else {
-      add_edges(number, recognised);
-      edge_weights_ = optimise_pose_graph(poses_, edges_).edge_weights;
-    }
-    pose_ = poses_.back();
-    anchor_ = number;
-    since_view_ = {};
-    since_view_m_ = 0.0;
-    since_view_rad_ = 0.0;
-    position_variance_m2_ = 0.0;
-    heading_variance_rad2_ = 0.0;
-    unrecognised_m_ = 0.0;
-  }
-
-  void add_edges(std::size_t number, const std::vector<Recognition>& recognised) {
-    const auto square = [](double value) { return value * value; };
-    const double turn_variance_rad2 = square(odometry_.rotation_from_translation) * since_view_m_ +
-                                      square(odometry_.rotation_from_rotation) * since_view_rad_;
-    const double variance_m2 = square(odometry_.translation_from_translation) * since_view_m_ +
-                               square(odometry_.translation_scale_error * since_view_m_) +
-                               turn_variance_rad2 * square(since_view_m_) / 3.0;
-    constexpr double min_deviation = 0.01;  // keeps the weights of the equations within range
-    edges_.push_back({.a = number - 1,
-                      .b = number,
-                      .a_from_b = since_view_,
-                      .position_deviation_m = min_deviation + std::sqrt(variance_m2),
-                      .heading_deviation_rad = min_deviation + std::sqrt(turn_variance_rad2)});
-    for (const Recognition& seen : recognised) {
-      const double away_m = std::hypot(seen.robot_from_view.x_m, seen.robot_from_view.y_m);
-      edges_.push_back({.a = number,
-                        .b = seen.view,
-                        .a_from_b = seen.robot_from_view,
-                        .position_deviation_m = near_m + direction_deviation_rad * away_m,
-                        .heading_deviation_rad = turn_deviation_rad,
-                        .doubtful = true});
-    }
-  }
-
   [[nodiscard]] AnchoredPoint anchor(Point2 position) const {
-    return {anchor_, inverse(poses_[anchor_]) * position};
+    return {robot_.anchor(), inverse(robot_.poses()[robot_.anchor()]) * position};
   }
   [[nodiscard]] Point2 resolve(const AnchoredPoint& point) const {
-    return poses_[point.view] * point.position;
+    return robot_.poses()[point.view] * point.position;
   }
 
   // Stores what the robot sensed of the floor.
   void store_sensed(const ExplorationReport& report) {
-    driven_.push_back({anchor(before_.position()), anchor(pose_.position())});
+    driven_.push_back({anchor(before_.position()), anchor(robot_.pose().position())});
     const auto point_at = [this](double direction_rad, double length_m) {
-      return anchor(pose_ *
+      return anchor(robot_.pose() *
                     Point2{length_m * std::cos(direction_rad), length_m * std::sin(direction_rad)});
     };
     if (report.contact_rad) {
@@ -320,15 +155,9 @@ class Explorer::Implementation {
       }
       const double open_m = used_m - 0.5 * coverage_.robot_radius_m;
       if (open_m > 0.0) {
-        open_.push_back({anchor(pose_.position()), point_at(range.direction_rad, open_m)});
+        open_.push_back({anchor(robot_.pose().position()), point_at(range.direction_rad, open_m)});
       }
     }
-  }
-
-  [[nodiscard]] bool is_near_a_view() const {
-    return std::ranges::any_of(poses_, [this](const Pose2& view) {
-      return distance(view.position(), pose_.position()) <= options_.radius_m;
-    });
   }
 
   [[nodiscard]] CoverageMap make_map() const {
@@ -341,7 +170,7 @@ class Explorer::Implementation {
     for (const auto& [point, view_count] : unrecognised_) {
       floor.unrecognised.push_back({resolve(point), view_count});
     }
-    for (const Pose2& pose : poses_) {
+    for (const Pose2& pose : robot_.poses()) {
       floor.views.push_back({pose.position(), options_.radius_m});
     }
     return {floor, coverage_};
@@ -350,7 +179,7 @@ class Explorer::Implementation {
   // Makes the map again if an obstacle was felt, a target is reached or needed, or it is old.
   void update_map(bool has_contact) {
     const bool is_target_near =
-        target_ && distance(pose_.position(), resolve(*target_)) <= options_.step_m;
+        target_ && distance(robot_.pose().position(), resolve(*target_)) <= options_.step_m;
     if (map_ && !has_contact && target_ && !is_target_near && ++map_age_ < max_map_age) return;
     map_ = make_map();
     map_age_ = 0;
@@ -362,39 +191,15 @@ class Explorer::Implementation {
       state_ = State::exploring;
       return;
     }
-    if (unrecognised_m_ <= options_.max_unrecognised_m) return;
+    if (robot_.unrecognised_m() <= options_.max_unrecognised_m) return;
     if (state_ == State::exploring) {
       state_ = State::recovering;
       target_.reset();
     }
-    const bool is_back = distance(pose_.position(), poses_[anchor_].position()) <= near_m;
-    if (!is_back && unrecognised_m_ <= 4.0 * options_.max_unrecognised_m) return;
-    if (!relocalise(current)) state_ = State::lost;
-  }
-
-  // Searches all views; true if one is recognised, whose pose the robot then takes over.
-  bool relocalise(const HomingView& current) {
-    double max_probability = min_probability;
-    std::optional<std::size_t> best;
-    HomeVector vector;
-    for (std::size_t i = 0; i < views_.size(); ++i) {
-      const auto evidence = compute_pair_evidence(views_[i], current);
-      if (!evidence || evidence->probability < max_probability) continue;
-      max_probability = evidence->probability;
-      best = i;
-      vector = evidence->vector;
-    }
-    if (!best) return false;
-    const double away_m = std::min(vector.length(), 1.0) * options_.radius_m;
-    pose_ = poses_[*best] *
-            inverse(Pose2{away_m * std::cos(vector.direction_rad()),
-                          away_m * std::sin(vector.direction_rad()), vector.heading_rad});
-    anchor_ = *best;
-    unrecognised_m_ = 0.0;
-    position_variance_m2_ = options_.radius_m * options_.radius_m;
-    heading_variance_rad2_ = turn_deviation_rad * turn_deviation_rad;
-    state_ = State::exploring;
-    return true;
+    const bool is_back =
+        distance(robot_.pose().position(), robot_.poses()[robot_.anchor()].position()) <= near_m;
+    if (!is_back && robot_.unrecognised_m() <= 4.0 * options_.max_unrecognised_m) return;
+    state_ = robot_.relocalise(current) ? State::exploring : State::lost;
   }
 
   // True if the robot is at its target and a view there covers new floor. Gives up a target where
@@ -402,8 +207,8 @@ class Explorer::Implementation {
   bool has_reached_view_point() {
     if (!target_) return false;
     const Point2 target = resolve(*target_);
-    if (distance(pose_.position(), target) > near_m) return false;
-    if (map_->compute_gain_m2(pose_.position()) >= options_.min_area_m2) return true;
+    if (distance(robot_.pose().position(), target) > near_m) return false;
+    if (map_->compute_gain_m2(robot_.pose().position()) >= options_.min_area_m2) return true;
     give_up_target();
     return false;
   }
@@ -427,8 +232,8 @@ class Explorer::Implementation {
       }
     }
     if (target_) return true;
-    auto next = map_->find_view_point(pose_.position());
-    if (!next && forget_contradictions()) next = map_->find_view_point(pose_.position());
+    auto next = map_->find_view_point(robot_.pose().position());
+    if (!next && forget_contradictions()) next = map_->find_view_point(robot_.pose().position());
     if (!next) return false;
     target_ = anchor(next->position);
     target_area_m2_ = next->area_m2;
@@ -438,7 +243,7 @@ class Explorer::Implementation {
 
   // Drives the last part of the way back by the images alone.
   void home_to_start(const HomingView& current, ExplorationDecision& decision) {
-    if (!homing_) homing_.emplace(views_.front());
+    if (!homing_) homing_.emplace(robot_.views().front());
     const HomingPursuit::Decision step = homing_->decide(current);
     decision.direction_rad = step.turn_rad;
     decision.advance_m = step.advance_m;
@@ -448,8 +253,8 @@ class Explorer::Implementation {
   // The robot drove from each view to the next, so that a map in which it reaches one of them no
   // more is wrong: forgets the obstacles then, and returns true.
   bool forget_contradictions() {
-    const bool is_consistent = std::ranges::all_of(poses_, [this](const Pose2& view) {
-      return map_->find_path(pose_.position(), view.position()).has_value();
+    const bool is_consistent = std::ranges::all_of(robot_.poses(), [this](const Pose2& view) {
+      return map_->find_path(robot_.pose().position(), view.position()).has_value();
     });
     if (is_consistent) return false;
     forget_obstacles();
@@ -465,16 +270,16 @@ class Explorer::Implementation {
   // Computes the motion to the target: along the path as far as it is straight.
   void decide_motion(const HomingView& current, ExplorationDecision& decision) {
     if (state_ == State::lost) return;
-    Point2 goal = poses_.front().position();
+    Point2 goal = robot_.poses().front().position();
     if (state_ == State::exploring) goal = resolve(*target_);
-    if (state_ == State::recovering) goal = poses_[anchor_].position();
-    const bool is_near_start = distance(pose_.position(), goal) <= 0.5 * options_.radius_m;
+    if (state_ == State::recovering) goal = robot_.poses()[robot_.anchor()].position();
+    const bool is_near_start = distance(robot_.pose().position(), goal) <= 0.5 * options_.radius_m;
     if (homing_ || (state_ == State::returning && is_near_start)) {
       home_to_start(current, decision);
       return;
     }
-    auto path = map_->find_path(pose_.position(), goal);
-    if (!path && forget_contradictions()) path = map_->find_path(pose_.position(), goal);
+    auto path = map_->find_path(robot_.pose().position(), goal);
+    if (!path && forget_contradictions()) path = map_->find_path(robot_.pose().position(), goal);
     if (!path) {
       if (state_ == State::exploring) {
         give_up_target();
@@ -485,26 +290,23 @@ class Explorer::Implementation {
     }
     Point2 next = path->empty() ? goal : path->front();
     for (const Point2& point : *path) {
-      if (!map_->is_open_between(pose_.position(), point)) break;
+      if (!map_->is_open_between(robot_.pose().position(), point)) break;
       next = point;
-      if (distance(pose_.position(), point) >= options_.step_m) break;
+      if (distance(robot_.pose().position(), point) >= options_.step_m) break;
     }
-    if (distance(next, goal) < coverage_.cell_m && map_->is_open_between(pose_.position(), goal)) {
+    if (distance(next, goal) < coverage_.cell_m &&
+        map_->is_open_between(robot_.pose().position(), goal)) {
       next = goal;
     }
-    const Point2 there = inverse(pose_) * next;
+    const Point2 there = inverse(robot_.pose()) * next;
     decision.direction_rad = std::atan2(there.y_m, there.x_m);
     decision.advance_m = std::min(options_.step_m, std::hypot(there.x_m, there.y_m));
   }
 
   ExplorationOptions options_;
-  OdometryNoise odometry_;
+  ExplorerPose robot_;
   CoverageOptions coverage_;
   State state_ = State::exploring;
-  std::vector<HomingView> views_;
-  std::vector<Pose2> poses_;
-  std::vector<PoseEdge> edges_;
-  std::vector<double> edge_weights_;
   std::vector<AnchoredLine> driven_;
   std::vector<AnchoredLine> open_;
   std::vector<AnchoredPoint> obstacles_;
@@ -518,16 +320,7 @@ class Explorer::Implementation {
   std::optional<HomingPursuit> homing_;  // to the start
   int contacts_ = 0;                     // on the way to the target
   bool is_new_ = false;                  // the first view was just memorised
-  std::size_t anchor_ = 0;               // the last view that was recognised
   Pose2 before_;                         // pose at the last observation
-  Pose2 pose_;
-  double position_variance_m2_ = 0.0;
-  double heading_variance_rad2_ = 0.0;
-  double unrecognised_m_ = 0.0;  // path since a view was recognised
-  double travelled_m_ = 0.0;
-  Pose2 since_view_;  // motion by odometry since the last memorised view
-  double since_view_m_ = 0.0;
-  double since_view_rad_ = 0.0;
 };
 
 Explorer::Explorer(const ExplorationOptions& options, double robot_radius_m, bool has_ranges,
@@ -543,16 +336,16 @@ ExplorationDecision Explorer::observe(const FourierSignature& view,
   return implementation_->observe(view, report);
 }
 const Pose2& Explorer::pose() const noexcept {
-  return implementation_->pose();
+  return implementation_->robot().pose();
 }
 std::span<const Pose2> Explorer::view_poses() const noexcept {
-  return implementation_->poses();
+  return implementation_->robot().poses();
 }
 TopologicalMap Explorer::map(std::span<const ViewId> ids) const {
-  return implementation_->map(ids);
+  return implementation_->robot().map(ids);
 }
 double Explorer::travelled_m() const noexcept {
-  return implementation_->travelled_m();
+  return implementation_->robot().travelled_m();
 }
 
 }  // namespace panonav
