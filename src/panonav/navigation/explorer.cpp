@@ -17,7 +17,7 @@ namespace {
 // Ranges are used up to this length: farther ends are too uncertain for a map of 0.1 m.
 constexpr double max_used_range_m = 2.0;
 // Distance from a target at which the robot is there: half a cell.
-constexpr double near_m = 0.05;
+constexpr double arrival_m = 0.05;
 // Contacts on the way to a target after which it is given up.
 constexpr int max_contacts = 8;
 // Without ranges, floor is assumed around driven positions up to this distance, in catchment radii,
@@ -206,7 +206,7 @@ class Explorer::Implementation {
       target_.reset();
     }
     const bool is_back =
-        distance(robot_.pose().position(), robot_.poses()[robot_.anchor()].position()) <= near_m;
+        distance(robot_.pose().position(), robot_.poses()[robot_.anchor()].position()) <= arrival_m;
     if (!is_back && robot_.unrecognised_m() <= 4.0 * options_.max_unrecognised_m) return;
     state_ = robot_.relocalise(current) ? State::exploring : State::lost;
   }
@@ -216,7 +216,7 @@ class Explorer::Implementation {
   bool has_reached_view_point() {
     if (!target_) return false;
     const Point2 target = resolve(*target_);
-    if (distance(robot_.pose().position(), target) > near_m) return false;
+    if (distance(robot_.pose().position(), target) > arrival_m) return false;
     if (map_->compute_gain_m2(robot_.pose().position()) >= options_.min_area_m2) return true;
     give_up_target();
     return false;
