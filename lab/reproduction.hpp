@@ -22,7 +22,7 @@ struct MissionGrid {
 /// Optics of the views in the experiments of a paper.
 enum class Optics {
   mirror,   ///< images of the simulated mirror camera, 640 x 480, unwarped as those of a robot
-  panorama  ///< panoramas that are rendered directly: no mirror, some four times as fast
+  panorama  ///< panoramas that are rendered directly: no mirror, three to six times as fast
 };
 
 /// Extent of the experiments of a paper. The experiments of each paper read only some of the

@@ -189,6 +189,14 @@ void face_path(std::vector<Pose2>& poses) {
 Panorama capture_panorama(const Renderer& renderer, const Pose2& pose,
                           const PanoramaRendering& rendering, const FrameOptions& options,
                           const SensorOptions& sensor, std::uint64_t seed, Executor& executor) {
+  if (rendering.unwarper != nullptr && rendering.rays != nullptr) {
+    validate(options);
+    const Radiance light =
+        renderer.render_image(make_viewpoint(pose, options, seed), *rendering.rays, executor);
+    const Image image =
+        apply_sensor(light, rendering.unwarper->camera(), sensor, seed, rendering.rays->pixels());
+    return rendering.unwarper->unwrap(image.view());
+  }
   if (rendering.unwarper != nullptr) {
     FrameOptions frame = options;
     frame.rays_per_axis = rendering.rays_per_axis;
@@ -217,7 +225,8 @@ PanoramaRendering make_mirror_rendering(int rows, int columns,
           .columns = columns,
           .elevations = unwarper->elevations(),
           .rays_per_axis = 1,
-          .unwarper = unwarper};
+          .unwarper = unwarper,
+          .rays = std::make_shared<const PixelRays>(camera, unwarper->find_read_pixels(), 1)};
 }
 
 Image capture_image(const Renderer& renderer, const Pose2& pose, const RecordingCamera& camera,

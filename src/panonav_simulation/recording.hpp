@@ -70,8 +70,9 @@ void face_path(std::vector<Pose2>& poses);
 /// Returns the rendering of panoramas that are unwarped from images of
 /// `make_simulated_mirror_camera`, one ray per pixel of the image. Without `elevations`: all that
 /// the mirror shows at every azimuth. `pixel_size`: pixels of that camera along each side of a
-/// pixel of the image, 1 for its full size. Cost: some 50 ms. Throws OptionError on an invalid
-/// size, ContractError unless `pixel_size` is 1 .. 8.
+/// pixel of the image, 1 for its full size. Only the pixels that the unwarper reads are rendered.
+/// Cost: some 100 ms. Throws OptionError on an invalid size, ContractError unless `pixel_size` is
+/// 1 .. 8.
 [[nodiscard]] PanoramaRendering make_mirror_rendering(
     int rows, int columns, std::optional<ElevationBand> elevations = std::nullopt,
     int pixel_size = 1);

@@ -293,17 +293,20 @@ namespace {
 // Computes the rays through image points, by the lenses or the mirror.
 class CameraRays {
  public:
+  // A ray in the robot's frame, from the viewpoint of the camera.
+  struct RobotRay {
+    Vector3 origin;
+    Direction3 direction;
+  };
   // Target of a pixel: a ray into the scene, or a part of the camera with this brightness. Both are
   // nullopt outside the image circle.
   struct PixelTarget {
-    std::optional<Ray> ray;
+    std::optional<RobotRay> ray;
     std::optional<float> body;
   };
 
-  CameraRays(const Viewpoint& viewpoint, const Camera& camera, const Renderer& renderer)
-      : camera_(camera),
-        dual_(std::get_if<DualFisheyeModel>(&camera.model)),
-        make_ray_(viewpoint, renderer) {
+  explicit CameraRays(const Camera& camera)
+      : camera_(camera), dual_(std::get_if<DualFisheyeModel>(&camera.model)) {
     if (std::holds_alternative<HyperboloidalModel>(camera.model)) mirror_.emplace(camera);
     for (std::size_t i = 0; dual_ && i < 2; ++i) {
       const double half_m = 0.5 * dual_->baseline_m;
@@ -316,7 +319,7 @@ class CameraRays {
   [[nodiscard]] PixelTarget find_pixel_target(const PixelPoint& point) const {
     if (mirror_) {
       const MirrorRay ray = mirror_->trace(point);
-      if (ray.target == MirrorTarget::world) return {make_ray_(ray.origin, ray.direction), {}};
+      if (ray.target == MirrorTarget::world) return {RobotRay{ray.origin, ray.direction}, {}};
       const bool housing = ray.target == MirrorTarget::housing;
       return {{},
               housing                 ? housing_brightness
@@ -325,8 +328,8 @@ class CameraRays {
     }
     const auto direction = unproject(camera_, point);
     if (!direction) return {};
-    if (!dual_) return {make_ray_(*direction), {}};
-    return {make_ray_(viewpoints_[lens_at(camera_, point)], *direction), {}};
+    const Vector3 origin = dual_ ? viewpoints_[lens_at(camera_, point)] : Vector3{};
+    return {RobotRay{origin, *direction}, {}};
   }
 
   // Returns the gain of the lens to which a column belongs.
@@ -350,7 +353,6 @@ class CameraRays {
  private:
   const Camera& camera_;
   const DualFisheyeModel* dual_;
-  RayFactory make_ray_;
   std::optional<HyperboloidalMirror> mirror_;
   std::array<Vector3, 2> viewpoints_{};  // of the lenses, in the robot's frame
 };
@@ -362,7 +364,8 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
   validate(viewpoint);
   panonav::validate(camera);
   require_rays(rays_per_axis);
-  const CameraRays camera_rays(viewpoint, camera, *this);
+  const CameraRays camera_rays(camera);
+  const RayFactory make_ray(viewpoint, *this);
   const int n = rays_per_axis;
   const auto channels = static_cast<std::size_t>(implementation_->channels);
   const auto width = static_cast<std::size_t>(camera.image_size.width);
@@ -391,7 +394,7 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
         const auto seen = camera_rays.find_pixel_target(
             {static_cast<double>(i / n) + at.u, static_cast<double>(line / n) + at.v});
         if (seen.ray) {
-          rays.push_back(*seen.ray);
+          rays.push_back(make_ray(seen.ray->origin, seen.ray->direction));
           pixel_of.push_back(pixel);
         } else if (seen.body) {
           colour.fill(*seen.body);
@@ -407,6 +410,83 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
     }
   };
   executor.for_each_chunk(static_cast<std::size_t>(image.height), 8, draw_rows);
+  return image;
+}
+
+PixelRays::PixelRays(const Camera& camera, std::span<const std::uint32_t> pixels, int rays_per_axis)
+    : image_size_(camera.image_size), pixels_(pixels.begin(), pixels.end()) {
+  panonav::validate(camera);
+  require_rays(rays_per_axis);
+  const CameraRays camera_rays(camera);
+  const int n = rays_per_axis;
+  const auto width = static_cast<std::uint32_t>(image_size_.width);
+  spread_rad_ = static_cast<float>(camera_rays.pixel_rad() / n);
+  const auto to_floats = [](double x, double y, double z) {
+    return std::array{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
+  };
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    const std::uint32_t u = pixels_[i] % width;
+    const std::uint32_t v = pixels_[i] / width;
+    require(v < static_cast<std::uint32_t>(image_size_.height), "pixel", pixels_[i],
+            "an offset within the image");
+    float body = 0.0F;
+    for (int ray = 0; ray < n * n; ++ray) {
+      const SubPixel at = sub_pixel(ray % n, ray / n, n);
+      const auto seen = camera_rays.find_pixel_target({u + at.u, v + at.v});
+      body += seen.body.value_or(0.0F);
+      if (!seen.ray) continue;
+      const auto& [origin, direction] = *seen.ray;
+      rays_.push_back({to_floats(origin.x_m, origin.y_m, origin.z_m),
+                       to_floats(direction.x, direction.y, direction.z),
+                       static_cast<std::uint32_t>(i)});
+    }
+    gains_.push_back(camera_rays.gain(u) / static_cast<float>(n * n));
+    bodies_.push_back(gains_.back() * body);
+  }
+}
+
+Radiance Renderer::render_image(const Viewpoint& viewpoint, const PixelRays& pixel_rays,
+                                Executor& executor) const {
+  validate(viewpoint);
+  const RayFactory make_ray(viewpoint, *this);
+  const auto channels = static_cast<std::size_t>(implementation_->channels);
+  const ImageSize size = pixel_rays.image_size_;
+  Radiance image{size.width, size.height, implementation_->channels, {}};
+  image.values.resize(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height) *
+                      channels);
+  for (std::size_t i = 0; i < pixel_rays.pixels_.size(); ++i) {
+    std::fill_n(
+        image.values.begin() + static_cast<std::ptrdiff_t>(pixel_rays.pixels_[i] * channels),
+        channels, pixel_rays.bodies_[i]);
+  }
+  // Chunks end between pixels, so that no two threads add to one.
+  const std::vector<PixelRays::PixelRay>& all = pixel_rays.rays_;
+  const auto find_first_ray = [&](std::size_t index) {
+    return static_cast<std::size_t>(
+        std::ranges::lower_bound(all, index, {}, &PixelRays::PixelRay::pixel) - all.begin());
+  };
+  const auto draw = [&](std::size_t begin, std::size_t end, std::size_t) {
+    const std::span part =
+        std::span(all).subspan(find_first_ray(begin), find_first_ray(end) - find_first_ray(begin));
+    std::vector<Ray> rays;
+    for (const PixelRays::PixelRay& ray : part) {
+      const auto& [ox, oy, oz] = ray.origin;
+      const auto& [dx, dy, dz] = ray.direction;
+      rays.push_back(make_ray(Vector3{ox, oy, oz}, Direction3{dx, dy, dz}));
+    }
+    std::vector<RayHit> hits(rays.size());
+    implementation_->tracer.trace(rays, hits);
+    std::array<float, 3> colour{};
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      implementation_->shade(rays[i], hits[i], pixel_rays.spread_rad_, colour.data());
+      const std::uint32_t index = part[i].pixel;
+      for (std::size_t c = 0; c < channels; ++c) {
+        image.values[pixel_rays.pixels_[index] * channels + c] +=
+            pixel_rays.gains_[index] * colour[c];
+      }
+    }
+  };
+  executor.for_each_chunk(pixel_rays.pixels_.size(), 4096, draw);
   return image;
 }
 

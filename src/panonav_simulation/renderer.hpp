@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,6 +40,35 @@ struct RendererOptions {
   int channels = 1;
 };
 
+/// The rays of some pixels of a camera, computed once for many pictures: most of the time of a
+/// picture through a mirror is spent on following its rays to the mirror and back. Holds 28 bytes a
+/// ray.
+class PixelRays {
+ public:
+  /// Follows rays_per_axis^2 rays per pixel, the same as `Renderer::render_image`. `pixels`:
+  /// offsets v * width + u, ascending. Throws ContractError unless the camera is valid,
+  /// rays_per_axis is 1 .. 8 and all pixels are in its image.
+  PixelRays(const Camera& camera, std::span<const std::uint32_t> pixels, int rays_per_axis);
+
+  [[nodiscard]] const std::vector<std::uint32_t>& pixels() const noexcept { return pixels_; }
+  [[nodiscard]] ImageSize image_size() const noexcept { return image_size_; }
+
+ private:
+  friend class Renderer;
+  /// A ray in the robot's frame, with its origin measured from the viewpoint of the camera.
+  struct PixelRay {
+    std::array<float, 3> origin{};
+    std::array<float, 3> direction{};
+    std::uint32_t pixel = 0;  ///< index of `pixels_`
+  };
+  ImageSize image_size_;
+  std::vector<std::uint32_t> pixels_;
+  std::vector<float> gains_;    // of the lens of each pixel, over the number of rays per pixel
+  std::vector<PixelRay> rays_;  // into the scene, in the order of the pixels
+  std::vector<float> bodies_;   // light of each pixel from parts of the camera
+  float spread_rad_ = 0.0F;
+};
+
 /// Size, ray density and optics of a rendered panorama.
 struct PanoramaRendering {
   int rows = 80;                                                      ///< number of rows, >= 1
@@ -49,6 +81,9 @@ struct PanoramaRendering {
   /// rays per pixel of the image, and unwarps it; the panorama then has the unwarper's size and
   /// elevations. If empty, the panorama is rendered directly.
   std::shared_ptr<const Unwarper> unwarper = nullptr;
+  /// If set, only these pixels of the image are rendered, by these rays instead of `rays_per_axis`
+  /// for each; they must be all pixels that the unwarper reads. Much faster than without.
+  std::shared_ptr<const PixelRays> rays = nullptr;
 };
 
 /// Light at the pixels of a camera before exposure and noise: linear, not clamped; a white surface
@@ -97,6 +132,10 @@ class Renderer {
   /// and rays_per_axis is 1 .. 8.
   [[nodiscard]] Radiance render_image(const Viewpoint& viewpoint, const Camera& camera,
                                       int rays_per_axis, Executor& executor) const;
+  /// Renders some pixels of the image of a camera; the others are 0. The same light as in the whole
+  /// image, up to rounding to single precision.
+  [[nodiscard]] Radiance render_image(const Viewpoint& viewpoint, const PixelRays& pixel_rays,
+                                      Executor& executor) const;
 
   /// Returns the distance in metres to the nearest surface along the ray; infinity if there is
   /// none.

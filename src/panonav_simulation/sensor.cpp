@@ -131,13 +131,16 @@ Panorama apply_sensor(Panorama view, const SensorOptions& options, std::uint64_t
 }
 
 Image apply_sensor(const Radiance& view, const Camera& camera, const SensorOptions& options,
-                   std::uint64_t seed) {
+                   std::uint64_t seed, std::span<const std::uint32_t> pixels) {
   validate(options);
   validate(camera);
   require(view.width == camera.image_size.width, "width of the view", view.width,
           "that of the camera's image");
   require(view.height == camera.image_size.height, "height of the view", view.height,
           "that of the camera's image");
+  const std::size_t count = static_cast<std::size_t>(view.width) * view.height;
+  require(pixels.empty() || *std::ranges::max_element(pixels) < count, "pixels",
+          static_cast<double>(count), "offsets within the image");
   const Occluders occluders(options, seed);
   const ElevationBand band = visible_elevations(camera);
   const std::array<ImageCircle, 2> circles{image_circle(camera, 0),
@@ -146,33 +149,35 @@ Image apply_sensor(const Radiance& view, const Camera& camera, const SensorOptio
   const bool needs_directions = options.directional_light > 0.0 || !occluders.empty();
   PixelSensor pixel(options, seed);
   Image image(view.width, view.height, view.channels);
-  std::size_t i = 0;
-  for (int v = 0; v < view.height; ++v) {
-    for (int u = 0; u < view.width; ++u) {
-      const PixelPoint point{u + 0.5, v + 0.5};
-      double factor = 1.0;
-      std::optional<float> hidden;
-      const auto direction = needs_directions ? unproject(camera, point) : std::nullopt;
-      if (direction) {
-        const double azimuth = direction->azimuth_rad();
-        factor = light_factor(options, azimuth);
-        hidden = occluders.at(azimuth, (direction->elevation_rad() - band.bottom_rad) /
-                                           (band.top_rad - band.bottom_rad));
-      }
-      const ImageCircle& circle = circles[static_cast<std::size_t>(lens_at(camera, point))];
-      if (circle.rim_radius_px > 0.0) {
-        const double radius =
-            std::hypot(point.u_px - circle.centre.u_px, point.v_px - circle.centre.v_px) /
-            circle.rim_radius_px;
-        factor *= 1.0 - options.vignetting * std::min(1.0, radius * radius);
-      }
-      for (int c = 0; c < view.channels; ++c, ++i) {
-        const double light = hidden ? *hidden : view.values[i];
-        image.at(u, v, c) =
-            static_cast<std::uint8_t>(std::lround(255.0F * pixel.value(light * factor)));
-      }
+  const auto channels = static_cast<std::size_t>(view.channels);
+  const auto measure = [&](std::size_t offset) {
+    const auto width = static_cast<std::size_t>(view.width);
+    const PixelPoint point{static_cast<double>(offset % width) + 0.5,
+                           static_cast<double>(offset / width) + 0.5};
+    double factor = 1.0;
+    std::optional<float> hidden;
+    const auto direction = needs_directions ? unproject(camera, point) : std::nullopt;
+    if (direction) {
+      const double azimuth = direction->azimuth_rad();
+      factor = light_factor(options, azimuth);
+      hidden = occluders.at(azimuth, (direction->elevation_rad() - band.bottom_rad) /
+                                         (band.top_rad - band.bottom_rad));
     }
-  }
+    const ImageCircle& circle = circles[static_cast<std::size_t>(lens_at(camera, point))];
+    if (options.vignetting > 0.0 && circle.rim_radius_px > 0.0) {
+      const double radius =
+          std::hypot(point.u_px - circle.centre.u_px, point.v_px - circle.centre.v_px) /
+          circle.rim_radius_px;
+      factor *= 1.0 - options.vignetting * std::min(1.0, radius * radius);
+    }
+    for (std::size_t i = channels * offset; i < channels * (offset + 1); ++i) {
+      const double light = hidden ? *hidden : view.values[i];
+      image.pixels()[i] =
+          static_cast<std::uint8_t>(std::lround(255.0F * pixel.value(light * factor)));
+    }
+  };
+  for (const std::uint32_t offset : pixels) measure(offset);
+  for (std::size_t offset = 0; pixels.empty() && offset < count; ++offset) measure(offset);
   return image;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "panonav/camera/camera.hpp"
 #include "panonav/core/image.hpp"
@@ -34,9 +35,11 @@ void visit_options(SensorOptions& options, OptionVisitor& visitor);
 [[nodiscard]] Panorama apply_sensor(Panorama view, const SensorOptions& options,
                                     std::uint64_t seed);
 
-/// Applies the sensor to an image rendered through `camera`. Throws OptionError, and ContractError
-/// if the sizes differ.
+/// Applies the sensor to an image rendered through `camera`. `pixels`: offsets of the pixels that
+/// are measured, all others are black; empty: all pixels. Throws OptionError, and ContractError if
+/// the sizes differ or a pixel is outside the image.
 [[nodiscard]] Image apply_sensor(const Radiance& view, const Camera& camera,
-                                 const SensorOptions& options, std::uint64_t seed);
+                                 const SensorOptions& options, std::uint64_t seed,
+                                 std::span<const std::uint32_t> pixels = {});
 
 }  // namespace panonav::simulation

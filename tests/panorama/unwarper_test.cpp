@@ -73,6 +73,28 @@ TEST(Unwarper, KeepsAConstantToTheLastRow) {
   }
 }
 
+TEST(Unwarper, ReadsNoOtherPixelsThanItFinds) {
+  const Camera camera = mirror_camera();
+  Random random(3);
+  for (const UnwarperOptions& options :
+       {UnwarperOptions{}, UnwarperOptions{.rows = 200, .columns = 1500},
+        UnwarperOptions{.rows = 4, .columns = 36, .elevations = ElevationBand{-0.1, 0.1}}}) {
+    const Unwarper unwarper(camera, options);
+    const auto pixels = unwarper.find_read_pixels();
+    Image image(640, 480);
+    for (auto& value : image.pixels()) value = static_cast<std::uint8_t>(random.index(256));
+    ASSERT_GT(pixels.size(), 1000U);
+    ASSERT_LT(pixels.size(), 200000U);
+    EXPECT_TRUE(std::ranges::is_sorted(pixels));
+    Image masked(640, 480);
+    for (const std::uint32_t pixel : pixels) masked.pixels()[pixel] = image.pixels()[pixel];
+    EXPECT_EQ(unwarper.unwrap(image.view()), unwarper.unwrap(masked.view()));
+    // A tenth of the pixels fewer is too few.
+    for (std::size_t i = 0; i < pixels.size(); i += 10) masked.pixels()[pixels[i]] ^= 0x80U;
+    EXPECT_NE(unwarper.unwrap(image.view()), unwarper.unwrap(masked.view()));
+  }
+}
+
 TEST(Unwarper, InterpolatesLinearlyWhereTheImageIsNotDenser) {
   // Columns and rows closer than the pixels: one tap per value, in the image itself. By the
   // definition.

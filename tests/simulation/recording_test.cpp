@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/panorama/unwarper.hpp"
+#include "panonav_simulation/mirror.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "support/scene_views.hpp"
 
@@ -236,6 +239,42 @@ TEST_F(Recording, AMirrorShowsTheSameSurroundingsAsAPanorama) {
   EXPECT_EQ(around_horizon.elevations, (ElevationBand{-0.1, 0.1}));
   EXPECT_THROW((void)renderer.render_panorama({}, mirror, executor_), ContractError);
   EXPECT_THROW((void)make_mirror_rendering(0, 36), OptionError);
+}
+
+TEST_F(Recording, PixelsThatAreRenderedAloneAreThoseOfTheWholeImage) {
+  const Renderer renderer(scene_);
+  Executor two(2);
+  const Camera dual = make_simulated_dual_fisheye(4, 0.02);
+  for (const Camera& camera : {make_simulated_mirror_camera(), dual}) {
+    std::vector<std::uint32_t> pixels;
+    const auto count = static_cast<std::uint32_t>(camera.image_size.width) *
+                       static_cast<std::uint32_t>(camera.image_size.height);
+    for (std::uint32_t pixel = 3; pixel < count; pixel += 7) pixels.push_back(pixel);
+    const PixelRays rays(camera, pixels, 2);
+    Random random(5);
+    for (int k = 0; k < 3; ++k) {
+      const Viewpoint viewpoint{.pose = space_.random_pose(random), .roll_rad = 0.05};
+      const Radiance whole = renderer.render_image(viewpoint, camera, 2, two);
+      const Radiance alone = renderer.render_image(viewpoint, rays, two);
+      EXPECT_EQ(alone.values, renderer.render_image(viewpoint, rays, executor_).values);
+      ASSERT_EQ(alone.values.size(), whole.values.size());
+      double difference = 0.0;
+      double light = 0.0;
+      for (const std::uint32_t pixel : pixels) {
+        difference += std::abs(static_cast<double>(alone.values[pixel]) - whole.values[pixel]);
+        light += whole.values[pixel];
+      }
+      EXPECT_GT(light, 0.1 * static_cast<double>(pixels.size()));
+      EXPECT_LT(difference, 1e-4 * light);  // a ray at an edge falls on the other side of it
+      for (std::uint32_t pixel = 0; pixel < count; ++pixel) {
+        if (pixel % 7 != 3) {
+          ASSERT_EQ(alone.values[pixel], 0.0F);
+        }
+      }
+    }
+    EXPECT_THROW(PixelRays(camera, std::vector<std::uint32_t>{count}, 1), ContractError);
+    EXPECT_THROW(PixelRays(camera, pixels, 9), ContractError);
+  }
 }
 
 TEST_F(Recording, BadInputIsNamed) {

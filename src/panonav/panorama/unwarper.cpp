@@ -71,6 +71,42 @@ bool Unwarper::is_visible(int row, int column) const noexcept {
          table_->visible[static_cast<std::size_t>(row) * columns_ + column] != 0;
 }
 
+std::vector<std::uint32_t> Unwarper::find_read_pixels() const {
+  const ImageSize size = camera_.image_size;
+  std::vector<std::uint8_t> is_read(static_cast<std::size_t>(size.width) * size.height,
+                                    table_ ? 0 : 1);
+  // Marks the pixels of the image that a pixel of a level is the mean of.
+  const auto mark = [&](std::size_t level, int u, int v) {
+    const int side = 1 << level;
+    for (int y = v * side; y < std::min((v + 1) * side, size.height); ++y) {
+      for (int x = u * side; x < std::min((u + 1) * side, size.width); ++x)
+        is_read[static_cast<std::size_t>(y) * size.width + x] = 1;
+    }
+  };
+  for (std::size_t i = 0; table_ && i < table_->positions.size(); ++i) {
+    std::size_t level = 0;  // the pairs of finer levels follow those of coarser ones
+    while (!table_->levels[level].has_pairs() ||
+           table_->levels[level].pairs_offset > table_->positions[i]) {
+      ++level;
+    }
+    const UnwarpTable::Level& part = table_->levels[level];
+    const auto offset = static_cast<int>(table_->positions[i] - part.pairs_offset);
+    const int width = part.pair_right - part.pair_left;
+    const int u = part.pair_left + offset % width;
+    const int v = part.pair_top + offset / width;
+    // The weights of a tap are bytes: (u, v), (u, v + 1), (u + 1, v), (u + 1, v + 1).
+    for (int corner = 0; corner < 4; ++corner) {
+      if ((table_->weights[i] >> (8 * corner) & 0xFFU) != 0)
+        mark(level, u + corner / 2, v + corner % 2);
+    }
+  }
+  std::vector<std::uint32_t> pixels;
+  for (std::size_t i = 0; i < is_read.size(); ++i) {
+    if (is_read[i] != 0) pixels.push_back(static_cast<std::uint32_t>(i));
+  }
+  return pixels;
+}
+
 void Unwarper::require_camera_size(ImageView image) const {
   const auto text = [](ImageSize size) {
     return std::to_string(size.width) + " x " + std::to_string(size.height);

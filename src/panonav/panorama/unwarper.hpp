@@ -60,6 +60,9 @@ class Unwarper {
   [[nodiscard]] const ElevationBand& elevations() const noexcept { return elevations_; }
   /// False if the camera does not see that direction, so that the value is copied from a neighbour.
   [[nodiscard]] bool is_visible(int row, int column) const noexcept;
+  /// Returns the offsets, v * width + u in ascending order, of the pixels that `unwrap` reads; all
+  /// pixels for an equirectangular camera. Cost: some milliseconds.
+  [[nodiscard]] std::vector<std::uint32_t> find_read_pixels() const;
 
   /// Throws ContractError unless the image has the camera's size; colour becomes grey.
   [[nodiscard]] Panorama unwrap(ImageView image) const;
