@@ -29,6 +29,15 @@ double round_to_sensor_rad(double direction_rad) {
   return wrap_angle(std::round(direction_rad / direction_spacing_rad) * direction_spacing_rad);
 }
 
+// Returns the distance to the rectangle of the map, beyond which obstacles are unknown.
+double distance_to_map_m(const FreeSpace& space, Point2 point) {
+  const auto outside_m = [](double value, double low, double high) {
+    return std::max({low - value, value - high, 0.0});
+  };
+  return std::hypot(outside_m(point.x_m, space.low().x_m, space.high().x_m),
+                    outside_m(point.y_m, space.low().y_m, space.high().y_m));
+}
+
 // Returns the directions from the robot's centre in which its hull is sampled.
 std::array<double, 72> hull_directions() {
   std::array<double, 72> directions_rad{};
@@ -47,28 +56,28 @@ double sensor_direction_rad(std::size_t sensor) {
 
 std::array<double, sensor_directions> measure_ranges(const FreeSpace& space, const People* people,
                                                      const Pose2& robot, Random& random,
-                                                     double border_m) {
-  const auto is_within_border = [&](Point2 position) {
-    const auto outside_m = [](double value, double low, double high) {
-      return std::max({low - value, value - high, 0.0});
-    };
-    const double away_m = std::hypot(outside_m(position.x_m, space.low().x_m, space.high().x_m),
-                                     outside_m(position.y_m, space.low().y_m, space.high().y_m));
-    return away_m > 0.0 && away_m < border_m;
-  };
+                                                     std::optional<double> wall_outside_m) {
   constexpr double step_m = 0.01;
   std::array<double, sensor_directions> ranges_m{};
   for (std::size_t sensor = 0; sensor < sensor_directions; ++sensor) {
     const double direction_rad = sensor_direction_rad(sensor);
     double range_m = 0.0;
+    bool has_echo = false;
     while (range_m < max_range_m) {
       const Point2 there = find_point_at(robot, direction_rad, range_m);
-      if (space.clearance_m(there) <= 0.0 && !is_within_border(there)) break;
-      if (people != nullptr && people->has_person_within(there, 0.0)) break;
+      const double outside_m = distance_to_map_m(space, there);
+      if (outside_m > 0.0) {
+        has_echo = wall_outside_m && outside_m >= *wall_outside_m;
+        if (has_echo || !wall_outside_m) break;
+      } else {
+        has_echo = space.clearance_m(there) <= 0.0 ||
+                   (people != nullptr && people->has_person_within(there, 0.0));
+        if (has_echo) break;
+      }
       range_m += step_m;
     }
     range_m += (range_noise_factor * range_m + range_noise_m) * random.normal();
-    ranges_m[sensor] = std::clamp(range_m, 0.0, max_range_m);
+    ranges_m[sensor] = has_echo ? std::clamp(range_m, 0.0, max_range_m) : max_range_m;
   }
   return ranges_m;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "panonav/core/random.hpp"
@@ -30,14 +31,13 @@ inline constexpr double range_noise_m = 0.01;
 /// Returns the direction of a sensor of the ring in the robot frame.
 [[nodiscard]] double sensor_direction_rad(std::size_t sensor);
 
-/// Measures the distance from the robot's centre to the first obstacle or person in each direction
-/// of the ring, with noise; 0 to `max_range_m`. Without noise, at most 2 cells of `space` below the
-/// truth. `people` may be null. `border_m`: distance outside of the map at which a range ends.
-[[nodiscard]] std::array<double, sensor_directions> measure_ranges(const FreeSpace& space,
-                                                                   const People* people,
-                                                                   const Pose2& robot,
-                                                                   Random& random,
-                                                                   double border_m = 0.0);
+/// Measures the noisy distance from the robot's centre to the first obstacle or person in each
+/// direction of the ring; `max_range_m` if there is none up to there or to the border of the map.
+/// Without noise, at most 2 cells of `space` below the truth. `people` may be null.
+/// `wall_outside_m`: distance from the map to a wall around it; nullopt: no wall.
+[[nodiscard]] std::array<double, sensor_directions> measure_ranges(
+    const FreeSpace& space, const People* people, const Pose2& robot, Random& random,
+    std::optional<double> wall_outside_m = {});
 
 /// Returns the direction of contact in the robot frame, as one of the bumper's eight, of a robot
 /// that would touch an obstacle or a person at this pose.

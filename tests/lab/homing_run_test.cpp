@@ -58,6 +58,18 @@ TEST(HomingRun, BothDrivesGetHomeInOfficeAndLab) {
   }
 }
 
+// The floor of the office ends at the border of its map without a wall, near which ranges are
+// measured, too.
+TEST(HomingRun, ARingOfRangesGetsHomeAsOftenAsABumperAlone) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor executor(2);
+  const auto tasks = sample_homing_tasks(place_of("office"), 24, 1.0, 5);
+  HomingRunOptions options;
+  const std::size_t bumper = successes(run_home(place_of("office"), tasks, options, 6, executor));
+  options.sensor = simulation::ObstacleSensor::ranges;
+  EXPECT_GE(successes(run_home(place_of("office"), tasks, options, 6, executor)) + 1, bumper);
+}
+
 TEST(HomingRun, ATiltedRobotGetsHomeWithAnInertialSensorAndWithout) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   Executor executor(2);

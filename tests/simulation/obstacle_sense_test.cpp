@@ -62,7 +62,7 @@ TEST(Ranges, EndInObstaclesWithinTheirNoise) {
   Random random(5);
   int far = 0;
   int all = 0;
-  for (int trial = 0; trial < 40; ++trial) {
+  for (int trial = 0; trial < 60; ++trial) {
     const Pose2 robot = space.random_pose(random);
     const auto ranges_m = measure_ranges(space, nullptr, robot, random);
     for (std::size_t i = 0; i < ranges_m.size(); ++i) {
@@ -153,6 +153,20 @@ TEST(Contact, BlocksTheDirectionIntoTheWall) {
 }
 
 constexpr std::array sensors{ObstacleSensor::bumper, ObstacleSensor::ranges, ObstacleSensor::truth};
+
+TEST(Ranges, DoNotEndWhereTheMapEndsWithoutAnObstacle) {
+  Scene scene = make_empty_room(1.5);
+  scene.floor_low = {-1.5, -1.5};
+  scene.floor_high = {0.5, 1.5};  // the wall in front is a metre beyond the map
+  const FreeSpace space = find_free_space(scene);
+  Random random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const auto ranges_m = measure_ranges(space, nullptr, {0.4, 0.0, 0.0}, random);
+    EXPECT_EQ(ranges_m[0], max_range_m);
+    EXPECT_NEAR(ranges_m[2], 1.5, 0.2);
+    EXPECT_NEAR(ranges_m[4], 1.9, 0.2);
+  }
+}
 
 TEST(SimulatedRobot, StopsWhereItIsEnclosed) {
   const FreeSpace space = find_free_space(make_empty_room(0.3));
