@@ -150,7 +150,14 @@ SimulatedRobot::Step SimulatedRobot::drive(double direct_rad, double advance_m) 
     if (sensor_ == ObstacleSensor::truth) return step;
     const bool has_advanced = distance(before.position(), pose_.position()) >= 0.5 * advance_m;
     const bool has_turned = motion_.drive == DriveKind::differential;
-    back_off_from_contact(has_turned ? 0.0 : *free_rad);
+    const double course_rad = has_turned ? 0.0 : *free_rad;
+    // The side of a contact is known to 22.5 degrees only: if one more follows, it is its course
+    // that is blocked.
+    if (contacts > 0) {
+      const double radius_m = space_->robot_radius_m();
+      known_.add({radius_m * std::cos(course_rad), radius_m * std::sin(course_rad)});
+    }
+    back_off_from_contact(course_rad);
     if (has_advanced) return step;
     if (has_turned) direct_rad = wrap_angle(direct_rad - *free_rad);
   }
