@@ -63,14 +63,13 @@ struct ChainRun {
 
 /// Drives a differential robot along the chain, from the first or the last pose of `route` (the
 /// true path of the recording), with a random heading, wheel and odometry errors; it drives around
-/// obstacles by its sensor, by default with the true free space, which no robot knows. The run ends
-/// when the follower reports an end, when no direction is free, or after 1000 steps and 5 for each
-/// metre of the route. The same seed gives the same run. Throws ContractError on an empty route or
-/// chain.
+/// obstacles by its sensor. The run ends when the follower reports an end, when no direction is
+/// free, or after 1000 steps and 5 for each metre of the route. The same seed gives the same run.
+/// Throws ContractError on an empty route or chain.
 [[nodiscard]] ChainRun follow_chain(
     const HomingPlace& place, const SnapshotChain& chain, std::span<const Pose2> route,
     ChainDirection direction, std::uint64_t seed,
-    simulation::ObstacleSensor sensor = simulation::ObstacleSensor::truth);
+    simulation::ObstacleSensor sensor = simulation::ObstacleSensor::bumper);
 
 /// Measures chains of snapshots along `routes` random routes of 60 m through the place, each
 /// repeated forward and back. The rows "s06.chain.NAME.*" are routes completed to within 50 cm,

@@ -24,6 +24,7 @@
 #include "panonav/route/route_tracker.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/obstacle_sense.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/worlds.hpp"
 #include "panonav_viewer/plot.hpp"
@@ -45,16 +46,23 @@ struct RepeatedRoute {
   std::vector<RouteRun> runs;
 };
 
+// Repeats a route with one sensor for obstacles; every second run is backwards.
+std::vector<RouteRun> repeat_with_sensor(const RouteScene& place, const RouteTracker& tracker,
+                                         int runs, simulation::ObstacleSensor sensor,
+                                         std::uint64_t seed, Executor& executor) {
+  return simulation::make_each(executor, static_cast<std::size_t>(runs), [&](std::size_t i) {
+    return repeat_route(place, tracker, {.back = i % 2 == 1, .sensor = sensor},
+                        Random(seed, 100 + i).next());
+  });
+}
+
 RepeatedRoute record_and_repeat_route(const RouteScene& place, int runs, std::uint64_t seed,
                                       Executor& executor) {
   RepeatedRoute repeated;
   repeated.poses = plan_curved_route(place, long_route_m, spacing_m, seed);
   repeated.panorama = record_route(place, repeated.poses, Random(seed, 7).next(), executor);
-  const RouteTracker tracker(repeated.panorama);
-  repeated.runs =
-      simulation::make_each(executor, static_cast<std::size_t>(runs), [&](std::size_t i) {
-        return repeat_route(place, tracker, {.back = i % 2 == 1}, Random(seed, 100 + i).next());
-      });
+  repeated.runs = repeat_with_sensor(place, RouteTracker(repeated.panorama), runs,
+                                     simulation::ObstacleSensor::bumper, seed, executor);
   return repeated;
 }
 
@@ -91,7 +99,9 @@ void report_routes(const ReproductionOptions& options, const std::string& name,
   }
   const std::size_t runs = results.lateral_cm.size();
   const std::string id = "y03.route." + name;
-  const std::string what = name + ", 60 m route repeated with wheels 5 % wrong, start 0.3 m off";
+  const std::string what = name +
+                           ", 60 m route repeated with wheels 5 % wrong, start 0.3 m off, by a "
+                           "robot with a bumper";
   add_row(result, id + ".lateral", what + ": distance from the route",
           mean_figure(results.lateral_cm, options.seed), "cm", at_most(5.0))
       .over = "mean of " + std::to_string(runs) + " runs";
@@ -118,6 +128,26 @@ void report_routes(const ReproductionOptions& options, const std::string& name,
            "A route of 60 m through " + name +
                ", recorded once and repeated forward and back; the driven paths lie on it.",
            map);
+}
+
+// Runs of the same routes by robots with another sensor for obstacles.
+struct SensorRoutes {
+  simulation::ObstacleSensor sensor;
+  std::string id;
+  std::string what;
+  RouteResults results;
+};
+
+void report_sensors(const std::string& name, const std::vector<SensorRoutes>& sensors,
+                    Reproduction& result) {
+  for (const SensorRoutes& kind : sensors) {
+    const std::string id = "y03.route." + name + "." + kind.id;
+    const std::string what = name + ", the same 60 m routes with " + kind.what;
+    add_mean(result, id + ".lateral", what + ": distance from the route", "cm",
+             kind.results.lateral_cm);
+    add_rate(result, id + ".completed", what + ": runs that reach the end", kind.results.completed,
+             kind.results.lateral_cm.size());
+  }
 }
 
 // Returns the size of a memory file on disk, including the write-ahead log.
@@ -174,15 +204,27 @@ int count_routes(const ReproductionOptions& options) {
 void RouteExperiments::reproduce_loop_routes() const {
   std::vector<RepeatedRoute> routes;
   std::optional<RouteScene> first;
+  using enum simulation::ObstacleSensor;
+  std::vector<SensorRoutes> sensors{
+      {ranges, "ranges", "a bumper and eight noisy ranges", {}},
+      {truth, "truth", "the true free space, which no robot knows", {}}};
+  const int runs = std::min(runs_per_route, options.runs);
   for (int i = 0; i < count_routes(options); ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     RouteScene place =
         make_route_scene(simulation::make_scene("loop", {.seed = seed}), "loop", executor);
-    routes.push_back(
-        record_and_repeat_route(place, std::min(runs_per_route, options.runs), seed, executor));
+    routes.push_back(record_and_repeat_route(place, runs, seed, executor));
+    const RouteTracker tracker(routes.back().panorama);
+    for (SensorRoutes& kind : sensors) {
+      for (const RouteRun& run :
+           repeat_with_sensor(place, tracker, runs, kind.sensor, seed, executor)) {
+        kind.results.add(run, false);
+      }
+    }
     if (!first) first = std::move(place);
   }
   report_routes(options, "loop", *first, routes, result);
+  report_sensors("loop", sensors, result);
   measure_file(routes, result);
 }
 

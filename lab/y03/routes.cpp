@@ -14,7 +14,10 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/motion/path_follower.hpp"
+#include "panonav/motion/velocity.hpp"
+#include "panonav_simulation/obstacle_sense.hpp"
 #include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/people.hpp"
 #include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
@@ -112,25 +115,6 @@ Pose2 sample_start_with_offset(const RouteScene& place, std::span<const Point2> 
   return start;
 }
 
-// Returns a step around an obstacle: half of the planned length, in the direction nearest to the
-// planned one (15 degrees apart) that is free; nullopt if there is none. Without obstacle returns
-// `planned`.
-std::optional<Pose2> find_step_past_obstacle(const RouteScene& place, const Pose2& robot,
-                                             const Pose2& planned) {
-  if (has_clear_line(place, robot.position(), (robot * planned).position())) return planned;
-  const double half_m = 0.5 * std::hypot(planned.x_m, planned.y_m);
-  constexpr int directions_per_side = 11;
-  const auto step_along = [&](double direction_rad) {
-    return Pose2{0.0, 0.0, direction_rad} * Pose2{half_m, 0.0, 0.0};
-  };
-  const auto free_direction =
-      simulation::find_open_direction(0.0, directions_per_side, 0, [&](double direction_rad) {
-        return has_clear_line(place, robot.position(),
-                              (robot * step_along(direction_rad)).position());
-      });
-  return free_direction ? std::optional(step_along(free_direction->direction_rad)) : std::nullopt;
-}
-
 // Returns a step of a widening spiral that searches for the route; it is 0.5 m wide after about 25
 // steps.
 Pose2 spiral_step(int step) {
@@ -217,6 +201,145 @@ Pose2 ScaleErrorWheels::execute(const Pose2& commanded, Random& random) const {
 
 namespace {
 
+/// A robot that repeats a route: its wheels err, and it knows of obstacles what its sensor told.
+class RouteRobot {
+ public:
+  struct Step {
+    Pose2 odometry;                 ///< the commands that it executed, up to a contact
+    bool has_met_obstacle = false;  ///< it touched or avoided an obstacle
+    bool is_stopped = false;        ///< obstacles in all directions
+  };
+
+  RouteRobot(const RouteScene& place, const ScaleErrorWheels& wheels, const Pose2& start,
+             simulation::ObstacleSensor sensor, std::uint64_t seed)
+      : place_(place),
+        wheels_(wheels),
+        pose_(start),
+        sensor_(sensor),
+        nobody_(place.free_space, 0, seed),
+        noise_of_ranges_(seed, 5) {}
+
+  [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+
+  /// Drives a planned step, or half of its length in the nearest direction that is open as far as
+  /// the sensor knows. Contact ends the step.
+  Step drive(const Pose2& planned, Random& random) {
+    known_.advance(std::hypot(planned.x_m, planned.y_m) / BaseOptions{}.speed_m_s);
+    if (sensor_ == simulation::ObstacleSensor::ranges) {
+      known_.add_ranges(
+          simulation::measure_ranges(*place_.free_space, nullptr, pose_, noise_of_ranges_));
+    }
+    auto way = find_open_way(planned);
+    if (!way && sensor_ != simulation::ObstacleSensor::truth) {
+      // Contacts are known to 22.5 degrees only, so it feels again before it gives up.
+      known_ = {};
+      way = find_open_way(planned);
+    }
+    if (!way || contacts_ > 2 * directions_per_side) return {{}, true, true};
+    Step step{.has_met_obstacle = way->rotation_rad != 0.0};
+    if (way->rotation_rad != 0.0) {
+      const Pose2 rotation{0.0, 0.0, way->rotation_rad};
+      pose_ = pose_ * wheels_.execute(rotation, random);
+      known_.move(rotation);
+      step.odometry = rotation;
+    }
+    const bool has_touched = !drive_until_contact(way->advance, random, step.odometry);
+    step.has_met_obstacle |= has_touched;
+    contacts_ = has_touched ? contacts_ + 1 : 0;
+    return step;
+  }
+
+ private:
+  static constexpr int directions_per_side = 11;
+  /// A rotation on the spot and a step after it.
+  struct Way {
+    double rotation_rad = 0.0;
+    Pose2 advance;
+  };
+
+  [[nodiscard]] bool is_open(double direction_rad, double length_m, bool heeds_ranges) const {
+    if (sensor_ != simulation::ObstacleSensor::truth) {
+      return known_.is_open(direction_rad, length_m, place_.scene.robot_radius_m, heeds_ranges);
+    }
+    const Point2 there =
+        pose_ * Point2{length_m * std::cos(direction_rad), length_m * std::sin(direction_rad)};
+    return has_clear_line(place_, pose_.position(), there);
+  }
+
+  std::optional<Way> find_open_way(const Pose2& planned) {
+    const double length_m = std::hypot(planned.x_m, planned.y_m);
+    const double direct_rad = std::atan2(planned.y_m, planned.x_m);
+    // Between noisy ranges a door may seem too narrow; the bumper tells.
+    for (const bool heeds_ranges : {true, false}) {
+      if (length_m == 0.0 || is_open(direct_rad, length_m, heeds_ranges)) {
+        detour_side_ = 0;
+        return Way{0.0, planned};
+      }
+      for (const int side : {detour_side_, -detour_side_}) {
+        const auto open = simulation::find_open_direction(
+            0.0, directions_per_side, side, [&](double direction_rad) {
+              return is_open(direction_rad, 0.5 * length_m, heeds_ranges);
+            });
+        if (!open) continue;
+        detour_side_ = open->side;
+        return Way{open->direction_rad, {0.5 * length_m, 0.0, 0.0}};
+      }
+    }
+    return std::nullopt;
+  }
+
+  /// Drives a step, and after a contact a little back; adds to `odometry` what the wheels report.
+  bool drive_until_contact(const Pose2& advance, Random& random, Pose2& odometry) {
+    const Pose2 before = pose_;
+    const Pose2 after = before * wheels_.execute(advance, random);
+    const auto point_at = [&](double fraction) {
+      return Point2{before.x_m + fraction * (after.x_m - before.x_m),
+                    before.y_m + fraction * (after.y_m - before.y_m)};
+    };
+    const auto is_clear_to = [&](double fraction) {
+      return has_clear_line(place_, before.position(), point_at(fraction));
+    };
+    double fraction = is_clear_to(1.0) ? 1.0 : 0.0;
+    constexpr int halvings = 10;  // to a tenth of a millimetre
+    for (int i = 1; i <= halvings && fraction < 1.0; ++i) {
+      const double further = fraction + std::exp2(-i);
+      if (is_clear_to(further)) fraction = further;
+    }
+    report_motion({fraction * advance.x_m, fraction * advance.y_m, advance.heading_rad}, odometry);
+    pose_ = {point_at(fraction).x_m, point_at(fraction).y_m, after.heading_rad};
+    if (fraction == 1.0) return true;
+    const double radius_m = place_.scene.robot_radius_m;
+    const double contact_rad =
+        simulation::sense_contact_rad(*place_.free_space, nobody_, pose_, radius_m);
+    known_.add({radius_m * std::cos(contact_rad), radius_m * std::sin(contact_rad)});
+    // The side of a contact is known to 22.5 degrees only: if one more follows, it is its course
+    // that is blocked.
+    if (contacts_ > 0) known_.add({radius_m, 0.0});
+    // A tenth of the radius leaves room for driving along a wall.
+    const Pose2 back{-0.1 * radius_m, 0.0, 0.0};
+    if (has_clear_line(place_, pose_.position(), (pose_ * back).position())) {
+      pose_ = pose_ * back;
+      report_motion(back, odometry);
+    }
+    return false;
+  }
+
+  void report_motion(const Pose2& motion, Pose2& odometry) {
+    odometry = odometry * motion;
+    known_.move(motion);
+  }
+
+  const RouteScene& place_;
+  ScaleErrorWheels wheels_;
+  Pose2 pose_;
+  simulation::ObstacleSensor sensor_;
+  simulation::People nobody_;
+  Random noise_of_ranges_;
+  simulation::ObstacleMemory known_;
+  int detour_side_ = 0;  // side of the last detour: 1 left, -1 right, 0 none
+  int contacts_ = 0;     // consecutive steps that ended in contact
+};
+
 /// Adds the fix of a line that was taken at the true pose `robot`; nullopt: off the route.
 void add_line(RouteRun& run, const Pose2& robot, const std::optional<RouteLineFix>& fix) {
   run.truth.push_back(robot);
@@ -247,7 +370,9 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   ScaleErrorWheels wheels;
   wheels.travel = scale();
   wheels.turn = scale();
-  Pose2 robot = sample_start_with_offset(place, path, start, options.start_offset_m, random);
+  RouteRobot robot(place, wheels,
+                   sample_start_with_offset(place, path, start, options.start_offset_m, random),
+                   options.sensor, seed);
   tracker.set_pose(start);
   PathFollower follower(path);
   const auto max_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
@@ -257,15 +382,16 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   constexpr int max_lines_without_fix = 4;
   int lines_without_fix = 0;
   for (int step = 0; step < max_steps; ++step) {
+    const Pose2 here = robot.pose();
     const auto line =
-        simulation::capture_line(*place.renderer, robot, place.camera, noise_of_lines.next());
+        simulation::capture_line(*place.renderer, here, place.camera, noise_of_lines.next());
     std::optional<RouteLineFix> fix;
     if (const auto found = tracker.track(line, commanded))
       fix = RouteLineFix{found->pose, found->along_m};
     lines_without_fix = fix ? 0 : lines_without_fix + 1;
     run.lateral_m.push_back(
-        distance_from_expected_part_m(robot.position(), poses, follower.along_m()));
-    add_line(run, robot, fix);
+        distance_from_expected_part_m(here.position(), poses, follower.along_m()));
+    add_line(run, here, fix);
     const Pose2 estimate = tracker.pose().value_or(start);
     const auto target = follower.next_target(estimate.position());
     if (!target) {
@@ -275,23 +401,15 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     const Pose2 planned = lines_without_fix < max_lines_without_fix
                               ? steer_to(estimate, *target, {.step_m = options.step_m})
                               : spiral_step(lines_without_fix - max_lines_without_fix);
-    const auto free_step = find_step_past_obstacle(place, robot, planned);
-    if (!free_step) {
+    const auto driven = robot.drive(planned, random);
+    if (driven.is_stopped) {
       run.blocked = true;
       break;
     }
-    commanded = *free_step;
-    run.obstacle_steps += static_cast<std::size_t>(commanded != planned);
-    const Pose2 there = robot * wheels.execute(commanded, random);
-    // Wheel errors may lead the robot into an obstacle: then it turns, but does not move.
-    if (has_clear_line(place, robot.position(), there.position())) {
-      robot = there;
-    } else {
-      robot.heading_rad = there.heading_rad;
-      ++run.obstacle_steps;
-    }
+    commanded = driven.odometry;
+    run.obstacle_steps += driven.has_met_obstacle ? 1 : 0;
   }
-  run.end_distance_m = distance(robot.position(), path.back());
+  run.end_distance_m = distance(robot.pose().position(), path.back());
   return run;
 }
 

@@ -12,6 +12,7 @@
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/route/route_tracker.hpp"
 #include "panonav_simulation/line_camera.hpp"
+#include "panonav_simulation/obstacle_sense.hpp"
 #include "panonav_simulation/place_recording.hpp"
 #include "panonav_viewer/plot.hpp"
 
@@ -49,6 +50,7 @@ struct RouteRunOptions {
   double wheel_scale_error = 0.05;  ///< scale error of travel and turn, random sign per run
   double start_offset_m = 0.3;      ///< lateral; the robot assumes the start of the route
   double step_m = 0.15;             ///< driven between two lines
+  simulation::ObstacleSensor sensor = simulation::ObstacleSensor::bumper;
 };
 
 /// A pose estimated from one line.
@@ -65,7 +67,7 @@ struct RouteRun {
   std::vector<double> position_m;  ///< error of the fixes
   std::size_t off_route = 0;       ///< lines that were not recognised as of this route
   bool arrived = false;            ///< the robot reported the end of the route
-  std::size_t obstacle_steps = 0;  ///< steps with an obstacle in the robot's path
+  std::size_t obstacle_steps = 0;  ///< steps at which it touched or avoided an obstacle
   bool blocked = false;            ///< obstacles in all directions
   double end_distance_m = 0.0;     ///< from the end of the route
 
@@ -77,9 +79,9 @@ struct RouteRun {
 
 /// Repeats a route in closed loop: the tracker localises each line in the route panorama from the
 /// pose predicted by the wheels, and the robot steers to a point a little ahead on the path. It
-/// senses obstacles and drives around them, and drives a spiral after several lines that are not of
-/// the route. `tracker` must be made from this route. The same seed gives the same run. Cost: one
-/// rendered line per step.
+/// drives around obstacles as far as its sensor knows them, and drives a spiral after several lines
+/// that are not of the route. `tracker` must be made from this route. The same seed gives the same
+/// run. Cost: one rendered line per step.
 [[nodiscard]] RouteRun repeat_route(const RouteScene& place, RouteTracker tracker,
                                     const RouteRunOptions& options, std::uint64_t seed);
 
