@@ -14,8 +14,8 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/panorama/panorama.hpp"
 #include "panonav/panorama/preprocessing.hpp"
-#include "panonav/panorama/unwarper.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/simulated_odometry.hpp"
@@ -265,22 +265,11 @@ PublishedRuleErrors measure_published_rule(const simulation::MappingRecording& r
   return errors;
 }
 
-Camera make_mirror_camera() {
-  Camera camera;
-  camera.model = HyperboloidalModel{};
-  camera.image_size = {640, 480};
-  camera.centre = {320.0, 240.0};
-  camera.rim_radius_px = 230.0;
-  camera.inner_radius_px = 40.0;
-  return camera;
-}
-
 simulation::MappingRecording record_by_mirror(const simulation::PlaceRecording& place,
                                               std::span<const Pose2> plan, int components,
                                               const OdometryNoise& wheels, std::uint64_t seed,
                                               Executor& executor) {
-  const Camera camera = make_mirror_camera();
-  const Unwarper unwarper(camera, {80, 512});
+  const simulation::PanoramaRendering rendering = simulation::make_mirror_rendering(80, 512);
   Random random(seed, 500);
   simulation::MappingRecording recording;
   for (const Pose2& planned : plan) {
@@ -290,12 +279,10 @@ simulation::MappingRecording record_by_mirror(const simulation::PlaceRecording& 
       pose = last * sample_step(inverse(last) * planned, wheels, random);
       if (!place.free_space->is_free(pose.position())) pose = planned;
     }
-    const Image image = simulation::capture_image(
-        *place.renderer, pose, camera,
-        {.camera_height_m = place.scene.camera_height_m, .rays_per_axis = 1}, {},
-        seed + recording.truth.size(), executor);
-    recording.views.push_back(
-        compute_signature(preprocess(unwarper.unwrap(image.view()), {}), components));
+    Panorama view = simulation::capture_panorama(*place.renderer, pose, rendering,
+                                                 {.camera_height_m = place.scene.camera_height_m},
+                                                 {}, seed + recording.truth.size(), executor);
+    recording.views.push_back(compute_signature(preprocess(std::move(view), {}), components));
     recording.truth.push_back(pose);
   }
   recording.wheels = simulation::simulate_odometry(recording.truth, wheels, seed);

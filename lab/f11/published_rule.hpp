@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "lab/rows.hpp"
-#include "panonav/camera/camera.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav_simulation/mapping_run.hpp"
@@ -51,12 +50,9 @@ struct PublishedRuleErrors {
     const simulation::MappingRecording& recording, const PublishedRuleVariant& variant,
     const PublishedFigure& published, Executor& executor);
 
-/// Returns a camera with a hyperbolic mirror and images of 640 x 480.
-[[nodiscard]] Camera make_mirror_camera();
-
-/// Records images of `make_mirror_camera` along `plan`. Each step leads to the next planned pose
-/// and errs as those of `wheels`; a step that would leave the free space is made without error.
-/// Throws as `simulation::capture_image`.
+/// Records images of the simulated mirror camera along `plan`. Each step leads to the next planned
+/// pose and errs as those of `wheels`; a step that would leave the free space is made without
+/// error. Throws as `simulation::capture_image`.
 [[nodiscard]] simulation::MappingRecording record_by_mirror(const simulation::PlaceRecording& place,
                                                             std::span<const Pose2> plan,
                                                             int components,

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -146,21 +148,14 @@ struct SetResults {
     return without;
   }
 
-  /// Drives along a recording again with a mirror camera, maps its images, and adds both recordings
-  /// to `study`.
-  void add_mirror(const simulation::PlaceRecording& place,
-                  const simulation::MappingRecording& recording, PublishedRuleStudy& study,
-                  Executor& executor) {
-    const auto by_mirror =
-        record_by_mirror(place, recording.truth, recording.views.front().components(),
-                         simulation::make_noisy_wheels(), 1000 * place.seed, executor);
+  /// Maps the mirror images of a drive and adds the errors.
+  void add_mirror(const simulation::MappingRecording& by_mirror) {
     for (const bool close_loops : {false, true}) {
       const auto mapped =
           simulation::map_recording(by_mirror, {.mapping = {.close_loops = close_loops}});
       auto& errors = close_loops ? mirror_closed : mirror_open;
       errors.push_back(simulation::shape_error(mapped.estimate, mapped.truth));
     }
-    study.add(place, recording, by_mirror, executor);
   }
 
   struct Targets {
@@ -297,6 +292,46 @@ struct FirstSetVariations {
   }
 };
 
+simulation::MappingRecording record_drive(const MappingExperiments& f11,
+                                          const simulation::PlaceRecording& place,
+                                          const std::vector<Pose2>& poses) {
+  return simulation::record_for_mapping(place, poses, max_components + 2,
+                                        simulation::make_noisy_wheels(), 1000 * place.seed,
+                                        f11.executor);
+}
+
+/// Drives along the same path as a recording with a mirror camera.
+simulation::MappingRecording record_again_by_mirror(const MappingExperiments& f11,
+                                                    const simulation::PlaceRecording& place,
+                                                    const simulation::MappingRecording& recording) {
+  return record_by_mirror(place, recording.truth, max_components + 2,
+                          simulation::make_noisy_wheels(), 1000 * place.seed, f11.executor);
+}
+
+/// A drive through a variant of a scene, recorded as panoramas and by a mirror camera.
+using DriveMeasurement = std::function<void(const simulation::PlaceRecording& place,
+                                            const simulation::MappingRecording& recording,
+                                            const simulation::MappingRecording& by_mirror)>;
+
+/// Measures the published rule, and `measure`, on drives along the round trip through all variants
+/// of a scene, and the rule on drives beside it, at `offsets_m`, through every second one.
+void measure_round_trips(const MappingExperiments& f11, const std::string& scene,
+                         std::span<const double> offsets_m, PublishedRuleStudy& published,
+                         const DriveMeasurement& measure = {}) {
+  for (int s = 0; s < f11.options.scenes; ++s) {
+    const simulation::PlaceRecording place = f11.make_variant(scene, s);
+    const auto recording = record_drive(
+        f11, place, drive(place, {}, loop_spacing_m, static_cast<std::size_t>(f11.options.views)));
+    const auto by_mirror = record_again_by_mirror(f11, place, recording);
+    if (measure) measure(place, recording, by_mirror);
+    published.add(place, recording, by_mirror, f11.executor);
+    published.add_spacings(recording, loop_spacing_m, f11.executor);
+    if (s % 2 == 0)
+      published.add_offset_tours(place, offsets_m, loop_spacing_m, recording.views.size(),
+                                 f11.executor);
+  }
+}
+
 }  // namespace
 
 simulation::PlaceRecording MappingExperiments::make_variant(const std::string& scene,
@@ -312,20 +347,15 @@ void MappingExperiments::reproduce_first_set() const {
   FirstSetVariations variations;
   constexpr std::array offsets_m{-0.3, -0.15, 0.15, 0.3};
   PublishedRuleStudy published(first_figure);
-  for (int s = 0; s < options.scenes; ++s) {
-    const simulation::PlaceRecording place = make_variant("loop", s);
-    const simulation::MappingRecording recording = simulation::record_for_mapping(
-        place, drive(place, {}, loop_spacing_m, static_cast<std::size_t>(options.views)),
-        max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
-    set.add(place, recording, {});
-    add_published_errors(recording, set.grid);
-    set.add_mirror(place, recording, published, executor);
-    published.add_spacings(recording, loop_spacing_m, executor);
-    if (s % 2 == 0)
-      published.add_offset_tours(place, offsets_m, loop_spacing_m, recording.views.size(),
-                                 executor);
-    variations.add_variations(recording, set.open.back(), set.closed.back());
-  }
+  measure_round_trips(
+      *this, "loop", offsets_m, published,
+      [&](const simulation::PlaceRecording& place, const simulation::MappingRecording& recording,
+          const simulation::MappingRecording& by_mirror) {
+        set.add(place, recording, {});
+        add_published_errors(recording, set.grid);
+        set.add_mirror(by_mirror);
+        variations.add_variations(recording, set.open.back(), set.closed.back());
+      });
   set.report({.open = at_most(0.02),
               .closed = at_most(0.006),
               .closed_with_wheels = at_most(0.002),
@@ -352,9 +382,8 @@ void MappingExperiments::reproduce_second_set() const {
     const simulation::PlaceRecording place = make_variant("lab", s);
     std::vector<Point2> path = place.scene.tour;
     path.insert(path.end(), place.scene.tour.begin(), place.scene.tour.end());
-    const simulation::MappingRecording recording = simulation::record_for_mapping(
-        place, drive(place, path, capture_spacing_m, pictures_per_captured_view * views),
-        max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
+    const auto recording = record_drive(
+        *this, place, drive(place, path, capture_spacing_m, pictures_per_captured_view * views));
     const auto open = set.add(
         place, recording,
         {.mapping = {.capture_difference = capture_difference}, .max_nodes = views * 3 / 4});
@@ -367,7 +396,9 @@ void MappingExperiments::reproduce_second_set() const {
       captured.views.push_back(recording.views[i]);
     }
     add_published_errors(captured, set.grid);
-    set.add_mirror(place, captured, published, executor);
+    const auto by_mirror = record_again_by_mirror(*this, place, captured);
+    set.add_mirror(by_mirror);
+    published.add(place, captured, by_mirror, executor);
     published.add_spacings(recording, capture_spacing_m, executor);
     if (s % 2 == 0)
       published.add_offset_tours(place, offsets_m, loop_spacing_m, views * 3 / 5, executor);
@@ -391,20 +422,7 @@ void MappingExperiments::reproduce_second_set() const {
 void MappingExperiments::measure_wide_room() const {
   constexpr std::array offsets_m{-0.6, 0.6, 1.2, 1.8};
   PublishedRuleStudy published(first_figure);
-  for (int s = 0; s < options.scenes; ++s) {
-    const simulation::PlaceRecording place = make_variant("hall", s);
-    const simulation::MappingRecording recording = simulation::record_for_mapping(
-        place, drive(place, {}, loop_spacing_m, static_cast<std::size_t>(options.views)),
-        max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
-    const auto by_mirror =
-        record_by_mirror(place, recording.truth, max_components + 2,
-                         simulation::make_noisy_wheels(), 1000 * place.seed, executor);
-    published.add(place, recording, by_mirror, executor);
-    published.add_spacings(recording, loop_spacing_m, executor);
-    if (s % 2 == 0)
-      published.add_offset_tours(place, offsets_m, loop_spacing_m, recording.views.size(),
-                                 executor);
-  }
+  measure_round_trips(*this, "hall", offsets_m, published);
   published.report("f11.hall", "hall, " + std::to_string(options.views) + " views 10 cm apart",
                    result);
 }

@@ -25,6 +25,7 @@
 #include "panonav/signature/signature_extractor.hpp"
 #include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/mapping_run.hpp"
+#include "panonav_simulation/mirror.hpp"
 #include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/worlds.hpp"
@@ -202,7 +203,7 @@ struct MirrorImages {
 
 MirrorImages capture_mirror_images(const MappingExperiments& f11) {
   const simulation::PlaceRecording place = f11.make_variant("loop", 0);
-  const Camera camera = make_mirror_camera();
+  const Camera camera = simulation::make_simulated_mirror_camera();
   std::vector<Image> images;
   for (const Pose2& pose :
        drive(place, {}, 0.1, static_cast<std::size_t>(std::min(60, f11.options.views)))) {
