@@ -43,10 +43,10 @@ ExitCode reproduce(const ReproduceArguments& arguments, Session& session) {
   }
   print_rows(result, session);
   const lab::TargetCount count = lab::count_targets(result.rows);
-  session.print(std::to_string(result.rows.size()) + " rows, " +
-                std::to_string(count.judged - count.held) +
-                " of them miss their target; images and tables: " +
-                (std::filesystem::path(out) / "index.html").string());
+  session.print(
+      session.bold(std::to_string(count.held) + " of " + std::to_string(count.judged)) +
+      " targets met, " + std::to_string(result.rows.size()) +
+      " rows; images and tables: " + (std::filesystem::path(out) / "index.html").string());
   return ExitCode::done;
 }
 
@@ -117,7 +117,7 @@ Run declare_reproduce(Arguments& arguments) {
                    "For m03: run only this part of the experiments (default: all parts)");
   arguments.choice("--optics", values->optics, {"mirror", "panorama"},
                    "For m03, m04, navigation, s06: unwarp the views from images of a mirror "
-                   "camera, or render them directly, which takes a fourth to a ninth of the time "
+                   "camera, or render them directly, which takes a third to a sixth of the time "
                    "(default: panorama)");
   arguments.hide_from_help({"--queries", "--rows", "--only", "--optics"});
   arguments.declare_outputs({"--out"});
