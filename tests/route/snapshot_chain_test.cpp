@@ -11,6 +11,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/route/chain_follower.hpp"
 #include "panonav/route/chain_recorder.hpp"
 #include "support/remembered_worlds.hpp"

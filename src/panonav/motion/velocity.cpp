@@ -6,6 +6,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/motion/command.hpp"
 
 namespace panonav {
 
@@ -29,20 +30,7 @@ Velocity compute_command_towards(double direction_rad, double distance_m,
   require(std::isfinite(direction_rad), "direction_rad", direction_rad, "finite");
   require(std::isfinite(distance_m) && distance_m >= 0.0, "distance_m", distance_m,
           ">= 0 and finite");
-  if (distance_m == 0.0) return {};
-  const double speed = std::min(options.speed_m_s, distance_m / options.period_s);
-  if (options.drive == DriveKind::holonomic) {
-    return {speed * std::cos(direction_rad), speed * std::sin(direction_rad), 0.0};
-  }
-  const double angle = wrap_angle(direction_rad);
-  const double turn = std::clamp(angle / options.period_s, -options.turn_rad_s, options.turn_rad_s);
-  if (std::abs(angle) > options.on_spot_rad) return {0.0, 0.0, turn};
-  // Limits the speed so that the largest rotation speed suffices for the arc to the point, whose
-  // curvature is 2 sin(angle) / distance.
-  const double arc =
-      0.5 * options.turn_rad_s * distance_m / std::max(std::abs(std::sin(angle)), 1e-9);
-  const double forward = std::min(speed * std::cos(angle), arc);
-  return {forward, 0.0, turn};
+  return command_towards(direction_rad, distance_m, options);
 }
 
 Pose2 integrate_velocity(const Velocity& velocity, double duration_s) {

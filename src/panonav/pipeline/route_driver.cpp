@@ -82,45 +82,24 @@ RouteDriver::Step RouteDriver::step(const Observation& observation,
 ChainDriver::ChainDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
                          const std::optional<std::string>& name, ChainDirection direction,
                          const BaseOptions& base)
-    : base_(base), guide_(memory, source, name, direction) {
-  validate(base_);
-}
-
-Point2 ChainDriver::target_from(const Pose2& odometry) const {
-  const double direction_rad = decision_->turn_rad;
-  const Point2 target{decision_->advance_m * std::cos(direction_rad),
-                      decision_->advance_m * std::sin(direction_rad)};
-  return inverse(odometry) * (decided_at_ * target);
+    : guide_(memory, source, name, direction), helm_(base) {
+  validate(base);
 }
 
 ChainDriver::Step ChainDriver::step(const Observation& observation) {
-  // A motion ends when this part of it is left: the next decision is by an image, and corrects it.
-  constexpr double left_part = 0.05;
   if (!observation.odometry) {
     throw ContractError("odometry of the observation", "unknown", "known, to repeat a route");
   }
   const Pose2& odometry = *observation.odometry;
-  const auto is_over = [](ChainState state) {
-    return state == ChainState::arrived || state == ChainState::lost;
-  };
-  const auto remaining_m = [&] {
-    const Point2 ahead = target_from(odometry);
-    return std::hypot(ahead.x_m, ahead.y_m);
-  };
   Step step;
-  if (!decision_ ||
-      (!is_over(decision_->state) && remaining_m() <= left_part * decision_->advance_m)) {
-    decision_ = guide_.step(observation);
-    decided_at_ = odometry;
+  if (helm_.needs_decision(odometry)) {
+    helm_.begin(guide_.step(observation), odometry);
     step.decided = true;
   }
-  step.state = decision_->state;
-  step.snapshot = guide_.snapshot_number(decision_->target);
-  if (is_over(step.state)) return step;
-  const Point2 ahead = target_from(odometry);
-  step.remaining_m = std::hypot(ahead.x_m, ahead.y_m);
-  step.velocity =
-      compute_command_towards(std::atan2(ahead.y_m, ahead.x_m), step.remaining_m, base_);
+  step.state = helm_.decision()->state;
+  step.snapshot = guide_.snapshot_number(helm_.decision()->target);
+  step.remaining_m = helm_.remaining_m(odometry);
+  step.velocity = helm_.velocity(odometry);
   return step;
 }
 

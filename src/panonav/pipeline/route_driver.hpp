@@ -10,6 +10,7 @@
 #include "panonav/motion/velocity.hpp"
 #include "panonav/pipeline/chain_route.hpp"
 #include "panonav/pipeline/route_follower.hpp"
+#include "panonav/route/chain_helm.hpp"
 
 namespace panonav {
 
@@ -111,13 +112,8 @@ class ChainDriver {
   [[nodiscard]] const SnapshotChain& chain() const noexcept { return guide_.chain(); }
 
  private:
-  /// Returns the point to which the present motion leads, in the robot frame at `odometry`.
-  [[nodiscard]] Point2 target_from(const Pose2& odometry) const;
-
-  BaseOptions base_;
   ChainGuide guide_;
-  std::optional<ChainDecision> decision_;
-  Pose2 decided_at_;  // pose by odometry at the last decision
+  ChainHelm helm_;
 };
 
 }  // namespace panonav

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 
+#include "panonav/core/portable_math.hpp"
 #include "panonav/relative_pose/internal/turn_bound.hpp"
 #include "panonav/signature/correlation_point.hpp"
 
@@ -50,8 +52,9 @@ const CircleTable& unit_circle() {
         const double angle = 2.0 * std::numbers::pi *
                              static_cast<double>(i * (max_points / count)) /
                              static_cast<double>(max_points);
-        table.cosine[count + i] = static_cast<float>(std::cos(angle));
-        table.sine[count + i] = static_cast<float>(std::sin(angle));
+        const auto [cosine, sine] = portable::cosine_sine(angle);
+        table.cosine[count + i] = static_cast<float>(cosine);
+        table.sine[count + i] = static_cast<float>(sine);
       }
     }
     return table;
@@ -97,7 +100,8 @@ float sequential_heading(const TurnCorrelation& correlation) noexcept {
   float all = 0.0F;
   for (int k = 1; k <= correlation.highest; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    differences[i] = std::atan2(correlation.imaginary[i], correlation.real[i]);
+    differences[i] = static_cast<float>(portable::atan2(
+        static_cast<double>(correlation.imaginary[i]), static_cast<double>(correlation.real[i])));
     const auto frequency = static_cast<float>(k);
     weights[i] = frequency * frequency *
                  std::sqrt(correlation.real[i] * correlation.real[i] +
@@ -172,8 +176,12 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
     peaks[i].turn_rad = refine_peak(correlation, peaks[i].turn_rad, half_step_rad);
     peaks[i].value = correlation.at(peaks[i].turn_rad);
   }
-  std::stable_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(refined),
-                   [](const Peak& a, const Peak& b) { return a.value > b.value; });
+  // Insertion keeps the order of equal values and needs no memory.
+  for (std::size_t i = 1; i < refined; ++i) {
+    for (std::size_t j = i; j > 0 && peaks[j].value > peaks[j - 1].value; --j) {
+      std::swap(peaks[j], peaks[j - 1]);
+    }
+  }
   const std::size_t filled = std::min(refined, turns.size());
   for (std::size_t i = 0; i < filled; ++i) turns[i] = peaks[i].turn_rad;
   return static_cast<int>(filled);

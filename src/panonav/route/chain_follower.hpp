@@ -1,135 +1,42 @@
 #pragma once
 
-#include <cstddef>
-#include <optional>
 #include <vector>
 
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/route/chain_pilot.hpp"
 #include "panonav/route/snapshot_chain.hpp"
 
 namespace panonav {
 
-struct SnapshotSight;
-
-/// Direction in which a chain is followed.
-enum class ChainDirection {
-  forward,  ///< as recorded
-  back,     ///< from the last snapshot to the first
-};
-
-/// The present activity of a robot that follows a chain.
-enum class ChainState {
-  travelling,  ///< by odometry to the next snapshot
-  homing,      ///< to the next snapshot, whose view is similar
-  searching,   ///< for a snapshot that was not found where odometry expects it
-  arrived,     ///< homing ended at the last snapshot
-  lost,        ///< the search ended without a similar view
-};
-
-/// The next motion of the robot after a view.
-struct ChainDecision {
-  ChainState state = ChainState::travelling;  ///< after the view
-  std::size_t target = 0;                     ///< node of the snapshot to which the robot moves
-  double turn_rad = 0.0;   ///< direction of the motion in the current robot frame
-  double advance_m = 0.0;  ///< length of the motion; 0 if arrived or lost
-};
-
-/// Steps of a robot that follows a chain.
-struct ChainFollowerOptions {
-  double max_step_m = 0.3;    ///< longest motion between two views, > 0
-  double stop_step_m = 0.02;  ///< homing ends when its steps are shorter than this, > 0
-  int max_homing_steps = 40;  ///< of one approach to a snapshot, >= 1
-  double error_factor = 1.5;  ///< radius of the search, in errors of the odometry, >= 1
-  friend bool operator==(const ChainFollowerOptions&, const ChainFollowerOptions&) = default;
-};
 void visit_options(ChainFollowerOptions& options, OptionVisitor& visitor);
 
-/// Repeats a route along a chain of snapshots. The robot travels from snapshot to snapshot by
-/// odometry. At each one it homes, which resets the drift of position and heading and shows the
-/// systematic errors of the odometry. A snapshot that is not found where odometry expects it is
-/// searched for along a spiral, whose turns are half as far apart as homing reaches, up to the
-/// error of the odometry; without success the robot is lost. It has arrived only if homing ended at
-/// a view that is as similar to the last snapshot as those beside snapshots were while recording,
-/// and where the error of odometry allows it to be.
+/// Repeats a route along a chain of snapshots: a `ChainPilot` that owns its chain and checks its
+/// arguments.
 class ChainFollower {
  public:
   /// Throws OptionError; ContractError on a chain without nodes.
   ChainFollower(SnapshotChain chain, ChainDirection direction,
                 const ChainFollowerOptions& options = {}, const ChainOdometry& odometry = {});
+  ChainFollower(const ChainFollower&) = delete;  // the pilot refers to the chain
+  ChainFollower& operator=(const ChainFollower&) = delete;
+  ChainFollower(ChainFollower&&) = default;
+  ChainFollower& operator=(ChainFollower&&) = default;
+  ~ChainFollower() = default;
 
-  /// Decides the next motion after the motion `moved` since the last view
-  /// (robot_old_from_robot_new, by odometry; ignored for the first view). The robot starts beside a
-  /// snapshot, of any heading: the first one of its direction if the view is similar to it, else
-  /// the most similar one. After `arrived` or `lost` every decision is the same. Throws
-  /// ContractError as `ChainRecorder::add`.
+  /// Decides the next motion as `ChainPilot::decide`; the view may have more rows and components
+  /// than the snapshots. Throws ContractError as `ChainRecorder::add`.
   [[nodiscard]] ChainDecision decide(const HomingView& view, const Pose2& moved);
 
   /// The estimated pose in the frame of the chain, in which snapshots have the heading 0.
-  [[nodiscard]] const Pose2& chain_from_robot() const noexcept { return pose_; }
+  [[nodiscard]] const Pose2& chain_from_robot() const noexcept { return pilot_.chain_from_robot(); }
 
  private:
-  [[nodiscard]] std::optional<std::size_t> next_snapshot(std::size_t node) const noexcept;
-  [[nodiscard]] std::size_t step_towards_end(std::size_t node) const noexcept;
-  [[nodiscard]] Point2 position(std::size_t node) const { return chain_.nodes()[node].position; }
-  [[nodiscard]] double error_m() const noexcept;
-  [[nodiscard]] double path_to_target_m() const;
-  [[nodiscard]] SnapshotSight look_at(std::size_t node, const HomingView& view,
-                                      bool any_heading) const;
-  [[nodiscard]] bool is_confident(const SnapshotSight& sight) const;
-  [[nodiscard]] Point2 home_from_robot(const HomeVector& vector) const;
-  [[nodiscard]] bool agrees_with_odometry(const SnapshotSight& sight) const;
-
-  void start(const HomingView& view);
-  void aim_at(std::size_t node);
-  void fix_pose(const HomeVector& vector);
-  void learn_drift(const Pose2& fixed);
-  void begin_homing();
-  [[nodiscard]] double next_step_m(const SnapshotSight& sight);
-  void begin_search();
-  void fail_approach();
-  [[nodiscard]] ChainDecision move_to(Point2 place) const;
-  [[nodiscard]] ChainDecision end_with(ChainState state);
-  [[nodiscard]] ChainDecision travel(const HomingView& view);
-  [[nodiscard]] ChainDecision home(const HomingView& view);
-  [[nodiscard]] ChainDecision search(const HomingView& view);
-
   SnapshotChain chain_;
-  ChainDirection direction_;
-  ChainFollowerOptions options_;
-  ChainOdometry odometry_;
-  ChainState state_ = ChainState::travelling;
-  bool has_started_ = false;
-  Pose2 pose_;                   // chain_from_robot
-  double since_fix_m_ = 0.0;     // distance driven since the last snapshot was reached
-  std::size_t target_ = 0;       // node of the next snapshot
-  std::size_t way_point_ = 0;    // node to which the robot travels
-  double since_target_m_ = 0.0;  // distance driven since the target was chosen
-  double expected_path_m_ = 0.0;
-  // Systematic errors of the odometry in both drives, for each metre driven.
-  Point2 drift_m_per_m_;         // by wind, in the frame of the chain
-  double scale_error_ = 0.0;     // relative error of distances
-  double turn_rad_per_m_ = 0.0;  // drift of the heading
-  Pose2 fixed_pose_;             // at the last snapshot that was reached
-  double heading_by_odometry_rad_ = 0.0;
-  // The present approach.
-  int homing_stage_ = 0;
-  int homing_steps_ = 0;
-  double step_factor_ = 1.0;
-  std::optional<double> last_direction_rad_;
-  double min_difference_ = 2.0;
-  double approach_confidence_ = -1.0;  // largest one
-  int steps_since_min_ = 0;
-  // The present search.
-  std::vector<Point2> spiral_;
-  std::size_t search_steps_ = 0;
-  double fix_to_search_m_ = 0.0;  // distance driven from the last snapshot until then
-  std::size_t spiral_point_ = 0;
-  int steps_to_point_ = 0;
-  double since_approach_m_ = 0.0;    // distance driven since the last approach failed
-  double failed_confidence_ = -1.0;  // largest one of the approaches that failed
+  std::vector<ChainStop> stops_;
+  std::vector<float> workspace_;
+  ChainPilot pilot_;
 };
 
 }  // namespace panonav

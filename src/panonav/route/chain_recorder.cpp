@@ -6,35 +6,21 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
-#include "panonav/geometry/angles.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/route/internal/snapshot_sight.hpp"
 
 namespace panonav {
 
 namespace {
 
-// Largest deviation of a right home vector from the direction by odometry.
-constexpr double right_direction_rad = 0.6;
 // Distance between views that are kept until the next snapshot.
 constexpr double kept_view_spacing_m = 0.1;
-// Nearer views are not compared, because noise dominates the direction of their home vector.
-constexpr double min_compared_m = 0.15;
-constexpr double max_compared_m = 3.0;
-// Headings at which views, turned to heading 0, are compared: as far as a follower's may be off.
-constexpr HeadingWindow heading_window{0.0F, 0.8F};
 // Smallest distance between snapshots along the path.
 constexpr double min_snapshot_spacing_m = 0.5;
 // Largest distance of the path from the legs between way points.
 constexpr double corner_tolerance_m = 0.15;
 // Further views are tested over this part of the way to the farthest one that can be reached.
 constexpr double tested_beyond = 0.3;
-constexpr std::size_t packed_leg_bytes = 3;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double point_to_chord_m(Point2 p, Point2 from, Point2 to) {
   const double length_m = distance(from, to);
@@ -59,43 +45,6 @@ void find_way_points(const std::vector<Point2>& path, std::size_t begin, std::si
   find_way_points(path, begin, farthest, found);
   found.push_back(farthest);
   find_way_points(path, farthest, end, found);
-}
-
-/// A normal distribution of logarithms.
-struct LogNormal {
-  double mean = 0.0;
-  double deviation = 1.0;
-
-  static LogNormal fit(const std::vector<double>& values) {
-    constexpr double min_value = 1e-4;
-    constexpr double min_deviation = 0.1;
-    LogNormal fitted;
-    for (const double v : values) fitted.mean += std::log(std::max(v, min_value));
-    fitted.mean /= static_cast<double>(values.size());
-    double squares = 0.0;
-    for (const double v : values) {
-      const double off = std::log(std::max(v, min_value)) - fitted.mean;
-      squares += off * off;
-    }
-    fitted.deviation =
-        std::max(min_deviation, std::sqrt(squares / static_cast<double>(values.size())));
-    return fitted;
-  }
-  [[nodiscard]] double log_density(double log_value) const {
-    const double z = (log_value - mean) / deviation;
-    return -0.5 * z * z - std::log(deviation);
-  }
-};
-
-// The value at which both are equally probable, between their means.
-double find_equal_density(const LogNormal& low, const LogNormal& high) {
-  double below = low.mean;
-  double above = std::max(high.mean, low.mean);
-  for (int i = 0; i < 40; ++i) {
-    const double middle = 0.5 * (below + above);
-    (low.log_density(middle) > high.log_density(middle) ? below : above) = middle;
-  }
-  return std::exp(below);
 }
 
 }  // namespace
@@ -125,7 +74,7 @@ ChainRecorder::ChainRecorder(const SnapshotShape& shape, const ChainSpacing& spa
 }
 
 double ChainRecorder::bytes_per_snapshot() const noexcept {
-  return static_cast<double>(chain_.shape().bytes() + packed_leg_bytes);
+  return static_cast<double>(chain_.shape().bytes() + ChainLeg::bytes);
 }
 
 double ChainRecorder::min_spacing_m() const noexcept {
@@ -134,11 +83,9 @@ double ChainRecorder::min_spacing_m() const noexcept {
 }
 
 bool ChainRecorder::can_home(const StoredView& from, const StoredView& to) const {
-  const HomeVector vector = home_vector(to.view, from.view, {}, heading_window);
-  if (vector.length() == 0.0) return false;
-  const double true_rad =
-      std::atan2(to.position.y_m - from.position.y_m, to.position.x_m - from.position.x_m);
-  return std::abs(wrap_angle(vector.direction_rad() - true_rad)) <= right_direction_rad;
+  const HomeVector vector = home_vector(to.view, from.view, {}, compared_headings);
+  return vector.length() > 0.0 &&
+         is_right_direction(vector.direction_rad(), from.position, to.position);
 }
 
 // True if homing bridges the error of odometry over the way between the last snapshot and a view,
@@ -211,12 +158,7 @@ void ChainRecorder::compare_with_snapshot(std::size_t index) {
   double reach_m = 0.0;
   bool is_reached = true;
   const auto compare = [&](const HomingView& view, Point2 from) {
-    const SnapshotSight sight = look_at_snapshot(snapshot, view, heading_window);
-    const HomeVector& vector = sight.vector;
-    const double true_rad = std::atan2(place.y_m - from.y_m, place.x_m - from.x_m);
-    const double error_rad = wrap_angle(vector.direction_rad() - true_rad);
-    pairs_.push_back({distance(from, place), vector.length(), sight.difference, sight.confidence,
-                      vector.length() > 0.0 && std::abs(error_rad) <= right_direction_rad});
+    pairs_.push_back(panonav::compare_with_snapshot(snapshot, place, view, from));
   };
   for (std::size_t i = index; i-- > 0;) {
     const double away_m = distance(views_[i].position, place);
@@ -234,57 +176,11 @@ void ChainRecorder::compare_with_snapshot(std::size_t index) {
   }
 }
 
-ChainModel ChainRecorder::learn_model() const {
-  ChainModel model;
-  std::vector<double> scales_m;
-  for (const ComparedPair& pair : pairs_) {
-    if (pair.is_right && pair.distance_m >= min_compared_m && pair.distance_m <= max_compared_m) {
-      scales_m.push_back(pair.distance_m / pair.length);
-    }
-  }
-  if (scales_m.empty()) return model;
-  model.typical_distance_m = static_cast<float>(std::clamp(median(scales_m), 1e-3, 1e4));
-  model.reach_m = static_cast<float>(std::max(min_compared_m, median(reaches_m_)));
-  std::vector<double> beside;
-  std::vector<double> elsewhere;
-  std::vector<std::pair<double, bool>> by_confidence;
-  constexpr double max_length_beside = 0.1;  // in units of R
-  for (const ComparedPair& pair : pairs_) {
-    const auto r_m = static_cast<double>(model.typical_distance_m);
-    if (pair.distance_m <= std::max(max_length_beside * r_m, 1.5 * kept_view_spacing_m)) {
-      beside.push_back(pair.difference);
-    } else if (!pair.is_right) {
-      elsewhere.push_back(pair.difference);
-    }
-    if (pair.distance_m >= min_compared_m)
-      by_confidence.emplace_back(-pair.confidence, pair.is_right);
-  }
-  constexpr std::size_t min_values = 5;
-  if (beside.size() >= min_values && elsewhere.size() >= min_values) {
-    const LogNormal near = LogNormal::fit(beside);
-    const double equal = find_equal_density(near, LogNormal::fit(elsewhere));
-    constexpr double quantile_95 = 1.645;
-    model.arrived_difference = static_cast<float>(
-        std::min({2.0, equal, std::exp(near.mean + quantile_95 * near.deviation)}));
-  }
-  std::sort(by_confidence.begin(), by_confidence.end());
-  constexpr double right_share = 0.9;
-  double right = 0.0;
-  double all = 0.0;
-  for (const auto& [negative_confidence, is_right] : by_confidence) {
-    all += 1.0;
-    right += is_right ? 1.0 : 0.0;
-    if (right >= right_share * all)
-      model.homing_confidence = static_cast<float>(-negative_confidence);
-  }
-  return model;
-}
-
 SnapshotChain ChainRecorder::finish() const {
   ChainRecorder ended = *this;
   if (reachable_ > 0 && reachable_ + 1 < views_.size()) ended.take_snapshot(reachable_);
   if (ended.views_.size() > 1) ended.take_snapshot(ended.views_.size() - 1);
-  ended.chain_.set_model(ended.learn_model());
+  ended.chain_.set_model(learn_chain_model(ended.pairs_, ended.reaches_m_));
   return ended.chain_;
 }
 

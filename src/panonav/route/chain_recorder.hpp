@@ -8,6 +8,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/route/snapshot_chain.hpp"
+#include "panonav/route/snapshot_pair.hpp"
 
 namespace panonav {
 
@@ -53,28 +54,18 @@ class ChainRecorder {
     Point2 position;
     double path_m = 0.0;  // since the last snapshot
   };
-  /// A snapshot and a view somewhere on the route.
-  struct ComparedPair {
-    double distance_m = 0.0;  // by odometry
-    double length = 0.0;      // length of the home vector, in units of R
-    double difference = 0.0;  // difference of the images
-    double confidence = 0.0;  // confidence of the home vector
-    bool is_right = false;    // true if the home vector points to the snapshot
-  };
-
   [[nodiscard]] double bytes_per_snapshot() const noexcept;
   [[nodiscard]] double min_spacing_m() const noexcept;
   [[nodiscard]] bool can_home(const StoredView& from, const StoredView& to) const;
   [[nodiscard]] bool can_be_reached(std::size_t index) const;
   void take_snapshot(std::size_t index);
   void compare_with_snapshot(std::size_t index);
-  [[nodiscard]] ChainModel learn_model() const;
 
   ChainSpacing spacing_;
   ChainOdometry odometry_;
   SnapshotChain chain_;
   std::vector<StoredView> views_;  // the first one is the last snapshot
-  std::vector<ComparedPair> pairs_;
+  std::vector<SnapshotPair> pairs_;
   std::vector<double> reaches_m_;  // one for each snapshot
   std::size_t reachable_ = 0;      // the farthest view that can be the next snapshot; 0: none
   Pose2 odometry_from_robot_;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -8,24 +7,10 @@
 
 #include "panonav/core/options.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/route/snapshot_code.hpp"
 
 namespace panonav {
 
-/// Size of the snapshots of a chain. The defaults take 48 bytes and lose less than 0.01 of the
-/// homeward component of the same coefficients as floats (docs/decisions.md).
-struct SnapshotShape {
-  int rows = 8;        ///< 1 .. 255, from the highest elevation to the lowest
-  int components = 6;  ///< k = 0 .. components - 1; 2 .. 64
-  int bits = 4;        ///< of a coefficient, 3 .. 8
-
-  /// Number of stored coefficients: a_k and b_k of all rows; b_0 is 0 and not stored.
-  [[nodiscard]] std::size_t coefficients() const noexcept {
-    return static_cast<std::size_t>(rows) * (2 * static_cast<std::size_t>(components) - 1);
-  }
-  /// Number of bytes of a snapshot: scales, then coefficients.
-  [[nodiscard]] std::size_t bytes() const noexcept;
-  friend bool operator==(const SnapshotShape&, const SnapshotShape&) = default;
-};
 void visit_options(SnapshotShape& shape, OptionVisitor& visitor);
 
 /// Returns a view of fewer rows and components: each row is the mean of the rows that it covers,

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 
@@ -11,36 +13,16 @@ namespace panonav {
 
 namespace {
 
-constexpr double leg_step_m = 0.01;
-constexpr std::uint32_t max_distance_code = 2047;  // 11 bits
-constexpr std::uint32_t direction_codes = 4096;    // 12 bits
-constexpr double direction_step_rad = 2.0 * std::numbers::pi / direction_codes;
-constexpr std::size_t leg_bytes = 3;
-// Magic and version, shape, elevations, model.
-constexpr std::uint32_t chain_magic = 0x31434E50;  // "PNC1"
-constexpr std::size_t chain_header_bytes = 32;
-
-/// A straight step between two nodes, as its 23 bits say.
-struct Leg {
-  std::uint32_t distance = 0;
-  std::uint32_t direction = 0;
-
-  [[nodiscard]] Point2 step() const {
-    const double length_m = distance * leg_step_m;
-    const double direction_rad = direction * direction_step_rad;
-    return {length_m * std::cos(direction_rad), length_m * std::sin(direction_rad)};
-  }
-};
-
-Leg make_leg(Point2 from, Point2 to) {
+ChainLeg make_leg(Point2 from, Point2 to) {
+  constexpr double direction_step_rad = 2.0 * std::numbers::pi / ChainLeg::directions;
   const double length_m = distance(from, to);
   require(std::isfinite(length_m) && length_m <= SnapshotChain::max_leg_m, "length of a leg",
           length_m, "0 .. " + to_text(SnapshotChain::max_leg_m));
   const double turns = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m) / direction_step_rad;
-  const auto direction = static_cast<std::int64_t>(std::llround(turns)) + direction_codes;
+  const auto direction = static_cast<std::int64_t>(std::llround(turns)) + ChainLeg::directions;
   return {
-      std::min(static_cast<std::uint32_t>(std::llround(length_m / leg_step_m)), max_distance_code),
-      static_cast<std::uint32_t>(direction % direction_codes)};
+      std::min(static_cast<std::uint32_t>(std::llround(100.0 * length_m)), ChainLeg::max_distance),
+      static_cast<std::uint32_t>(direction % ChainLeg::directions)};
 }
 
 void write_number(std::vector<std::uint8_t>& bytes, std::uint32_t value, std::size_t count) {
@@ -53,33 +35,6 @@ void write_float(std::vector<std::uint8_t>& bytes, double value) {
   write_number(bytes, std::bit_cast<std::uint32_t>(static_cast<float>(value)), 4);
 }
 
-/// Reads numbers from the front of bytes.
-class ChainBytes {
- public:
-  explicit ChainBytes(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
-
-  [[nodiscard]] bool empty() const noexcept { return bytes_.empty(); }
-  std::span<const std::uint8_t> take(std::size_t count) {
-    require(count <= bytes_.size(), "bytes left in a chain", static_cast<double>(bytes_.size()),
-            ">= " + to_text(static_cast<double>(count)));
-    const auto consumed = bytes_.first(count);
-    bytes_ = bytes_.subspan(count);
-    return consumed;
-  }
-  std::uint32_t number(std::size_t count) {
-    const auto consumed = take(count);
-    std::uint32_t value = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      value |= static_cast<std::uint32_t>(consumed[i]) << (8 * i);
-    }
-    return value;
-  }
-  float real() { return std::bit_cast<float>(number(4)); }
-
- private:
-  std::span<const std::uint8_t> bytes_;
-};
-
 void check_model(const ChainModel& model) {
   const auto check = [](const char* field, float value, float low, float high) {
     require(value >= low && value <= high, field, static_cast<double>(value),
@@ -91,11 +46,13 @@ void check_model(const ChainModel& model) {
   check("homing confidence of a chain", model.homing_confidence, -1.0F, 1.0F);
 }
 
-std::optional<ElevationBand> read_elevations(ChainBytes& bytes) {
-  const float bottom = bytes.real();
-  const float top = bytes.real();
-  if (bottom == 0.0F && top == 0.0F) return std::nullopt;
-  const ElevationBand band{static_cast<double>(bottom), static_cast<double>(top)};
+// Position of the elevations in a packed header.
+constexpr std::size_t header_elevations = 8;
+
+// Returns the band that a header says.
+std::optional<ElevationBand> make_band(float bottom_rad, float top_rad) {
+  if (bottom_rad == 0.0F && top_rad == 0.0F) return std::nullopt;
+  const ElevationBand band{static_cast<double>(bottom_rad), static_cast<double>(top_rad)};
   constexpr double right_angle = std::numbers::pi / 2.0 + 1e-6;  // as rounded to a float
   require(band.bottom_rad >= -right_angle && band.bottom_rad < band.top_rad &&
               band.top_rad <= right_angle,
@@ -106,24 +63,15 @@ std::optional<ElevationBand> read_elevations(ChainBytes& bytes) {
 // Returns the band as the packed form says it, in floats.
 std::optional<ElevationBand> round_band(const std::optional<ElevationBand>& band) {
   if (!band) return std::nullopt;
-  std::vector<std::uint8_t> packed;
+  std::vector<std::uint8_t> packed(header_elevations);
   write_float(packed, band->bottom_rad);
   write_float(packed, band->top_rad);
-  ChainBytes bytes(packed);
-  return read_elevations(bytes);
+  packed.resize(ChainHeader::bytes);
+  const ChainHeader header = decode_header(packed);
+  return make_band(header.bottom_rad, header.top_rad);
 }
 
 }  // namespace
-
-double ChainOdometry::position_error_m(double travelled_m) const noexcept {
-  const double sideways_m = 0.5 * heading_error_rad_per_m * travelled_m * travelled_m;
-  const double along_m = travelled_m * std::hypot(distance_error, drift);
-  return std::numbers::sqrt2 * std::hypot(along_m, sideways_m);
-}
-
-double ChainOdometry::heading_error_rad(double travelled_m) const noexcept {
-  return std::numbers::sqrt2 * heading_error_rad_per_m * travelled_m;
-}
 
 void visit_options(ChainOdometry& odometry, OptionVisitor& visitor) {
   using T = ChainOdometry;
@@ -162,6 +110,15 @@ void SnapshotChain::set_model(const ChainModel& model) {
   model_ = model;
 }
 
+ChainHeader SnapshotChain::header() const noexcept {
+  ChainHeader header{.magic_found = ChainHeader::magic, .shape = shape_, .model = model_};
+  if (elevations_) {
+    header.bottom_rad = static_cast<float>(elevations_->bottom_rad);
+    header.top_rad = static_cast<float>(elevations_->top_rad);
+  }
+  return header;
+}
+
 HomingView SnapshotChain::view(std::size_t node) const {
   require(node < nodes_.size() && nodes_[node].has_snapshot(), "node with a snapshot",
           static_cast<double>(node), "a node of the chain with a snapshot");
@@ -190,7 +147,7 @@ std::vector<std::uint8_t> SnapshotChain::pack() const {
   require(!nodes_.empty() && nodes_.back().has_snapshot(), "snapshots of the last node of a chain",
           0.0, "1");
   std::vector<std::uint8_t> bytes;
-  write_number(bytes, chain_magic, 4);
+  write_number(bytes, ChainHeader::magic, 4);
   write_number(bytes, static_cast<std::uint32_t>(shape_.rows), 1);
   write_number(bytes, static_cast<std::uint32_t>(shape_.components), 1);
   write_number(bytes, static_cast<std::uint32_t>(shape_.bits), 2);
@@ -202,9 +159,9 @@ std::vector<std::uint8_t> SnapshotChain::pack() const {
   }
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (i > 0) {
-      const Leg leg = make_leg(nodes_[i - 1].position, nodes_[i].position);
+      const ChainLeg leg = make_leg(nodes_[i - 1].position, nodes_[i].position);
       const std::uint32_t is_snapshot = nodes_[i].has_snapshot() ? 1U : 0U;
-      write_number(bytes, is_snapshot | leg.distance << 1U | leg.direction << 12U, leg_bytes);
+      write_number(bytes, is_snapshot | leg.distance << 1U | leg.direction << 12U, ChainLeg::bytes);
     }
     bytes.insert(bytes.end(), nodes_[i].snapshot.begin(), nodes_[i].snapshot.end());
   }
@@ -212,42 +169,30 @@ std::vector<std::uint8_t> SnapshotChain::pack() const {
 }
 
 SnapshotChain SnapshotChain::unpack(std::span<const std::uint8_t> bytes) {
-  require(bytes.size() > chain_header_bytes, "bytes of a chain", static_cast<double>(bytes.size()),
-          "> " + to_text(static_cast<double>(chain_header_bytes)));
-  ChainBytes rest(bytes);
-  const std::uint32_t magic = rest.number(4);
-  require(magic == chain_magic, "magic number of a chain", magic, to_text(chain_magic));
-  SnapshotShape shape;
-  shape.rows = static_cast<int>(rest.number(1));
-  shape.components = static_cast<int>(rest.number(1));
-  shape.bits = static_cast<int>(rest.number(2));
+  require(bytes.size() > ChainHeader::bytes, "bytes of a chain", static_cast<double>(bytes.size()),
+          "> " + to_text(static_cast<double>(ChainHeader::bytes)));
+  const ChainHeader header = decode_header(bytes);
+  require(header.magic_found == ChainHeader::magic, "magic number of a chain", header.magic_found,
+          to_text(ChainHeader::magic));
   SnapshotChain chain;
   try {
-    chain = SnapshotChain(shape, read_elevations(rest));
+    chain = SnapshotChain(header.shape, make_band(header.bottom_rad, header.top_rad));
   } catch (const OptionError& error) {
     throw ContractError(std::string("snapshots of a chain: ") + error.what());
   }
-  ChainModel model;
-  model.typical_distance_m = rest.real();
-  model.reach_m = rest.real();
-  model.arrived_difference = rest.real();
-  model.homing_confidence = rest.real();
-  chain.set_model(model);
-  while (!rest.empty()) {
-    ChainNode node;
-    bool has_snapshot = true;
-    if (!chain.nodes_.empty()) {
-      const std::uint32_t packed = rest.number(leg_bytes);
-      has_snapshot = (packed & 1U) != 0;
-      require((packed >> 1U & max_distance_code) > 0 || packed >> 12U == 0,
-              "direction of a leg without length", packed >> 12U, "0");
-      const Point2 from = chain.nodes_.back().position;
-      const Point2 step = Leg{packed >> 1U & max_distance_code, packed >> 12U}.step();
-      node.position = {from.x_m + step.x_m, from.y_m + step.y_m};
-    }
-    if (has_snapshot) {
-      const auto snapshot = rest.take(shape.bytes());
-      (void)snapshot_steps(snapshot, shape);  // refuses bytes that are not written
+  chain.set_model(header.model);
+  ChainCursor cursor(bytes, header.shape);
+  while (cursor.rest() > 0) {
+    const std::size_t rest = cursor.rest();
+    const std::optional<ChainStop> stop = cursor.next();
+    require(stop.has_value(), "bytes left in a chain", static_cast<double>(rest),
+            "those of a leg, and of a snapshot at its end");
+    require(cursor.leg().distance > 0 || cursor.leg().direction == 0,
+            "direction of a leg without length", cursor.leg().direction, "0");
+    ChainNode node{.position = stop->position};
+    if (stop->has_snapshot()) {
+      const std::span snapshot(stop->snapshot, header.shape.bytes());
+      (void)snapshot_steps(snapshot, header.shape);  // refuses bytes that are not written
       node.snapshot.assign(snapshot.begin(), snapshot.end());
     }
     chain.nodes_.push_back(std::move(node));

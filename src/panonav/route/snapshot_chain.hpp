@@ -9,39 +9,12 @@
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/route/chain_code.hpp"
 #include "panonav/route/packed_snapshot.hpp"
 
 namespace panonav {
 
-/// Largest errors of an odometry on which a chain of snapshots relies between two snapshots.
-struct ChainOdometry {
-  double distance_error = 0.05;                   ///< of the travelled distance, 0 .. 1
-  double heading_error_rad_per_m = 0.0349065850;  ///< >= 0; 2 degrees a metre
-  /// Drift that odometry does not see, as by wind, as a part of the travelled distance, 0 .. 1.
-  double drift = 0.1;
-
-  /// Returns by how much the position may be off after travelling straight on from a snapshot, by
-  /// the errors of both drives, the recorded and the repeated one: the root of the sum of squares.
-  [[nodiscard]] double position_error_m(double travelled_m) const noexcept;
-  /// Returns by how much the heading may be off, likewise.
-  [[nodiscard]] double heading_error_rad(double travelled_m) const noexcept;
-  friend bool operator==(const ChainOdometry&, const ChainOdometry&) = default;
-};
 void visit_options(ChainOdometry& odometry, OptionVisitor& visitor);
-
-/// Values that a recorder learns from the surroundings of a route.
-struct ChainModel {
-  float typical_distance_m = 3.0F;  ///< metres of a home vector of length 1, > 0
-  float reach_m = 0.5F;  ///< distance up to which home vectors to most snapshots are right, > 0
-  /// Image difference below which are 95 % of the views from beside a snapshot, if these are more
-  /// probable there than views from elsewhere along the route; 0 .. 2.
-  float arrived_difference = 0.08F;
-  /// Confidence of home vectors from which on nine of ten were right within 0.6 rad, -1 .. 1: the
-  /// mean of the correlation of the views and of the cosine of the angle between the home vectors
-  /// there and back.
-  float homing_confidence = 0.8F;
-  friend bool operator==(const ChainModel&, const ChainModel&) = default;
-};
 
 /// A node of a chain: a way point, or the place of a snapshot.
 struct ChainNode {
@@ -83,6 +56,8 @@ class SnapshotChain {
   }
   /// Values learnt while recording.
   [[nodiscard]] const ChainModel& model() const noexcept { return model_; }
+  /// Returns the values that the packed form says once for all nodes.
+  [[nodiscard]] ChainHeader header() const noexcept;
   /// All nodes in the order of the recording.
   [[nodiscard]] std::span<const ChainNode> nodes() const& noexcept { return nodes_; }
   std::span<const ChainNode> nodes() const&& = delete;  // would dangle

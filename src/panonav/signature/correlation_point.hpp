@@ -1,8 +1,9 @@
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <span>
+
+#include "panonav/core/portable_math.hpp"
 
 namespace panonav {
 
@@ -23,8 +24,9 @@ template <class Real>
 [[nodiscard]] CorrelationPoint<Real> correlation_at(std::span<const Real> term_real,
                                                     std::span<const Real> term_imaginary,
                                                     Real turn_rad) noexcept {
-  const Real step_real = std::cos(turn_rad);
-  const Real step_imaginary = -std::sin(turn_rad);
+  const auto step = portable::cosine_sine(static_cast<double>(turn_rad));
+  const auto step_real = static_cast<Real>(step.cosine);
+  const auto step_imaginary = static_cast<Real>(-step.sine);
   Real real = 1;
   Real imaginary = 0;
   CorrelationPoint<Real> point;

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "panonav/core/portable_math.hpp"
+
 namespace panonav {
 
 namespace {
@@ -37,7 +39,7 @@ PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
   constexpr double width_step = 1.19;  // a quarter of an octave
   for (double width = min_width; width < 3.0 * highest; width *= width_step) {
     PerFrequency gaussian{};
-    const double step = std::exp(-0.5 / (width * width));
+    const double step = portable::exp(-0.5 / (width * width));
     double value = step;
     double ratio = step * step * step;  // step^(2 k + 1)
     double common = 0.0;
@@ -97,32 +99,27 @@ PerFrequency compute_component_weights(PairCoefficients& coefficients, int highe
   return weights;
 }
 
-std::vector<float> compute_row_weights(PairCoefficients& coefficients, int highest,
-                                       std::size_t rows, const PerFrequency& weights) {
-  std::vector<double> common(rows);
-  std::vector<double> home(rows);
-  std::vector<double> current(rows);
-  for (int k = 1; k <= highest; ++k) {
-    const double weight = weights[static_cast<std::size_t>(k)];
-    const float* const ha = coefficients.home_a(k);
-    const float* const hb = coefficients.home_b(k);
-    const float* const ca = coefficients.current_a(k);
-    const float* const cb = coefficients.current_b(k);
-    for (std::size_t y = 0; y < rows; ++y) {
-      common[y] += weight * static_cast<double>(ha[y] * ca[y] + hb[y] * cb[y]);
-      home[y] += weight * static_cast<double>(ha[y] * ha[y] + hb[y] * hb[y]);
-      current[y] += weight * static_cast<double>(ca[y] * ca[y] + cb[y] * cb[y]);
-    }
-  }
+void compute_row_weights(PairCoefficients& coefficients, int highest, const PerFrequency& weights,
+                         std::span<float> row_weights) {
   constexpr double min_weight = 0.05;  // no row is left out completely
-  std::vector<float> result(rows);
-  for (std::size_t y = 0; y < rows; ++y) {
-    const double max_correlation = std::sqrt(home[y]) * std::sqrt(current[y]);
-    result[y] = static_cast<float>(max_correlation > 0.0
-                                       ? std::clamp(common[y] / max_correlation, min_weight, 1.0)
-                                       : min_weight);
+  for (std::size_t y = 0; y < row_weights.size(); ++y) {
+    double common = 0.0;
+    double home = 0.0;
+    double current = 0.0;
+    for (int k = 1; k <= highest; ++k) {
+      const double weight = weights[static_cast<std::size_t>(k)];
+      const float ha = coefficients.home_a(k)[y];
+      const float hb = coefficients.home_b(k)[y];
+      const float ca = coefficients.current_a(k)[y];
+      const float cb = coefficients.current_b(k)[y];
+      common += weight * static_cast<double>(ha * ca + hb * cb);
+      home += weight * static_cast<double>(ha * ha + hb * hb);
+      current += weight * static_cast<double>(ca * ca + cb * cb);
+    }
+    const double max_correlation = std::sqrt(home) * std::sqrt(current);
+    row_weights[y] = static_cast<float>(
+        max_correlation > 0.0 ? std::clamp(common / max_correlation, min_weight, 1.0) : min_weight);
   }
-  return result;
 }
 
 }  // namespace panonav

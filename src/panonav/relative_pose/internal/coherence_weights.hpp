@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cstddef>
-#include <vector>
+#include <span>
 
 #include "panonav/relative_pose/internal/pair_equations.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
@@ -20,8 +20,8 @@ using PerFrequency = std::array<double, TurnCorrelation::max_frequencies + 1>;
 [[nodiscard]] PerFrequency compute_component_weights(PairCoefficients& coefficients, int highest,
                                                      std::size_t rows);
 
-/// Returns a weight for each row: the coherence of both views in it over the weighted components.
-[[nodiscard]] std::vector<float> compute_row_weights(PairCoefficients& coefficients, int highest,
-                                                     std::size_t rows, const PerFrequency& weights);
+/// Computes a weight for each row: the coherence of both views in it over the weighted components.
+void compute_row_weights(PairCoefficients& coefficients, int highest, const PerFrequency& weights,
+                         std::span<float> row_weights);
 
 }  // namespace panonav

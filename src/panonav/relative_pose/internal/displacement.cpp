@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
-#include <memory>
 #include <numbers>
+#include <tuple>
 #include <utility>
-#include <vector>
 
+#include "panonav/core/portable_math.hpp"
 #include "panonav/relative_pose/internal/turn_bound.hpp"
 #include "panonav/relative_pose/internal/turn_coefficients.hpp"
 
@@ -45,54 +44,52 @@ struct Tables {
 
 // Integrates the matrix of a displacement by rho [S06 eq. 3].
 void fill_matrix(DisplacementMatrix& matrix, double rho) {
-  constexpr std::size_t points = 4 * size;  // nearly exact for products of two frequencies
-  std::vector<float> from_cosine(points * size), from_sine(points * size);
-  std::vector<float> to_cosine(points * size), to_sine(points * size);
+  constexpr std::size_t points = 256;  // nearly exact for products of two frequencies
+  const float share = 2.0F / static_cast<float>(points);
+  std::array<float, size> to_cosine;
+  std::array<float, size> to_sine;
   for (std::size_t i = 0; i < points; ++i) {
     const double phi =
         2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(points);
-    const double source = phi - std::asin(rho * std::sin(phi));
-    for (std::size_t k = 0; k < size; ++k) {
-      const auto frequency = static_cast<double>(k);
-      from_cosine[i * size + k] = static_cast<float>(std::cos(frequency * source));
-      from_sine[i * size + k] = static_cast<float>(std::sin(frequency * source));
-      to_cosine[i * size + k] = static_cast<float>(std::cos(frequency * phi));
-      to_sine[i * size + k] = static_cast<float>(std::sin(frequency * phi));
+    const double source = phi - portable::asin(rho * portable::sin(phi));
+    for (std::size_t m = 1; m < size; ++m) {
+      const auto [cosine, sine] = portable::cosine_sine(static_cast<double>(m) * phi);
+      to_cosine[m] = static_cast<float>(cosine);
+      to_sine[m] = static_cast<float>(sine);
     }
-  }
-  const float share = 2.0F / static_cast<float>(points);
-  for (std::size_t i = 0; i < points; ++i) {
     // Frequency 0 of a view shows no structure.
     for (std::size_t k = 1; k < size; ++k) {
-      const float c = from_cosine[i * size + k];
-      const float s = from_sine[i * size + k];
+      const auto [cosine, sine] = portable::cosine_sine(static_cast<double>(k) * source);
+      const auto c = static_cast<float>(cosine);
+      const auto s = static_cast<float>(sine);
       float* const cosines = matrix.cosines.data() + k * size;
       float* const sines = matrix.sines.data() + k * size;
       for (std::size_t m = 1; m < size; ++m) {
-        cosines[m] += share * to_cosine[i * size + m] * c;
-        sines[m] += share * to_sine[i * size + m] * s;
+        cosines[m] += share * to_cosine[m] * c;
+        sines[m] += share * to_sine[m] * s;
       }
     }
   }
 }
 
 const Tables& tables() {
-  static const std::unique_ptr<const Tables> made = [] {
-    auto tables = std::make_unique<Tables>();
+  static Tables made;
+  static const bool is_filled [[maybe_unused]] = [](Tables& tables) {
     for (int ring = 1; ring <= Displacement::rings; ++ring) {
-      fill_matrix(tables->matrices[static_cast<std::size_t>(ring - 1)], ring_radius(ring));
+      fill_matrix(tables.matrices[static_cast<std::size_t>(ring - 1)], ring_radius(ring));
     }
     for (std::size_t d = 0; d < Displacement::directions; ++d) {
       for (std::size_t k = 0; k < size; ++k) {
         const double angle = 2.0 * std::numbers::pi * static_cast<double>(d * k) /
                              static_cast<double>(Displacement::directions);
-        tables->cosines[d][k] = static_cast<float>(std::cos(angle));
-        tables->sines[d][k] = static_cast<float>(std::sin(angle));
+        const auto [cosine, sine] = portable::cosine_sine(angle);
+        tables.cosines[d][k] = static_cast<float>(cosine);
+        tables.sines[d][k] = static_cast<float>(sine);
       }
     }
-    return tables;
-  }();
-  return *made;
+    return true;
+  }(made);
+  return made;
 }
 
 /// Coefficients of one row in the frame of a robot that faces a direction.
@@ -139,16 +136,24 @@ void move_ahead(Displacement displacement, const RowCoefficients& ahead, std::si
 /// The expected image of one displacement, compared with the home view.
 struct ExpectedImage {
   Displacement displacement;
-  TurnCorrelation correlation;
+  std::array<float, max_searched_frequency + 1> real{};
+  std::array<float, max_searched_frequency + 1> imaginary{};
   float energy = 0.0F;
 
   void add_row(std::span<const float> home_a, std::span<const float> home_b,
                std::span<const float> a, std::span<const float> b) noexcept {
     for (std::size_t k = 1; k < home_a.size(); ++k) {
-      correlation.real[k] += home_a[k] * a[k] + home_b[k] * b[k];
-      correlation.imaginary[k] += home_a[k] * b[k] - home_b[k] * a[k];
+      real[k] += home_a[k] * a[k] + home_b[k] * b[k];
+      imaginary[k] += home_a[k] * b[k] - home_b[k] * a[k];
       energy += a[k] * a[k] + b[k] * b[k];
     }
+  }
+  [[nodiscard]] TurnCorrelation correlation(int highest) const noexcept {
+    TurnCorrelation correlation;
+    correlation.highest = highest;
+    std::copy(real.begin(), real.end(), correlation.real.begin());
+    std::copy(imaginary.begin(), imaginary.end(), correlation.imaginary.begin());
+    return correlation;
   }
   /// Returns the difference from the home view for a correlation. If two displacements explain the
   /// views equally, the nearer is more likely.
@@ -157,17 +162,20 @@ struct ExpectedImage {
     return (home_energy + energy - 2.0F * value) * (1.0F + far_penalty * ring_square);
   }
 };
+using ExpectedImages =
+    std::array<ExpectedImage, Displacement::rings * Displacement::directions + 1>;
 
 /// Returns the displacement of the smallest difference, the first of equal ones. Searches turns
 /// only of images that may differ least.
-BestDisplacement choose_displacement(std::span<const ExpectedImage> images, float home_energy,
+BestDisplacement choose_displacement(const ExpectedImages& images, int highest, float home_energy,
                                      const HeadingWindow& window) {
-  constexpr float rounding = 1e-5F;                    // relative error of sums of single precision
-  std::vector<std::pair<float, std::size_t>> pending;  // lower bounds of the differences
+  constexpr float rounding = 1e-5F;  // relative error of sums of single precision
+  // Lower bounds of the differences.
+  std::array<std::pair<float, std::size_t>, std::tuple_size_v<ExpectedImages>> pending;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const float bound =
-        bound_maximum(images[i].correlation) + rounding * (home_energy + images[i].energy);
-    pending.emplace_back(images[i].difference(home_energy, bound), i);
+        bound_maximum(images[i].correlation(highest)) + rounding * (home_energy + images[i].energy);
+    pending[i] = {images[i].difference(home_energy, bound), i};
   }
   std::ranges::sort(pending);
   BestDisplacement best;
@@ -175,8 +183,9 @@ BestDisplacement choose_displacement(std::span<const ExpectedImage> images, floa
   for (const auto& [bound, i] : pending) {
     if (bound > smallest.first) break;
     std::array<float, 1> turn{};
-    if (find_highest_peaks(images[i].correlation, turn, window) == 0) continue;
-    const float value = images[i].correlation.at(turn[0]);
+    const TurnCorrelation correlation = images[i].correlation(highest);
+    if (find_highest_peaks(correlation, turn, window) == 0) continue;
+    const float value = correlation.at(turn[0]);
     const std::pair found(images[i].difference(home_energy, value), i);
     if (!(found < smallest)) continue;
     smallest = found;
@@ -193,6 +202,10 @@ double Displacement::length() const noexcept {
 
 double Displacement::direction_rad() const noexcept {
   return 2.0 * std::numbers::pi * direction / directions;
+}
+
+void fill_displacement_tables() noexcept {
+  (void)tables();
 }
 
 void displace(Displacement displacement, std::span<const float> from_a,
@@ -230,8 +243,7 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
       home_energy += ha * ha + hb * hb;
     }
   }
-  std::array<ExpectedImage, Displacement::rings * Displacement::directions + 1> images;
-  for (ExpectedImage& image : images) image.correlation.highest = static_cast<int>(compared) - 1;
+  ExpectedImages images;
   RowCoefficients ahead;
   std::array<float, size> a;
   std::array<float, size> b;
@@ -257,18 +269,19 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
       }
     }
   }
-  return choose_displacement(images, home_energy, window);
+  return choose_displacement(images, static_cast<int>(compared) - 1, home_energy, window);
 }
 
-DisplacementStart find_displacement_start(const HomingView& home, const HomingView& current,
-                                          int known, const HeadingWindow& window) {
+DisplacementStart find_displacement_start(const CoefficientView& home,
+                                          const CoefficientView& current, int known,
+                                          const HeadingWindow& window) {
   constexpr std::size_t max_bands = 8;
-  const auto rows = static_cast<std::size_t>(home.rows());
+  const auto rows = static_cast<std::size_t>(home.rows);
   // Expected images need more frequencies of the current view than are compared.
   const int frequencies = std::min(known, 2 * max_searched_frequency);
   const std::size_t bands = std::min(max_bands, rows);
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
-  std::vector<float> values(4 * bands * stride);
+  std::array<float, 4 * max_bands*(2 * max_searched_frequency + 1)> values{};
   const auto part = [&](std::size_t i) {
     return std::span(values).subspan(i * bands * stride, bands * stride);
   };
@@ -289,7 +302,8 @@ DisplacementStart find_displacement_start(const HomingView& home, const HomingVi
     ahead_a += part(2)[band * stride + 1];
     ahead_b += part(3)[band * stride + 1];
   }
-  const double ahead_rad = std::atan2(static_cast<double>(ahead_b), static_cast<double>(ahead_a));
+  const double ahead_rad =
+      portable::atan2(static_cast<double>(ahead_b), static_cast<double>(ahead_a));
   for (std::size_t band = 0; band < bands; ++band) {
     rotate_row(part(2).subspan(band * stride, stride), part(3).subspan(band * stride, stride),
                ahead_rad);

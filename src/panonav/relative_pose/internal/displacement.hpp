@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/relative_pose/home_vector.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
 
 namespace panonav {
@@ -26,8 +26,13 @@ struct Displacement {
 /// phase is off by at most 8 / 12 rad, well within the linear range.
 inline constexpr int max_searched_frequency = 8;
 
-/// Highest frequency of `displace`.
+/// Highest frequency of `displace`. A microcontroller that knows the size of its snapshots has no
+/// memory for the tables of all others; results do not depend on it.
+#ifdef PANONAV_MAX_DISPLACED_FREQUENCY
+inline constexpr int max_displaced_frequency = PANONAV_MAX_DISPLACED_FREQUENCY;
+#else
 inline constexpr int max_displaced_frequency = 63;
+#endif
 
 /// Computes the coefficients of the expected image [S06 eq. 3, no turn] for one row: the view at
 /// the displacement when all things are at distance R. `from_a`, `from_b`: frequencies 0 ..
@@ -35,6 +40,9 @@ inline constexpr int max_displaced_frequency = 63;
 /// Throws nothing. Cost: 2 from_a.size() to_a.size() multiplications.
 void displace(Displacement displacement, std::span<const float> from_a,
               std::span<const float> from_b, std::span<float> to_a, std::span<float> to_b) noexcept;
+
+/// Computes the tables of `displace` if they are not there yet.
+void fill_displacement_tables() noexcept;
 
 /// A displacement and the turn at which the displaced view fits best.
 struct BestDisplacement {
@@ -64,8 +72,8 @@ struct DisplacementStart {
 /// up or down by less than a band, and coarse structure suffices. Directions are measured from the
 /// maximum of the first frequency of the current view, so that the result does not depend on the
 /// robot's heading. `known`: the highest frequency that both have.
-[[nodiscard]] DisplacementStart find_displacement_start(const HomingView& home,
-                                                        const HomingView& current, int known,
+[[nodiscard]] DisplacementStart find_displacement_start(const CoefficientView& home,
+                                                        const CoefficientView& current, int known,
                                                         const HeadingWindow& window);
 
 }  // namespace panonav

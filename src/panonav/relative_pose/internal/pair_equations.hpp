@@ -3,20 +3,19 @@
 #include <array>
 #include <cstddef>
 #include <span>
-#include <vector>
 
+#include "panonav/relative_pose/internal/row_buffer.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
 
 namespace panonav {
 
 /// The coefficients of one pair of views, component-major like HomingView: those of component k of
-/// all rows are contiguous. One row is on the stack, more rows are on the heap.
+/// all rows are contiguous. Up to 64 coefficients, such as one row or a snapshot, are on the stack,
+/// more are on the heap.
 class PairCoefficients {
  public:
   PairCoefficients(std::size_t rows, std::size_t components)
-      : rows_(rows), size_(rows * components) {
-    if (arrays * size_ > on_stack_.size()) on_heap_.resize(arrays * size_);
-  }
+      : rows_(rows), size_(rows * components), values_(arrays * size_) {}
 
   /// The home view, rotated to the present heading.
   [[nodiscard]] float* home_a(int k) noexcept { return at(0, k); }
@@ -34,13 +33,11 @@ class PairCoefficients {
   static constexpr std::size_t arrays = 8;
   static constexpr std::size_t stacked = TurnCorrelation::max_frequencies + 2;
   [[nodiscard]] float* at(std::size_t array, int k) noexcept {
-    float* const first = on_heap_.empty() ? on_stack_.data() : on_heap_.data();
-    return first + array * size_ + static_cast<std::size_t>(k) * rows_;
+    return values_.numbers().data() + array * size_ + static_cast<std::size_t>(k) * rows_;
   }
   std::size_t rows_;
   std::size_t size_;
-  std::array<float, arrays * stacked> on_stack_;  // not initialised: written before it is read
-  std::vector<float> on_heap_;
+  RowBuffer<float, arrays * stacked> values_;  // written before they are read
 };
 
 /// Terms of each row that are the same for all components.

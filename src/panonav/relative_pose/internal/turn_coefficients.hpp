@@ -1,15 +1,15 @@
 #pragma once
 
-#include <cmath>
 #include <span>
+
+#include "panonav/core/portable_math.hpp"
 
 namespace panonav {
 
 /// Calls visit(k, cos(k turn), sin(k turn)) for k = 0 .. frequencies - 1.
 template <class Visit>
 void for_each_frequency(int frequencies, double turn_rad, const Visit& visit) {
-  const double step_cosine = std::cos(turn_rad);
-  const double step_sine = std::sin(turn_rad);
+  const auto [step_cosine, step_sine] = portable::cosine_sine(turn_rad);
   double cosine = 1.0;
   double sine = 0.0;
   for (int k = 0; k < frequencies; ++k) {
