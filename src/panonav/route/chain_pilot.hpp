@@ -50,14 +50,14 @@ struct ChainFollowerOptions {
   double error_factor = 1.5;  ///< radius of the search, in errors of the odometry, >= 1
   friend bool operator==(const ChainFollowerOptions&, const ChainFollowerOptions&) = default;
 };
+
 /// Repeats a route along a chain of snapshots, without heap memory and exceptions, with the same
-/// bits on a microcontroller. The robot travels from snapshot
-/// to snapshot by odometry. At each one it homes, which resets the drift of position and heading
-/// and shows the systematic errors of the odometry. A snapshot that is not found where odometry
-/// expects it is searched for along a spiral, whose turns are half as far apart as homing reaches,
-/// up to the error of the odometry; without success the robot is lost. It has arrived only if
-/// homing ended at a view that is as similar to the last snapshot as those beside snapshots were
-/// while recording, and where the error of odometry allows it to be.
+/// bits on a microcontroller. The robot travels from snapshot to snapshot by odometry. At each one
+/// it homes, which resets the drift of position and heading and shows the systematic errors of the
+/// odometry. A snapshot that is not found where odometry expects it is searched for along a spiral
+/// with turns half as far apart as homing reaches, up to the error of the odometry; without success
+/// the robot is lost. It has arrived only if homing ended at a view as similar to the last snapshot
+/// as those beside snapshots while recording, and where the error of odometry allows it to be.
 class ChainPilot {
  public:
   /// Returns the size of the workspace that a pilot needs.

@@ -401,7 +401,7 @@ SearchResult exact_search(const SearchedViews& searched, const PackedSignature& 
   if (searched.index.layout().has_sketches() && views / min_views_per_match >= top) {
     const SketchIndex::Query sketch =
         searched.index.make_query(comparison.query(), comparison.components(), mask.allowed_rows);
-    // For so many matches the limit is beyond most bounds (chosen).
+    // With this many matches the limit exceeds most bounds (chosen).
     constexpr std::size_t min_wide_top = 64;
     result.matches = top >= min_wide_top && WideSearch::is_possible(searched, comparison)
                          ? WideSearch(searched, comparison, sketch, kernels, top, result)
