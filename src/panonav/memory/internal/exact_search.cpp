@@ -254,8 +254,8 @@ class Search {
     return 8 * static_cast<std::size_t>(within) > bounds_.size();
   }
 
-  /// True if fine bounds exclude more than an eighth of the rows that coarse ones do not, judged by
-  /// rows in the middle. Those of random numbers exclude none.
+  /// True if fine bounds exclude any of the rows in the middle that coarse ones do not. Those of
+  /// random numbers exclude none, and thirds of the components then save nothing either.
   [[nodiscard]] bool can_exclude_by_fine_bounds(std::uint32_t limit) {
     constexpr std::size_t tested = 256;
     const std::size_t first = bounds_.size() / 2 / tested * tested;
@@ -266,7 +266,7 @@ class Search {
     compute_fine_bounds(static_cast<Row>(first), std::span(places).first(found), bounds.data());
     const auto within = std::ranges::count_if(
         std::span(bounds).first(found), [limit](std::uint32_t bound) { return bound <= limit; });
-    return 8 * static_cast<std::size_t>(within) < 7 * found;
+    return static_cast<std::size_t>(within) < found;
   }
 
   /// Computes the fine bounds of rows first + places[i], all in one segment.
