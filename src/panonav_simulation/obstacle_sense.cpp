@@ -29,7 +29,13 @@ double round_to_sensor_rad(double direction_rad) {
   return wrap_angle(std::round(direction_rad / direction_spacing_rad) * direction_spacing_rad);
 }
 
-// Returns the distance to the rectangle of the map, beyond which obstacles are unknown.
+// True inside of the rectangle of the map, beyond which obstacles are unknown.
+bool is_in_map(const FreeSpace& space, Point2 point) {
+  return point.x_m >= space.low().x_m && point.x_m < space.high().x_m &&
+         point.y_m >= space.low().y_m && point.y_m < space.high().y_m;
+}
+
+// Returns the distance to the rectangle of the map; 0 inside of it.
 double distance_to_map_m(const FreeSpace& space, Point2 point) {
   const auto outside_m = [](double value, double low, double high) {
     return std::max({low - value, value - high, 0.0});
@@ -65,9 +71,8 @@ std::array<double, sensor_directions> measure_ranges(const FreeSpace& space, con
     bool has_echo = false;
     while (range_m < max_range_m) {
       const Point2 there = find_point_at(robot, direction_rad, range_m);
-      const double outside_m = distance_to_map_m(space, there);
-      if (outside_m > 0.0) {
-        has_echo = wall_outside_m && outside_m >= *wall_outside_m;
+      if (!is_in_map(space, there)) {
+        has_echo = wall_outside_m && distance_to_map_m(space, there) >= *wall_outside_m;
         if (has_echo || !wall_outside_m) break;
       } else {
         has_echo = space.clearance_m(there) <= 0.0 ||
