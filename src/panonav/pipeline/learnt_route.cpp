@@ -12,7 +12,7 @@ namespace {
 
 /// Version of the learning method; raised when its results change, so that older limits are
 /// ignored.
-constexpr std::string_view limits_version = "2";
+constexpr std::string_view limits_version = "3";
 
 std::string make_limits_parameter_name(const std::string& name) {
   return "learnt route." + name;

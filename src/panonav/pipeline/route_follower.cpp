@@ -42,12 +42,6 @@ RouteFollower::Step RouteFollower::step(std::vector<float> line,
   } else {
     step.fix = tracker_.search(step.line);
   }
-  // Odometry vouches for a predicted position; a line alone may be from past an end of the route.
-  if (step.fix && step.fix->origin == RouteFix::Origin::search &&
-      tracker_.lines().is_better_past_end(step.line, *step.fix)) {
-    step.fix.reset();
-    tracker_.reset();
-  }
   // A fix without odometry is where the next motion begins; otherwise the last odometry is.
   if (odometry || step.fix) odometry_ = odometry;
   if (step.fix) {

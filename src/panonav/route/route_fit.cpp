@@ -29,17 +29,37 @@ using Equations = DenseEquations<5>;
 constexpr double typical_distance_m = 2.0;
 /// Fewest directions from which a pose, gain and offset are fitted.
 constexpr std::size_t min_directions = 16;
-/// Smallest noise: a grey level, as lines are bytes.
-constexpr double min_noise = 1.0 / 255.0;
-/// Standard deviation of a Gaussian over the median of its absolute values.
-constexpr double sigma_over_mad = 1.4826;
 /// Damping of the steps, so that unknowns that do not affect the line do not change.
 constexpr double fit_damping = 1e-3;
 /// Longest step, beyond which smoothed lines are no longer linear.
 constexpr double max_step_m = 0.25;
 constexpr double max_step_rad = 0.2;
-/// Residuals farther apart are taken as independent; 5 and 20 degrees do as well (decisions.md).
-constexpr double correlated_deg = 10.0;
+/// Length of the extrapolated section at either end, over the distance of the last two lines.
+constexpr double extension = 0.5;
+
+/// Returns the path with a pose before its first and one after its last.
+std::vector<Pose2> extend_path(std::span<const Pose2> poses) {
+  if (poses.size() < 2) return {};
+  const auto extrapolate = [](const Pose2& end, const Pose2& inner) {
+    return Pose2{end.x_m + extension * (end.x_m - inner.x_m),
+                 end.y_m + extension * (end.y_m - inner.y_m), end.heading_rad};
+  };
+  std::vector<Pose2> extended{extrapolate(poses[0], poses[1])};
+  extended.insert(extended.end(), poses.begin(), poses.end());
+  extended.push_back(extrapolate(poses.back(), poses[poses.size() - 2]));
+  return extended;
+}
+
+/// Returns the line of the pose at `index` in the extended path, in the world's frame.
+std::vector<float> make_extended_line(const RoutePanorama& route, std::size_t index) {
+  const std::size_t end = std::clamp<std::size_t>(index, 1, route.size()) - 1;
+  auto line = world_line(route, end);
+  if (index == end + 1) return line;
+  const auto inner = world_line(route, index == 0 ? 1 : end - 1);
+  for (std::size_t c = 0; c < line.size(); ++c)
+    line[c] += static_cast<float>(extension) * (line[c] - inner[c]);
+  return line;
+}
 
 }  // namespace
 
@@ -146,7 +166,7 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
     : columns_(route.columns()),
       options_(options),
       poses_(route.poses().begin(), route.poses().end()),
-      path_(poses_) {
+      path_(extend_path(poses_)) {
   validate(options);
   if (route.size() < 2) {
     throw ContractError("lines of the route", static_cast<double>(route.size()), "2 or more");
@@ -169,33 +189,13 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
     level.directions = equal_directions(static_cast<std::size_t>(columns_) / level.stride);
     levels_.push_back(std::move(level));
   }
-  for (std::size_t i = 0; i < route.size(); ++i) {
-    const auto line = world_line(route, i);
+  for (std::size_t i = 0; i < route.size() + 2; ++i) {
+    const auto line = make_extended_line(route, i);
     for (Level& level : levels_) {
       const auto smooth = smooth_line(line, level.sigma);
       level.values.insert(level.values.end(), smooth.begin(), smooth.end());
     }
   }
-}
-
-std::optional<LineWindow> RouteLines::find_window(Point2 position) const {
-  return path_.find_window(position, options_.reach_m * options_.metre);
-}
-
-std::vector<RouteCrossing> RouteLines::find_crossings_in(
-    const LineWindow& window, Point2 viewpoint, std::span<const Direction2> directions) const {
-  std::vector<RouteCrossing> crossings(directions.size());
-  path_.find_crossings(window, viewpoint, directions, crossings);
-  return crossings;
-}
-
-float RouteLines::expected_value(const Level& level, float along,
-                                 std::size_t column) const noexcept {
-  const auto before = std::min(static_cast<std::size_t>(along), poses_.size() - 2);
-  const float share = along - static_cast<float>(before);
-  const float* const at =
-      level.values.data() + before * static_cast<std::size_t>(columns_) + column;
-  return at[0] + share * (at[columns_] - at[0]);
 }
 
 bool RouteLines::collect_terms(const Level& level, std::span<const float> line, const Pose2& pose,
@@ -211,9 +211,9 @@ bool RouteLines::collect_terms(const Level& level, std::span<const float> line, 
     const RouteCrossing& crossing = crossings[k];
     if (crossing.along < 0.0F) continue;
     const std::size_t c = k * level.stride;
-    const auto before = std::min(static_cast<std::size_t>(crossing.along), poses_.size() - 2);
+    const auto before = std::min(static_cast<std::size_t>(crossing.along), poses_.size());
     const std::size_t low = before >= level.half_slope ? before - level.half_slope : 0;
-    const std::size_t high = std::min(before + 1 + level.half_slope, poses_.size() - 1);
+    const std::size_t high = std::min(before + 1 + level.half_slope, poses_.size() + 1);
     const float slope = (row(high)[c] - row(low)[c]) / static_cast<float>(high - low);
     const LineSample at = sample_line(line, static_cast<double>(c) - rotation);
     terms.push_back({expected_value(level, crossing.along, c), slope * crossing.along_by_x,
@@ -316,7 +316,7 @@ double RouteLines::Linearised::correlation_factor(const std::vector<Term>& terms
     const double off = residual(term);  // bounded as by the weights of the equations
     bounded[term.direction] = off / (1.0 + std::pow(off / (3.0 * noise), 2.0));
   }
-  return autocorrelation_factor(bounded, correlated_deg / 360.0);
+  return autocorrelation_factor(bounded, correlated_share);
 }
 
 std::optional<RouteLines::Linearised> RouteLines::Linearised::make(const std::vector<Term>& terms,
@@ -442,6 +442,21 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   return make_fix(line, pose, *best, *window);
 }
 
+std::optional<RouteLines::Candidate> RouteLines::fit_coarsely(std::span<const float> line,
+                                                              const Pose2& predicted) const {
+  check_line(line);
+  const auto window = find_window(predicted.position());
+  if (!window) return std::nullopt;
+  Pose2 pose = predicted;
+  FitProblem problem(*this, levels_.front(), line, *window, pose);
+  Equations equations;
+  const LeastSquaresOptions search{.max_steps = options_.max_steps, .damping = fit_damping};
+  if (!minimise(problem, equations, search).solvable) return std::nullopt;
+  const auto fitted = problem.compute_equations();
+  if (!fitted) return std::nullopt;
+  return Candidate{pose, fitted->correlation};
+}
+
 std::optional<RouteFix> RouteLines::make_fix(std::span<const float> line, const Pose2& pose,
                                              const Linearised& fitted,
                                              const LineWindow& window) const {
@@ -476,25 +491,6 @@ std::optional<RouteFix> RouteLines::make_fix(std::span<const float> line, const 
     fix.unexplained[static_cast<std::size_t>(at)] = residuals[c];
   }
   return fix;
-}
-
-std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
-  const auto size = static_cast<std::size_t>(columns_);
-  std::vector<float> world(size, std::numeric_limits<float>::quiet_NaN());
-  const auto window = find_window(pose.position());
-  if (!window) return world;
-  const auto crossings = find_crossings_in(*window, pose.position(), levels_.back().directions);
-  for (std::size_t c = 0; c < size; ++c) {
-    if (crossings[c].along >= 0.0F) {
-      world[c] = expected_value(levels_.back(), crossings[c].along, c);
-    }
-  }
-  const double rotation = pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
-  std::vector<float> line(size);
-  for (std::size_t c = 0; c < size; ++c) {
-    line[c] = sample_line(world, static_cast<double>(c) + rotation).value;
-  }
-  return line;
 }
 
 }  // namespace panonav

@@ -148,7 +148,8 @@ void RouteTracker::learn_acceptance(const TestRoute& test) {
   std::vector<RouteFix> right;
   std::vector<RouteFix> wrong;
   const auto add_wrong = [&](std::span<const float> line) {
-    if (auto fix = find_best_on_route(line)) wrong.push_back(*std::move(fix));
+    auto fixes = find_on_route(line);
+    if (!fixes.empty()) wrong.push_back(std::move(fixes.front()));
   };
   for (std::size_t i = 0; i < test.poses.size(); ++i) {
     const auto& line = test.values[i];

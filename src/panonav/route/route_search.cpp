@@ -1,4 +1,4 @@
-// Search for lines without a prediction.
+// Views that a route predicts, and the search for lines by them.
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,10 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/horizon_scanline.hpp"
+#include "panonav/route/internal/autocorrelation.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
 #include "panonav/route/route_fit.hpp"
 
@@ -49,9 +51,10 @@ struct Correlation {
   double rotation = 0.0;  // of the line, in columns
 };
 
-// Returns the highest correlation over all rotations of the line, over columns where `expected` is
-// finite.
-Correlation find_best_rotation(std::span<const float> expected, std::span<const float> line) {
+/// Returns the maxima of the correlation over all rotations of the line, over columns where
+/// `expected` is finite.
+std::vector<Correlation> find_rotations(std::span<const float> expected,
+                                        std::span<const float> line) {
   const std::size_t size = expected.size();
   // The line and its squares in reverse order of rotation, twice, so that no index wraps.
   std::vector<double> turned(2 * size);
@@ -88,13 +91,26 @@ Correlation find_best_rotation(std::span<const float> expected, std::span<const 
     const double vy = yy[r] - y[r] * y[r] / n;
     if (vx > 1e-9 && vy > 1e-9) values[r] = (xy[r] - x * y[r] / n) / std::sqrt(vx * vy);
   }
-  const auto at = static_cast<std::size_t>(std::ranges::max_element(values) - values.begin());
-  // Interpolates the maximum by a parabola through the highest value and its neighbours.
-  const double left = values[(at + size - 1) % size];
-  const double right = values[(at + 1) % size];
-  const double bend = left - 2.0 * values[at] + right;
-  const double shift = bend < -1e-12 ? std::clamp(0.5 * (left - right) / bend, -0.5, 0.5) : 0.0;
-  return {values[at], static_cast<double>(at) + shift};
+  std::vector<Correlation> maxima;
+  for (std::size_t at = 0; at < size; ++at) {
+    const double left = values[(at + size - 1) % size];
+    const double right = values[(at + 1) % size];
+    if (values[at] <= left || values[at] < right) continue;
+    // Interpolates the maximum by a parabola through the highest value and its neighbours.
+    const double bend = left - 2.0 * values[at] + right;
+    const double shift = bend < -1e-12 ? std::clamp(0.5 * (left - right) / bend, -0.5, 0.5) : 0.0;
+    maxima.push_back({values[at], static_cast<double>(at) + shift});
+  }
+  return maxima;
+}
+
+/// Returns the highest of these maxima.
+Correlation find_best_rotation(std::span<const float> expected, std::span<const float> line) {
+  Correlation best;
+  for (const Correlation& maximum : find_rotations(expected, line)) {
+    if (maximum.value > best.value) best = maximum;
+  }
+  return best;
 }
 
 /// A view past an end of a route, relative to the view from the end.
@@ -107,6 +123,10 @@ struct StepOutward {
 constexpr double max_step_length = 0.4;
 /// Shortest step that the search tells from none: half of its last change of the length.
 constexpr double min_step_length = max_step_length / 128.0;
+
+/// Least distance over which the change of the lines before an end shows how far away things are:
+/// a tenth of a step at 2.5 m.
+constexpr double known_step_m = 0.25;
 
 /// Returns the line at the end after a step, in the world's frame.
 std::vector<float> move_line(std::span<const float> end, const StepOutward& step,
@@ -165,10 +185,9 @@ StepOutward find_step(std::span<const float> end, std::span<const float> coarse_
   return best;
 }
 
-/// Moves the step to the highest correlation of the line with views near it, by pattern search;
-/// returns that correlation.
-double maximise_past_end(std::span<const float> end, std::span<const float> line, StepOutward& step,
-                         std::size_t columns) {
+/// Moves the step to the highest correlation of the line with views near it, by pattern search.
+void maximise_past_end(std::span<const float> end, std::span<const float> line, StepOutward& step,
+                       std::size_t columns) {
   double best = correlate_past_end(end, line, step, columns);
   // Half of the steps of `find_step`, and of its columns.
   StepOutward change{std::numbers::pi / 24.0, max_step_length / 16.0,
@@ -189,19 +208,128 @@ double maximise_past_end(std::span<const float> end, std::span<const float> line
       change.*unknown *= 0.5;
     }
   }
-  return best;
+}
+
+/// Returns the values of a line of the first level at the coarse columns.
+std::vector<float> sample_coarse_columns(std::span<const float> smooth) {
+  std::vector<float> result(coarse_columns);
+  for (std::size_t c = 0; c < coarse_columns; ++c) {
+    const auto column = static_cast<double>(c * smooth.size()) / coarse_columns;
+    result[c] = sample_line(smooth, column).value;
+  }
+  return result;
+}
+
+/// A line at the first level and at the one at which views past the ends are compared.
+struct SmoothedLine {
+  std::span<const float> coarse;
+  std::span<const float> fine;
+};
+
+/// Returns the step from the pose of a line after which another line is seen. `columns`: number of
+/// compared columns.
+StepOutward explain_by_step(const SmoothedLine& from, const SmoothedLine& seen, double outward_rad,
+                            std::size_t columns) {
+  StepOutward step = find_step(from.coarse, sample_coarse_columns(seen.coarse), outward_rad);
+  maximise_past_end(from.fine, seen.fine, step, columns);
+  return step;
+}
+
+/// Returns a line in the world's frame as seen with a heading.
+std::vector<float> rotate_line(std::span<const float> world, double heading_rad) {
+  const double rotation =
+      heading_rad * static_cast<double>(world.size()) / (2.0 * std::numbers::pi);
+  std::vector<float> line(world.size());
+  for (std::size_t c = 0; c < line.size(); ++c)
+    line[c] = sample_line(world, static_cast<double>(c) + rotation).value;
+  return line;
+}
+
+/// The regression of a line on an expected one.
+struct Regression {
+  Regression(std::span<const float> line, std::span<const float> expected,
+             std::span<const std::size_t> columns) {
+    const auto n = static_cast<double>(columns.size());
+    double x = 0.0;
+    double y = 0.0;
+    for (const std::size_t c : columns) {
+      x += static_cast<double>(expected[c]) / n;
+      y += static_cast<double>(line[c]) / n;
+    }
+    double xx = 0.0;
+    double xy = 0.0;
+    for (const std::size_t c : columns) {
+      const double off = static_cast<double>(expected[c]) - x;
+      xx += off * off;
+      xy += off * (static_cast<double>(line[c]) - y);
+    }
+    const double slope = xx > 1e-9 ? xy / xx : 0.0;
+    std::vector<double> absolute;
+    for (const std::size_t c : columns) {
+      residuals.push_back(static_cast<double>(line[c]) - y -
+                          slope * (static_cast<double>(expected[c]) - x));
+      absolute.push_back(std::abs(residuals.back()));
+    }
+    noise = std::max(min_noise, sigma_over_mad * order_statistic(std::move(absolute), 0.5));
+  }
+
+  std::vector<double> residuals;  // of each of the columns
+  double noise = 0.0;             // robust standard deviation of these
+};
+
+/// Returns `RouteLines::compare_poses` by the lines that are expected at both; NaN: not predicted.
+double compute_lead(std::span<const float> line, std::span<const float> expected,
+                    std::span<const float> expected_by_other) {
+  std::vector<std::size_t> columns;
+  for (std::size_t c = 0; c < line.size(); ++c) {
+    if (std::isfinite(expected[c]) && std::isfinite(expected_by_other[c])) columns.push_back(c);
+  }
+  if (columns.size() < 2) return 0.0;
+  const Regression here(line, expected, columns);
+  const Regression there(line, expected_by_other, columns);
+  // Cauchy's loss, as of the fits.
+  const double scale = 3.0 * std::min(here.noise, there.noise);
+  const auto loss = [&](double residual) { return std::log1p(std::pow(residual / scale, 2.0)); };
+  std::vector<double> gains(line.size(), 0.0);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    gains[columns[i]] = loss(there.residuals[i]) - loss(here.residuals[i]);
+    sum += gains[columns[i]];
+  }
+  double squares = 0.0;
+  for (const std::size_t c : columns) {
+    gains[c] -= sum / static_cast<double>(columns.size());
+    squares += gains[c] * gains[c];
+  }
+  const double variance = squares * autocorrelation_factor(gains, correlated_share);
+  return variance > 0.0 ? sum / std::sqrt(variance) : 0.0;
 }
 
 }  // namespace
 
+std::optional<LineWindow> RouteLines::find_window(Point2 position) const {
+  return path_.find_window(position, options_.reach_m * options_.metre);
+}
+
+std::vector<RouteCrossing> RouteLines::find_crossings_in(
+    const LineWindow& window, Point2 viewpoint, std::span<const Direction2> directions) const {
+  std::vector<RouteCrossing> crossings(directions.size());
+  path_.find_crossings(window, viewpoint, directions, crossings);
+  return crossings;
+}
+
+float RouteLines::expected_value(const Level& level, float along,
+                                 std::size_t column) const noexcept {
+  const auto before = std::min(static_cast<std::size_t>(along), poses_.size());
+  const float share = along - static_cast<float>(before);
+  const float* const at =
+      level.values.data() + before * static_cast<std::size_t>(columns_) + column;
+  return at[0] + share * (at[columns_] - at[0]);
+}
+
 std::vector<float> RouteLines::to_coarse_line(std::span<const float> line) const {
   check_line(line);
-  const auto smooth = smooth_line(line, levels_.front().sigma);
-  std::vector<float> result(coarse_columns);
-  for (std::size_t c = 0; c < coarse_columns; ++c) {
-    result[c] = sample_line(smooth, static_cast<double>(c) * columns_ / coarse_columns).value;
-  }
-  return result;
+  return sample_coarse_columns(smooth_line(line, levels_.front().sigma));
 }
 
 std::optional<RouteLines::CoarseView> RouteLines::make_coarse_view(Point2 position) const {
@@ -223,52 +351,86 @@ std::optional<RouteLines::CoarseView> RouteLines::make_coarse_view(Point2 positi
   return view;
 }
 
-std::optional<RouteLines::Candidate> RouteLines::find_candidate(std::span<const float> coarse_line,
-                                                                const CoarseView& view) {
+std::vector<RouteLines::Candidate> RouteLines::find_candidates(std::span<const float> coarse_line,
+                                                               const CoarseView& view) {
   if (coarse_line.size() != coarse_columns) {
     throw ContractError("values of the coarse line", static_cast<double>(coarse_line.size()),
                         std::to_string(coarse_columns));
   }
-  const Correlation best = find_best_rotation(view.expected, coarse_line);
-  if (!(best.value > -1.0)) return std::nullopt;
-  return Candidate{{view.position.x_m, view.position.y_m,
-                    wrap_angle(best.rotation * 2.0 * std::numbers::pi / coarse_columns)},
-                   best.value};
+  std::vector<Candidate> found;
+  for (const Correlation& maximum : find_rotations(view.expected, coarse_line)) {
+    found.push_back({{view.position.x_m, view.position.y_m,
+                      wrap_angle(maximum.rotation * 2.0 * std::numbers::pi / coarse_columns)},
+                     maximum.value});
+  }
+  return found;
 }
 
-bool RouteLines::is_better_past_end(std::span<const float> line, const RouteFix& fix) const {
-  const auto coarse = to_coarse_line(line);
-  const auto window = find_window(fix.pose.position());
-  if (!window) return false;
+std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
+  return synthesise(levels_.back(), pose);
+}
+
+std::vector<float> RouteLines::synthesise(const Level& level, const Pose2& pose) const {
+  const std::size_t size = level.directions.size();
+  std::vector<float> world(size, std::numeric_limits<float>::quiet_NaN());
+  const auto window = find_window(pose.position());
+  if (!window) return world;
+  const auto crossings = find_crossings_in(*window, pose.position(), level.directions);
+  for (std::size_t k = 0; k < size; ++k) {
+    if (crossings[k].along >= 0.0F) {
+      world[k] = expected_value(level, crossings[k].along, k * level.stride);
+    }
+  }
+  return rotate_line(world, pose.heading_rad);
+}
+
+double RouteLines::compare_poses(std::span<const float> line, const Pose2& pose,
+                                 const Pose2& other) const {
+  check_line(line);
+  return compute_lead(line, synthesise(pose), synthesise(other));
+}
+
+RouteLines::PastEnd RouteLines::find_past_end(std::span<const float> line,
+                                              const Pose2& pose) const {
+  check_line(line);
   // The last level shows depths, which a step among things at equal distances does not explain.
   const Level& level = levels_[levels_.size() > 1 ? levels_.size() - 2 : 0];
-  const auto smooth = smooth_line(line, level.sigma);
-  const auto crossings = find_crossings_in(*window, fix.pose.position(), level.directions);
-  const double rotation = fix.pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
-  std::vector<float> expected;
+  const auto coarse = smooth_line(line, levels_.front().sigma);
+  const auto fine = smooth_line(line, level.sigma);
   std::vector<float> measured;
-  for (std::size_t k = 0; k < crossings.size(); ++k) {
-    if (crossings[k].along < 0.0F) continue;
-    const std::size_t c = k * level.stride;
-    expected.push_back(expected_value(level, crossings[k].along, c));
-    measured.push_back(sample_line(smooth, static_cast<double>(c) - rotation).value);
+  for (std::size_t c = 0; c < fine.size(); c += level.stride) measured.push_back(fine[c]);
+  const auto expected = synthesise(level, pose);
+  const auto smoothed_line_at = [&](std::size_t i) {
+    const auto size = static_cast<std::size_t>(columns_);
+    const std::size_t begin = (i + 1) * size;  // after the extrapolated one
+    return SmoothedLine{std::span(levels_.front().values).subspan(begin, size),
+                        std::span(level.values).subspan(begin, size)};
+  };
+  PastEnd found;
+  for (const bool is_start : {true, false}) {
+    const std::size_t end = is_start ? 0 : poses_.size() - 1;
+    const auto find_step_from = [&](std::size_t from, std::size_t inner, const SmoothedLine& seen) {
+      const double outward_rad =
+          std::atan2(poses_[end].y_m - poses_[inner].y_m, poses_[end].x_m - poses_[inner].x_m);
+      return explain_by_step(smoothed_line_at(from), seen, outward_rad, measured.size());
+    };
+    const auto step = find_step_from(end, is_start ? 1 : end - 1, {coarse, fine});
+    const auto moved = move_line(smoothed_line_at(end).fine, step, measured.size());
+    const double lead = compute_lead(measured, expected, rotate_line(moved, step.heading_rad));
+    if (!is_start && lead >= found.lead) continue;
+    // The step that leads to the end, of known length, shows how far away things are.
+    std::size_t inner = end;
+    const auto inner_m = [&] { return distance(poses_[inner].position(), poses_[end].position()); };
+    do {
+      inner = is_start ? inner + 1 : inner - 1;
+    } while (inner_m() < known_step_m * options_.metre && inner > 0 && inner + 1 < poses_.size());
+    const StepOutward known = find_step_from(inner, inner, smoothed_line_at(end));
+    const double unit_m = inner_m() / std::max(min_step_length, known.length);
+    found = {{poses_[end].x_m + unit_m * step.length * std::cos(step.direction_rad),
+              poses_[end].y_m + unit_m * step.length * std::sin(step.direction_rad)},
+             lead};
   }
-  const double explained = correlate(expected, measured);
-  const auto size = static_cast<std::size_t>(columns_);
-  const auto line_at = [&](const Level& at, std::size_t i) {
-    return std::span(at.values).subspan(i * size, size);
-  };
-  const auto explain = [&](std::size_t end, std::size_t before) {
-    const double outward_rad =
-        std::atan2(poses_[end].y_m - poses_[before].y_m, poses_[end].x_m - poses_[before].x_m);
-    auto step = find_step(line_at(levels_.front(), end), coarse, outward_rad);
-    const double correlation =
-        maximise_past_end(line_at(level, end), smooth, step, level.directions.size());
-    return std::pair(correlation, step.length);
-  };
-  const auto [past_end, length] =
-      std::max(explain(0, 1), explain(poses_.size() - 1, poses_.size() - 2));
-  return length >= min_step_length && past_end > explained;
+  return found;
 }
 
 }  // namespace panonav

@@ -9,9 +9,62 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/route/route_position.hpp"
 
 namespace panonav {
+
+namespace {
+
+/// Number of candidates of a search that are fitted at the coarsest level; twice as many find no
+/// more poses in `corridor`.
+constexpr std::size_t max_coarse_candidates = 32;
+/// Two coarse fits that end nearer to each other have found one pose.
+constexpr double converged_m = 0.1;
+/// Headings nearer than this are one maximum of the correlation of lines smoothed by 8 degrees.
+constexpr double same_heading_rad = 0.35;
+/// Standard deviations by which a pose must explain a line better than any pose elsewhere: 95 % in
+/// a two-sided test, as the better pose is chosen by the same line.
+constexpr double min_lead = 1.96;
+
+bool is_same_heading(const Pose2& a, const Pose2& b) {
+  return std::abs(angle_difference(a.heading_rad, b.heading_rad)) < same_heading_rad;
+}
+
+/// Returns the items of the highest correlations, of which no two are near each other. `candidate`:
+/// projection of an item to its candidate.
+template <class Item, class Projection>
+std::vector<Item> choose_candidates(std::vector<Item> items, double near_m, std::size_t count,
+                                    Projection candidate) {
+  const auto correlation = [&](const Item& item) {
+    return std::invoke(candidate, item).correlation;
+  };
+  std::ranges::stable_sort(items, std::greater<>{}, correlation);
+  std::vector<Item> chosen;
+  for (const Item& item : items) {
+    if (chosen.size() >= count) break;
+    const Pose2& pose = std::invoke(candidate, item).pose;
+    const bool is_near = std::ranges::any_of(chosen, [&](const Item& other) {
+      const Pose2& there = std::invoke(candidate, other).pose;
+      return distance(there.position(), pose.position()) < near_m && is_same_heading(there, pose);
+    });
+    if (!is_near) chosen.push_back(item);
+  }
+  return chosen;
+}
+
+/// Adds the spread of the fix and of another position of the same line to the covariance.
+/// `p_other`: probability of the other one.
+void add_other_position(RouteFix& fix, Point2 other, double p_other) {
+  const double x_m = other.x_m - fix.pose.x_m;
+  const double y_m = other.y_m - fix.pose.y_m;
+  fix.covariance[0] += p_other * x_m * x_m;
+  fix.covariance[1] += p_other * x_m * y_m;
+  fix.covariance[3] += p_other * x_m * y_m;
+  fix.covariance[4] += p_other * y_m * y_m;
+}
+
+}  // namespace
 
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
   using T = RouteTrackerOptions;
@@ -53,7 +106,7 @@ void RouteTracker::list_search_views() {
   double since = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < path.size(); ++i) {
     if (i > 0) since += distance(path[i - 1].position(), path[i].position());
-    if (since < step_m) continue;
+    if (since < step_m && i + 1 < path.size()) continue;
     since = 0.0;
     const Pose2& before = path[i == 0 ? 0 : i - 1];
     const Pose2& after = path[std::min(i + 1, path.size() - 1)];
@@ -120,43 +173,74 @@ std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
       const double angle = 2.0 * std::numbers::pi * k / directions;
       const auto view = lines_.make_coarse_view(
           {predicted.x_m + off * std::cos(angle), predicted.y_m + off * std::sin(angle)});
-      const auto found = view ? RouteLines::find_candidate(coarse, *view) : std::nullopt;
-      if (found && (!start || found->correlation > start->correlation)) start = found;
+      if (!view) continue;
+      for (const auto& found : RouteLines::find_candidates(coarse, *view)) {
+        if (!start || found.correlation > start->correlation) start = found;
+      }
     }
   }
   if (!start) return std::nullopt;
   return lines_.fit(line, start->pose);
 }
 
-std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> line) const {
+std::vector<RouteFix> RouteTracker::find_on_route(std::span<const float> line) const {
   const auto coarse = lines_.to_coarse_line(line);
-  std::vector<RouteLines::Candidate> found;
+  std::vector<RouteLines::Candidate> all;
   for (const RouteLines::CoarseView& view : search_views_) {
-    if (const auto candidate = RouteLines::find_candidate(coarse, view))
-      found.push_back(*candidate);
+    const auto found = RouteLines::find_candidates(coarse, view);
+    all.insert(all.end(), found.begin(), found.end());
   }
-  std::ranges::stable_sort(found, std::greater<>{}, &RouteLines::Candidate::correlation);
-  std::optional<RouteFix> best;
-  std::vector<Point2> tried;
-  for (const auto& candidate : found) {
-    if (tried.size() >= static_cast<std::size_t>(options_.max_candidates)) break;
-    // Skips positions near a tested one, from which a fit would converge to the same pose.
-    const bool near = std::ranges::any_of(tried, [&](Point2 other) {
-      return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m * metre_;
-    });
-    if (near) continue;
-    tried.push_back(candidate.pose.position());
-    auto fix = lines_.fit(line, candidate.pose);
-    if (!fix || !has_enough_columns(*fix)) continue;
-    if (!best || fix->correlation > best->correlation) best = std::move(fix);
+  struct Start {
+    Pose2 pose;                    // before the coarse fit, which may end at a wrong pose
+    RouteLines::Candidate coarse;  // by this
+  };
+  std::vector<Start> starts;
+  const double near_m = 1.5 * options_.search_lateral_m * metre_;
+  for (const auto& candidate :
+       choose_candidates(std::move(all), near_m, max_coarse_candidates, std::identity{})) {
+    if (const auto better = lines_.fit_coarsely(line, candidate.pose))
+      starts.push_back({candidate.pose, *better});
   }
-  return best;
+  std::vector<RouteFix> fixes;
+  for (const Start& start :
+       choose_candidates(std::move(starts), converged_m * metre_,
+                         static_cast<std::size_t>(options_.max_candidates), &Start::coarse)) {
+    auto fix = lines_.fit(line, start.pose);
+    if (fix && has_enough_columns(*fix)) fixes.push_back(*std::move(fix));
+  }
+  std::ranges::stable_sort(fixes, std::greater<>{}, &RouteFix::correlation);
+  return fixes;
 }
 
 std::optional<RouteFix> RouteTracker::search(std::span<const float> line) const {
-  auto best = find_best_on_route(line);
-  if (!best || !is_match(*best)) return std::nullopt;
-  return add_route_position(*std::move(best), RouteFix::Origin::search);
+  auto fixes = find_on_route(line);
+  if (fixes.empty() || !is_match(fixes.front())) return std::nullopt;
+  RouteFix best = add_route_position(std::move(fixes.front()), RouteFix::Origin::search);
+  // Returns false if the other position is elsewhere and explains the line about as well.
+  const auto add_other = [&](Point2 other, double lead, double same_m) {
+    if (distance(best.pose.position(), other) > same_m * metre_) return lead >= min_lead;
+    add_other_position(best, other, 0.5 * std::erfc(lead / std::numbers::sqrt2));
+    return true;
+  };
+  for (const RouteFix& other : std::span(fixes).subspan(1)) {
+    if (is_round_end(best.pose, other.pose)) continue;
+    const double same_m = is_same_heading(best.pose, other.pose) ? options_.recovery_m : -1.0;
+    const double lead = lines_.compare_poses(line, best.pose, other.pose);
+    if (!add_other(other.pose.position(), lead, same_m)) return std::nullopt;
+  }
+  const RouteLines::PastEnd past_end = lines_.find_past_end(line, best.pose);
+  if (!add_other(past_end.position, past_end.lead, options_.surprise_m)) return std::nullopt;
+  return best;
+}
+
+bool RouteTracker::is_round_end(const Pose2& pose, const Pose2& other) const {
+  const auto path = lines_.poses();
+  const auto is_near = [&](const Pose2& a, const Pose2& b) {
+    return distance(a.position(), b.position()) <= options_.recovery_m * metre_;
+  };
+  return is_same_heading(pose, other) &&
+         ((is_near(pose, path.front()) && is_near(other, path.back())) ||
+          (is_near(pose, path.back()) && is_near(other, path.front())));
 }
 
 std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const Pose2& step) {

@@ -16,7 +16,7 @@ struct RouteTrackerOptions {
   double search_step_m = 0.2;      ///< distance between tested positions along the path
   double search_lateral_m = 0.25;  ///< distance between tested positions to either side
   int search_sides = 2;            ///< number of tested positions to either side
-  int max_candidates = 6;          ///< number of best positions from which a search fits
+  int max_candidates = 8;          ///< number of best poses from which a search fits
   double recovery_m = 0.5;         ///< largest error of a predicted position
   /// Distance from the odometry's prediction beyond which a fix of a followed robot must be
   /// confirmed by the next line.
@@ -66,7 +66,10 @@ class RouteTracker {
   /// then predicted by odometry alone. Throws ContractError on a wrong length.
   std::optional<RouteFix> track(std::span<const float> line, const Pose2& step);
 
-  /// Locates the robot by the line alone. Cost: some microseconds for each position tried.
+  /// Locates the robot by the line alone. nullopt if the line does not match the route, if it
+  /// matches it elsewhere almost as well, or if a position past an end explains it better. Where
+  /// such a position is near, the covariance contains both. Cost: some microseconds for each
+  /// position tried.
   [[nodiscard]] std::optional<RouteFix> search(std::span<const float> line) const;
 
   /// Forgets where the robot is.
@@ -104,9 +107,13 @@ class RouteTracker {
   /// directions decide, and any line fits somewhere far from the path.
   [[nodiscard]] bool has_enough_columns(const RouteFix& fix) const;
   [[nodiscard]] bool is_match(const RouteFix& fix) const;
+  /// True if one pose is near the first and the other near the last pose of the route, with the
+  /// same heading: a round ends where it begins, though by odometry in two positions.
+  [[nodiscard]] bool is_round_end(const Pose2& pose, const Pose2& other) const;
   [[nodiscard]] std::vector<FitError> measure_errors(const TestRoute& test) const;
   void learn_model_errors(const TestRoute& halved, const TestRoute& thinned);
-  [[nodiscard]] std::optional<RouteFix> find_best_on_route(std::span<const float> line) const;
+  /// Returns the fits of the line, the best one first.
+  [[nodiscard]] std::vector<RouteFix> find_on_route(std::span<const float> line) const;
   [[nodiscard]] std::optional<RouteFix> recover(std::span<const float> line,
                                                 const Pose2& predicted) const;
   [[nodiscard]] RouteFix add_route_position(RouteFix fix, RouteFix::Origin origin) const;

@@ -6,6 +6,10 @@
 
 namespace panonav {
 
+/// Residuals farther apart, as a share of a closed line, are taken as independent: 10 degrees; 5
+/// and 20 do as well (decisions.md).
+constexpr double correlated_share = 10.0 / 360.0;
+
 /// Returns the variance of a sum of the values of a closed line over that of as many independent
 /// ones, at least 1: the sum of their autocorrelations up to `reach`, a share of the line, with
 /// Bartlett's window [Newey and West, Econometrica 1987]. 1 if all values are 0.

@@ -5,6 +5,11 @@
 
 namespace panonav {
 
+/// Smallest noise: a grey level, as lines are bytes.
+constexpr double min_noise = 1.0 / 255.0;
+/// Standard deviation of a Gaussian over the median of its absolute values.
+constexpr double sigma_over_mad = 1.4826;
+
 /// An interpolated value of a closed line.
 struct LineSample {
   float value = 0.0F;
