@@ -21,6 +21,9 @@ constexpr double border_weight = 6.0;
 // Length added to that of a path, in catchment radii, so that a near position with little gain is
 // not preferred to a far one with much.
 constexpr double added_radii = 0.5;
+// Smallest frontier area for each metre of the path to it (m2/m): a far remnant is not worth it,
+// what a range shows of another room is.
+constexpr double min_area_per_path_m = 0.1;
 // Radius around a position from which no view was recognised, in catchment radii: half the distance
 // of the observations on the way.
 constexpr double unrecognised_radii = 0.3;
@@ -327,7 +330,9 @@ std::optional<CoverageMap::ViewPoint> CoverageMap::find_view_point(Point2 robot)
     });
     const double area_m2 = static_cast<double>(cells) * options_.cell_m * options_.cell_m;
     const double score = weight / (paths.length_m[cell] + added_m);
-    if (area_m2 < options_.min_area_m2 || score <= best_score) continue;
+    const double min_m2 =
+        std::max(options_.min_area_m2, min_area_per_path_m * paths.length_m[cell]);
+    if (area_m2 < min_m2 || score <= best_score) continue;
     best_score = score;
     best = ViewPoint{position, area_m2, paths.length_m[cell], trace_path(paths, cell)};
   }

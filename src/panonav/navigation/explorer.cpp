@@ -73,7 +73,8 @@ class Explorer::Implementation {
     validate(odometry);
     require(robot_radius_m >= 0.0 && std::isfinite(robot_radius_m), "robot_radius_m",
             robot_radius_m, ">= 0");
-    coverage_.radius_m = options.radius_m;
+    // The robot stops this far from a target.
+    coverage_.radius_m = options.radius_m - arrival_m;
     coverage_.robot_radius_m = robot_radius_m;
     coverage_.min_area_m2 = options.min_area_m2;
     if (!has_ranges) {
@@ -85,7 +86,7 @@ class Explorer::Implementation {
   ExplorationDecision observe(const FourierSignature& view, const ExplorationReport& report) {
     require(is_finite(report.moved), "moved", std::hypot(report.moved.x_m, report.moved.y_m),
             "finite numbers");
-    const HomingView current = homing_view(view);
+    const OdometryView current(view);
     if (state_ == State::done || state_ == State::lost) return {.state = state_};
     before_ = robot_.pose();
     robot_.move(report.moved);
@@ -180,7 +181,7 @@ class Explorer::Implementation {
       floor.unrecognised.push_back({resolve(point), view_count});
     }
     for (const Pose2& pose : robot_.poses()) {
-      floor.views.push_back({pose.position(), options_.radius_m});
+      floor.views.push_back({pose.position(), coverage_.radius_m});
     }
     return {floor, coverage_};
   }
@@ -195,7 +196,7 @@ class Explorer::Implementation {
   }
 
   // Drives back if the robot recognised no view for too long.
-  void check_place(const HomingView& current, bool is_recognised) {
+  void check_place(const OdometryView& current, bool is_recognised) {
     if (is_recognised) {
       state_ = State::exploring;
       return;
@@ -251,9 +252,9 @@ class Explorer::Implementation {
   }
 
   // Drives the last part of the way back by the images alone.
-  void home_to_start(const HomingView& current, ExplorationDecision& decision) {
-    if (!homing_) homing_.emplace(robot_.views().front());
-    const HomingPursuit::Decision step = homing_->decide(current);
+  void home_to_start(const OdometryView& current, ExplorationDecision& decision) {
+    if (!homing_) homing_.emplace(robot_.views().front().coefficients);
+    const HomingPursuit::Decision step = homing_->decide(current.coefficients);
     decision.direction_rad = step.turn_rad;
     decision.advance_m = step.advance_m;
     if (step.state != HomingPursuit::State::moving) state_ = State::done;
@@ -277,7 +278,7 @@ class Explorer::Implementation {
   }
 
   // Computes the motion to the target: along the path as far as it is straight.
-  void decide_motion(const HomingView& current, ExplorationDecision& decision) {
+  void decide_motion(const OdometryView& current, ExplorationDecision& decision) {
     if (state_ == State::lost) return;
     Point2 goal = robot_.poses().front().position();
     if (state_ == State::exploring) goal = resolve(*target_);

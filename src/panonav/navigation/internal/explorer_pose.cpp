@@ -8,7 +8,6 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/pair_evidence.hpp"
 
 namespace panonav {
@@ -24,7 +23,7 @@ constexpr double compared_radii = 1.6;
 // Below this distance, a home vector shows no direction that can be compared.
 constexpr double min_direction_m = 0.12;
 // Standard deviations of the turn and the direction of a home vector within a catchment area.
-constexpr double turn_deviation_rad = 0.2;
+constexpr double turn_deviation_rad = 0.05;
 constexpr double direction_deviation_rad = 0.2;
 // Largest error of the turn of a recognised view, in addition to that of the odometry.
 constexpr double max_turn_error_rad = 0.35;
@@ -66,29 +65,34 @@ std::vector<std::size_t> ExplorerPose::find_near_views() const {
   return views;
 }
 
-std::vector<ExplorerPose::Recognition> ExplorerPose::correct(const HomingView& current) {
+std::vector<ExplorerPose::Recognition> ExplorerPose::correct(const OdometryView& current) {
+  // Turns are refined by the flow: things nearer on one side would look like a turn.
+  const VisualOdometryOptions options{.max_residual = 1.0, .min_probability = 0.0};
   std::vector<Recognition> recognised;
   for (const std::size_t i : find_near_views()) {
-    const HomeVector vector = home_vector(views_[i], current);
+    const auto step = visual_step(views_[i], current, options);
+    if (!step) continue;
+    const Pose2 measured = inverse(step->before_from_after);
+    const double measured_rad = std::atan2(measured.y_m, measured.x_m);
     const Pose2 expected = inverse(pose_) * poses_[i];
     const double away_m = std::hypot(expected.x_m, expected.y_m);
-    const double turn_error_rad = wrap_angle(vector.heading_rad - expected.heading_rad);
+    const double turn_error_rad = wrap_angle(measured.heading_rad - expected.heading_rad);
     if (std::abs(turn_error_rad) > max_turn_error_rad + 2.0 * std::sqrt(heading_variance_rad2_)) {
       continue;
     }
     if (away_m < min_direction_m) {
       correct_heading(turn_error_rad);
-      recognised.push_back({i, {expected.x_m, expected.y_m, vector.heading_rad}});
+      recognised.push_back({i, {expected.x_m, expected.y_m, measured.heading_rad}});
       continue;
     }
     const double direction_rad = std::atan2(expected.y_m, expected.x_m);
-    const double error_rad = wrap_angle(vector.direction_rad() - direction_rad);
+    const double error_rad = wrap_angle(measured_rad - direction_rad);
     if (std::abs(error_rad) > max_direction_error_rad) continue;
     correct_heading(turn_error_rad);
-    correct_position(poses_[i].position(), pose_.heading_rad + vector.direction_rad());
-    recognised.push_back({i,
-                          {away_m * std::cos(vector.direction_rad()),
-                           away_m * std::sin(vector.direction_rad()), vector.heading_rad}});
+    correct_position(poses_[i].position(), pose_.heading_rad + measured_rad);
+    recognised.push_back(
+        {i,
+         {away_m * std::cos(measured_rad), away_m * std::sin(measured_rad), measured.heading_rad}});
   }
   if (!recognised.empty()) {
     anchor_ = recognised.front().view;
@@ -117,7 +121,7 @@ void ExplorerPose::correct_position(Point2 view, double world_direction_rad) {
   position_variance_m2_ *= 1.0 - 0.5 * gain;  // one of two directions
 }
 
-void ExplorerPose::add_view(HomingView current, const std::vector<Recognition>& recognised) {
+void ExplorerPose::add_view(OdometryView current, const std::vector<Recognition>& recognised) {
   const std::size_t number = views_.size();
   views_.push_back(std::move(current));
   poses_.push_back(pose_);
@@ -160,12 +164,12 @@ void ExplorerPose::add_edges(std::size_t number, const std::vector<Recognition>&
   }
 }
 
-bool ExplorerPose::relocalise(const HomingView& current) {
+bool ExplorerPose::relocalise(const OdometryView& current) {
   double max_probability = min_probability;
   std::optional<std::size_t> best;
   HomeVector vector;
   for (std::size_t i = 0; i < views_.size(); ++i) {
-    const auto evidence = compute_pair_evidence(views_[i], current);
+    const auto evidence = compute_pair_evidence(views_[i].coefficients, current.coefficients);
     if (!evidence || evidence->probability < max_probability) continue;
     max_probability = evidence->probability;
     best = i;

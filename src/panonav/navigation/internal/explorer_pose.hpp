@@ -7,13 +7,13 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/pose_graph.hpp"
 #include "panonav/mapping/topological_map.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/motion/odometry.hpp"
-#include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav {
 
 /// Pose of an exploring robot among the views that it memorised, in the frame of the first one:
-/// odometry, corrected by the home vectors to the views around. A new view is joined to these by
+/// odometry, corrected by visual steps from the views around. A new view is joined to these by
 /// edges of a pose graph, which moves all views.
 class ExplorerPose {
  public:
@@ -28,16 +28,16 @@ class ExplorerPose {
       : radius_m_(radius_m), odometry_(odometry) {}
 
   void move(const Pose2& moved);
-  /// Corrects the pose by the home vectors to the views around. Returns those that it recognises:
+  /// Corrects the pose by visual steps from the views around. Returns those that it recognises:
   /// turn and direction are where the pose expects them.
-  std::vector<Recognition> correct(const HomingView& current);
-  void add_view(HomingView current, const std::vector<Recognition>& recognised);
+  std::vector<Recognition> correct(const OdometryView& current);
+  void add_view(OdometryView current, const std::vector<Recognition>& recognised);
   /// Searches all views; true if one is recognised, whose pose the robot then takes over. Cost: a
   /// `compute_pair_evidence` for each view.
-  bool relocalise(const HomingView& current);
+  bool relocalise(const OdometryView& current);
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
-  [[nodiscard]] const std::vector<HomingView>& views() const noexcept { return views_; }
+  [[nodiscard]] const std::vector<OdometryView>& views() const noexcept { return views_; }
   [[nodiscard]] std::span<const Pose2> poses() const noexcept { return poses_; }
   /// Returns the index of the view that was recognised last.
   [[nodiscard]] std::size_t anchor() const noexcept { return anchor_; }
@@ -57,7 +57,7 @@ class ExplorerPose {
 
   double radius_m_;
   OdometryNoise odometry_;
-  std::vector<HomingView> views_;
+  std::vector<OdometryView> views_;
   std::vector<Pose2> poses_;
   std::vector<PoseEdge> edges_;
   std::vector<double> edge_weights_;
