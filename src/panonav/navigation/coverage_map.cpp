@@ -23,7 +23,7 @@ constexpr double border_weight = 6.0;
 constexpr double added_radii = 0.5;
 // Smallest frontier area for each metre of the path to it (m2/m): a far remnant is not worth it,
 // what a range shows of another room is.
-constexpr double min_area_per_path_m = 0.1;
+constexpr double min_area_per_path_m = 0.08;
 // Radius around a position from which no view was recognised, in catchment radii: half the distance
 // of the observations on the way.
 constexpr double unrecognised_radii = 0.3;
