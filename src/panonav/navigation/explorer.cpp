@@ -26,6 +26,8 @@ constexpr int max_contacts = 8;
 // as long.
 constexpr double assumed_open_radii = 1.3;
 constexpr double felt_width_m = 0.15;
+// Observations on a way back after which the robot is lost: 50 m in steps of 0.25 m.
+constexpr int max_driving_back = 200;
 // Observations after which the map is made again: a metre of ranges.
 constexpr int max_map_age = 4;
 }  // namespace
@@ -119,6 +121,9 @@ class Explorer::Implementation {
       if (!choose_target() || robot_.travelled_m() >= options_.max_metres)
         state_ = State::returning;
     }
+    const bool is_driving_back = state_ == State::recovering || state_ == State::returning;
+    driving_back_ = is_driving_back ? driving_back_ + 1 : 0;
+    if (driving_back_ > max_driving_back) state_ = State::lost;
     decide_motion(current, decision);
     decision.state = state_;
     return decision;
@@ -330,6 +335,7 @@ class Explorer::Implementation {
   double target_area_m2_ = 0.0;
   std::optional<HomingPursuit> homing_;  // to the start
   int contacts_ = 0;                     // on the way to the target
+  int driving_back_ = 0;                 // observations since it drives back
   bool is_new_ = false;                  // the first view was just memorised
   Pose2 before_;                         // pose at the last observation
 };
