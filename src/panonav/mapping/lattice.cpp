@@ -364,8 +364,15 @@ class Arranger {
     for (auto& spring : lattice_.springs) spring.length *= *scale;
   }
   [[nodiscard]] std::optional<double> unit_scale() const {
-    const std::vector<double> nearest =
-        distances_between_nearest_positions(positions_of(layout_.poses), layout_.components);
+    // Equal views are of one place, although the solver may leave them a little apart.
+    std::vector<Point2> positions;
+    std::vector<std::size_t> components;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (views_.find_first_equal({i, i}).first != i) continue;
+      positions.push_back(layout_.poses[i].position());
+      components.push_back(layout_.components[i]);
+    }
+    const std::vector<double> nearest = distances_between_nearest_positions(positions, components);
     if (nearest.empty()) return std::nullopt;
     return 1.0 / upper_median(nearest);
   }
