@@ -16,7 +16,7 @@ struct RouteTrackerOptions {
   double search_step_m = 0.2;      ///< distance between tested positions along the path
   double search_lateral_m = 0.25;  ///< distance between tested positions to either side
   int search_sides = 2;            ///< number of tested positions to either side
-  int max_candidates = 8;          ///< number of best poses from which a search fits
+  int max_candidates = 4;          ///< number of best poses from which a search fits
   double recovery_m = 0.5;         ///< largest error of a predicted position
   /// Distance from the odometry's prediction beyond which a fix of a followed robot must be
   /// confirmed by the next line.
