@@ -83,6 +83,7 @@ class Explorer::Implementation {
       coverage_.assumed_open_m = assumed_open_radii * options.radius_m;
       coverage_.robot_radius_m += felt_width_m;
     }
+    assumed_radius_m_ = coverage_.robot_radius_m;
   }
 
   ExplorationDecision observe(const FourierSignature& view, const ExplorationReport& report) {
@@ -116,6 +117,7 @@ class Explorer::Implementation {
         if (!is_new_) robot_.add_view(current, recognised);
         is_new_ = false;
         target_.reset();
+        coverage_.robot_radius_m = assumed_radius_m_;
         map_ = make_map();
       }
       if (!choose_target() || robot_.travelled_m() >= options_.max_metres)
@@ -248,6 +250,12 @@ class Explorer::Implementation {
     }
     if (target_) return true;
     auto next = map_->find_view_point(robot_.pose().position());
+    if (!next && coverage_.robot_radius_m > robot_radius_m_) {
+      // Enclosed by what it assumes: until the next view an obstacle is no wider than it felt.
+      coverage_.robot_radius_m = robot_radius_m_;
+      map_ = make_map();
+      next = map_->find_view_point(robot_.pose().position());
+    }
     if (!next && forget_contradictions()) next = map_->find_view_point(robot_.pose().position());
     if (!next) return false;
     target_ = anchor(next->position);
@@ -320,6 +328,7 @@ class Explorer::Implementation {
 
   ExplorationOptions options_;
   double robot_radius_m_;
+  double assumed_radius_m_ = 0.0;  // with the assumed width of obstacles
   ExplorerPose robot_;
   CoverageOptions coverage_;
   State state_ = State::exploring;
