@@ -105,8 +105,7 @@ class MissionRobot final : public RobotBase {
   [[nodiscard]] bool take_contact() noexcept;
   /// Returns the direction of the last contact in the robot frame, as one of the bumper's eight.
   [[nodiscard]] double contact_rad() const noexcept { return contact_rad_; }
-  /// Measures the ring of ranges (`measure_ranges`). The border of the map is a wall that touches a
-  /// robot whose centre is on it.
+  /// Measures the ring of ranges (`measure_ranges`).
   [[nodiscard]] std::array<double, sensor_directions> read_ranges();
   /// Drives back a little, against the command that led to the last contact.
   void back_off();
