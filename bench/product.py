@@ -217,7 +217,7 @@ BOUNDS = {
     "localise, first answer": 19,
     "localise, first answer, unknown": 40,
     "track, first answer": 828,
-    "route follow, first answer": 151,
+    "route follow, first answer": 184,
     "route follow, first answer, unknown": 168,
 }
 
