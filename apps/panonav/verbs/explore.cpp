@@ -224,8 +224,8 @@ Verb explore_verb() {
       "areas of the views cover the floor that it found. The memory contains the views and "
       "their map. True poses only measure the share of the floor that is covered. The exit "
       "code is 1 if the robot gets lost.",
-      "  panonav explore office office.panonav\n"
-      "  panonav explore lab lab.panonav --obstacles bumper --seed 7 --json",
+      "  panonav explore office office.panonav --kind panorama\n"
+      "  panonav explore lab lab.panonav --kind panorama --obstacles bumper --max-metres 10",
       declare_explore};
 }
 
