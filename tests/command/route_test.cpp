@@ -396,9 +396,10 @@ TEST(RealRoute, SussexFollowedToThreeCentimetres) {
     lateral_m.push_back(std::abs(answer["lateral_m"].get<double>() -
                                  answer["ground_truth"]["lateral_m"].get<double>()));
   }
-  EXPECT_GE(along_m.size(), 395U);
+  // Positions past the ends explain some images from within 0.4 m of these as well.
+  EXPECT_GE(along_m.size(), 389U);  // 95 %
   EXPECT_LE(median(along_m), 0.03);
-  EXPECT_LE(quantile(along_m, 0.95), 0.25);
+  EXPECT_LE(quantile(along_m, 0.95), 0.15);
   EXPECT_LE(quantile(lateral_m, 0.95), 0.05);
 }
 
