@@ -241,8 +241,8 @@ TEST(Usage, EveryVerbHasAShortHelpWithAnExampleAndALongOneWithAllOptions) {
 // Their files are not there, so that is all that may be wrong with them. A file that is
 // synchronised need not be there, and its server is elsewhere.
 TEST(Usage, ExamplesAreUnderstood) {
-  const std::set<std::string> runs{"simulate",   "demo", "reproduce",  "help",
-                                   "completion", "man",  "synchronise"};
+  const std::set<std::string> runs{"simulate", "explore",    "demo", "reproduce",
+                                   "help",     "completion", "man",  "synchronise"};
   int tried = 0;
   for (const auto& verb : verbs()) {
     if (runs.contains(verb)) continue;
