@@ -209,6 +209,8 @@ Run declare_explore(Arguments& arguments) {
   reject_ineffective_camera_options(arguments, values->simulation);
   arguments.show_in_help({"--radius-m", "--max-metres", "--seed", "--kind"});
   arguments.declare_outputs({"MEMORY"});
+  arguments.explain_interruption(
+      "MEMORY contains the views so far, without a map. To start over, choose another file.");
   return [values, &arguments](Session& session) { return explore(arguments, *values, session); };
 }
 
