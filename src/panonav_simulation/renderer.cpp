@@ -452,8 +452,7 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const PixelRays& pix
   const auto channels = static_cast<std::size_t>(implementation_->channels);
   const ImageSize size = pixel_rays.image_size_;
   Radiance image{size.width, size.height, implementation_->channels, {}};
-  image.values.resize(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height) *
-                      channels);
+  image.values.resize(channels * static_cast<std::size_t>(size.width) * size.height);
   for (std::size_t i = 0; i < pixel_rays.pixels_.size(); ++i) {
     std::fill_n(
         image.values.begin() + static_cast<std::ptrdiff_t>(pixel_rays.pixels_[i] * channels),
@@ -469,6 +468,7 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const PixelRays& pix
     const std::span part =
         std::span(all).subspan(find_first_ray(begin), find_first_ray(end) - find_first_ray(begin));
     std::vector<Ray> rays;
+    rays.reserve(part.size());
     for (const PixelRays::PixelRay& ray : part) {
       const auto& [ox, oy, oz] = ray.origin;
       const auto& [dx, dy, dz] = ray.direction;
@@ -480,10 +480,8 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const PixelRays& pix
     for (std::size_t i = 0; i < part.size(); ++i) {
       implementation_->shade(rays[i], hits[i], pixel_rays.spread_rad_, colour.data());
       const std::uint32_t index = part[i].pixel;
-      for (std::size_t c = 0; c < channels; ++c) {
-        image.values[pixel_rays.pixels_[index] * channels + c] +=
-            pixel_rays.gains_[index] * colour[c];
-      }
+      float* const values = image.values.data() + pixel_rays.pixels_[index] * channels;
+      for (std::size_t c = 0; c < channels; ++c) values[c] += pixel_rays.gains_[index] * colour[c];
     }
   };
   executor.for_each_chunk(pixel_rays.pixels_.size(), 4096, draw);

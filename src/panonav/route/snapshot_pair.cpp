@@ -92,10 +92,9 @@ ChainModel learn_chain_model(std::span<const SnapshotPair> pairs,
   std::vector<double> elsewhere;
   std::vector<std::pair<double, bool>> by_confidence;
   constexpr double max_length_beside = 0.1;  // in units of R
-  constexpr double min_beside_m = 0.15;
   for (const SnapshotPair& pair : pairs) {
     const auto r_m = static_cast<double>(model.typical_distance_m);
-    if (pair.distance_m <= std::max(max_length_beside * r_m, min_beside_m)) {
+    if (pair.distance_m <= std::max(max_length_beside * r_m, min_compared_m)) {
       beside.push_back(pair.difference);
     } else if (!pair.is_right) {
       elsewhere.push_back(pair.difference);
