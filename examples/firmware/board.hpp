@@ -9,8 +9,8 @@
 
 namespace board {
 
-constexpr int width = 160;   // of a picture, in pixels
-constexpr int height = 120;  // of a picture
+constexpr int width = 160;   // width of a picture in pixels
+constexpr int height = 120;  // height of a picture in pixels
 
 std::span<const std::uint8_t> chain();              // `SnapshotChain::pack`, in flash memory
 std::span<const std::uint16_t> sampler();           // `make_sampler_pixels` of this camera

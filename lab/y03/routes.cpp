@@ -201,7 +201,8 @@ Pose2 ScaleErrorWheels::execute(const Pose2& commanded, Random& random) const {
 
 namespace {
 
-/// A robot that repeats a route: its wheels err, and it knows of obstacles what its sensor told.
+/// A robot that repeats a route: its wheels err, and it knows only the obstacles that its sensor
+/// measured.
 class RouteRobot {
  public:
   struct Step {

@@ -63,7 +63,7 @@ class PixelRays {
   };
   ImageSize image_size_;
   std::vector<std::uint32_t> pixels_;
-  std::vector<float> gains_;    // of the lens of each pixel, over the number of rays per pixel
+  std::vector<float> gains_;    // light through the lens over rays, by pixel
   std::vector<PixelRay> rays_;  // into the scene, in the order of the pixels
   std::vector<float> bodies_;   // light of each pixel from parts of the camera
   float spread_rad_ = 0.0F;

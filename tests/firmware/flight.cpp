@@ -1,6 +1,6 @@
 // Records a chain in a simulated garden and flies back along it with the firmware's own program:
-// flight FOLDER [SCENE SEED]. Writes flight.bin, what the board captures, and flight.txt, the bits
-// of all velocities. Fails unless the flight ends, and if it ends elsewhere than at the start.
+// flight FOLDER [SCENE SEED]. Writes flight.bin, what the board captures, and flight.txt, all
+// velocities bit by bit. Fails unless the flight ends, and if it ends elsewhere than at the start.
 #include <array>
 #include <bit>
 #include <cmath>

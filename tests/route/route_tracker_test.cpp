@@ -250,7 +250,7 @@ TEST(RouteEnds, ARobotAtTheBeginningOfARoundIsFoundThoughItsEndHasDrifted) {
   EXPECT_GE(found, static_cast<int>(worlds) - 1);
 }
 
-// Two half turns of a hall whose ends and sides look like each other cannot be told apart.
+// Two half turns of a hall whose ends and sides look like each other cannot be distinguished.
 TEST(RouteLimits, APlaceThatLooksLikeAnotherIsNotAnswered) {
   int tested = 0;
   int answered = 0;

@@ -21,11 +21,11 @@ constexpr double border_weight = 6.0;
 // Length added to that of a path, in catchment radii, so that a near position with little gain is
 // not preferred to a far one with much.
 constexpr double added_radii = 0.5;
-// Smallest frontier area for each metre of the path to it (m2/m): a far remnant is not worth it,
-// what a range shows of another room is.
+// Smallest frontier area for each metre of the path to it (m2/m): a far remnant is not worth
+// a visit, another room of which ranges show a part is.
 constexpr double min_area_per_path_m = 0.08;
 // Radius around a position from which no view was recognised, in catchment radii: half the distance
-// of the observations on the way.
+// between successive observations.
 constexpr double unrecognised_radii = 0.3;
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace {
 constexpr double max_used_range_m = 2.0;
 // Distance from a target at which the robot is there: half a cell.
 constexpr double arrival_m = 0.05;
-// Contacts on the way to a target after which it is given up.
+// Largest number of contacts on the path to a target, which is abandoned then.
 constexpr int max_contacts = 8;
 // Without ranges, floor is assumed around driven positions up to this distance, in catchment radii,
 // and an obstacle to be this much wider than the point of contact: most obstacles are walls, and a
@@ -30,6 +30,7 @@ constexpr double felt_width_m = 0.15;
 constexpr int max_driving_back = 200;
 // Observations after which the map is made again: a metre of ranges.
 constexpr int max_map_age = 4;
+
 }  // namespace
 
 void visit_options(ExplorationOptions& options, OptionVisitor& visitor) {

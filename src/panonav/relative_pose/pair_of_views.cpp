@@ -107,7 +107,7 @@ class PairOfViews {
   RowBuffer<float, max_rows_without_heap> row_weights_;
   bool has_row_weights_ = false;  // false: equal weights
   PairEquations normal_;
-  PairSolution best_;  // of the present iteration
+  PairSolution best_;  // best one in the present iteration
   HomeVector vector_;
 };
 

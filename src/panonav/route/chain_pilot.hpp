@@ -148,8 +148,8 @@ class ChainPilot {
   double approach_confidence_ = -1.0;  // largest one
   int steps_since_min_ = 0;
   // The present search.
-  std::size_t spiral_points_ = 0;  // of the spiral; 0: there is no search
-  double spiral_angle_rad_ = 0.0;  // of the present point
+  std::size_t spiral_points_ = 0;  // points in the spiral; 0: there is no search
+  double spiral_angle_rad_ = 0.0;  // direction of the present point
   std::size_t search_steps_ = 0;
   double fix_to_search_m_ = 0.0;  // distance driven from the last snapshot until then
   std::size_t spiral_point_ = 0;

@@ -177,7 +177,7 @@ class RouteLines {
   int columns_;
   RouteFitOptions options_;
   std::vector<Pose2> poses_;
-  PathIndex path_;             // of the poses, with one more before the first and after the last
+  PathIndex path_;             // path through the poses, extended at both ends
   std::vector<Level> levels_;  // coarse first
 };
 

@@ -126,7 +126,7 @@ constexpr double min_step_length = max_step_length / 128.0;
 
 /// Least distance over which the change of the lines before an end shows how far away things are:
 /// a tenth of a step at 2.5 m.
-constexpr double known_step_m = 0.25;
+constexpr double min_known_step_m = 0.25;
 
 /// Returns the line at the end after a step, in the world's frame.
 std::vector<float> move_line(std::span<const float> end, const StepOutward& step,
@@ -273,7 +273,7 @@ struct Regression {
     noise = std::max(min_noise, sigma_over_mad * order_statistic(std::move(absolute), 0.5));
   }
 
-  std::vector<double> residuals;  // of each of the columns
+  std::vector<double> residuals;  // one for each column
   double noise = 0.0;             // robust standard deviation of these
 };
 
@@ -423,7 +423,8 @@ RouteLines::PastEnd RouteLines::find_past_end(std::span<const float> line,
     const auto inner_m = [&] { return distance(poses_[inner].position(), poses_[end].position()); };
     do {
       inner = is_start ? inner + 1 : inner - 1;
-    } while (inner_m() < known_step_m * options_.metre && inner > 0 && inner + 1 < poses_.size());
+    } while (inner_m() < min_known_step_m * options_.metre && inner > 0 &&
+             inner + 1 < poses_.size());
     const StepOutward known = find_step_from(inner, inner, smoothed_line_at(end));
     const double unit_m = inner_m() / std::max(min_step_length, known.length);
     found = {{poses_[end].x_m + unit_m * step.length * std::cos(step.direction_rad),

@@ -196,11 +196,11 @@ class WideSearch {
   std::size_t top_;
   SearchResult& result_;
   std::array<int, parts + 1> first_component_{};
-  std::array<SketchIndex::Query, parts> queries_;  // of the components from each part on
+  std::array<SketchIndex::Query, parts> queries_;  // one for the components from each part on
   std::vector<SketchIndex::FineBounds> bounds_of_rest_;
-  std::vector<std::uint32_t> bounds_;  // of rows
+  std::vector<std::uint32_t> bounds_;  // one for each row
   NearestMatchList nearest_{top_};
-  std::array<std::uint32_t, chunk + 16> places_{};  // of rows in a chunk
+  std::array<std::uint32_t, chunk + 16> places_{};  // positions of rows in a chunk
   std::array<std::uint32_t, chunk> distances_{}, rest_{};
   std::array<bool, parts> is_worthwhile_{};  // bounds after a part saved an eighth of the views
 };
