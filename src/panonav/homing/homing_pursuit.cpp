@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -14,11 +13,6 @@ namespace {
 
 constexpr int stages_of_coarse_to_fine = 3;
 constexpr int stages_of_recovering = 4;
-/// Factor of the step when a vector opposes the one before it.
-constexpr double opposing_factor = 0.5;
-/// Factor of the step when both vectors agree: two such steps do not undo one halving, so steps
-/// shrink when directions are random.
-constexpr double agreeing_factor = 1.25;
 
 }  // namespace
 
@@ -100,30 +94,17 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
       vector_options_.tilt && home_.elevations() ? align_tilt_to_home(view) : view;
   Decision decision;
   decision.difference = image_difference(home_, current);
-  ++steps_since_min_;
-  if (decision.difference < min_difference_) {
-    min_difference_ = decision.difference;
-    steps_since_min_ = 0;
-  }
+  approach_.add_difference(decision.difference);
   for (;;) {
     const FourierHomingOptions options = vector_options_of_stage(current);
     const HomeVector vector = home_vector(home_, current, options);
     decision.vector = vector;
     decision.stage = stage_;
-    // Directions are compared in the frame of the robot at home, which does not change.
-    const double direction_in_home_rad = vector.direction_rad() - vector.heading_rad;
-    if (direction_in_home_rad_) {
-      const bool is_opposing = std::cos(direction_in_home_rad - *direction_in_home_rad_) < 0.0;
-      step_factor_ = is_opposing ? step_factor_ * opposing_factor
-                                 : std::min(1.0, step_factor_ * agreeing_factor);
-    }
-    direction_in_home_rad_ = direction_in_home_rad;
     decision.turn_rad = vector.direction_rad();
-    decision.advance_m =
-        step_factor_ * std::min(options_.max_step_m, options_.typical_distance_m * vector.length());
+    decision.advance_m = approach_.next_m(vector, options_.typical_distance_m, options_.max_step_m);
     const bool stops = vector.length() < options_.stop_length ||
                        decision.advance_m < options_.min_step_m ||
-                       steps_since_min_ >= options_.patience;
+                       approach_.steps_since_min() >= options_.patience;
     if (state_ == State::moving && !stops && steps_ >= options_.max_steps) {
       state_ = State::exhausted;
     }
@@ -133,10 +114,7 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
     }
     if (state_ == State::moving && has_next_stage(decision.difference)) {
       ++stage_;
-      min_difference_ = decision.difference;
-      steps_since_min_ = 0;
-      step_factor_ = 1.0;
-      direction_in_home_rad_.reset();
+      approach_.restart(decision.difference);
       continue;
     }
     if (state_ == State::moving) {

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <optional>
-
 #include "panonav/core/options.hpp"
+#include "panonav/relative_pose/approach_steps.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 
@@ -96,10 +95,7 @@ class HomingPursuit {
   FourierHomingOptions vector_options_;
   int stage_ = 0;
   int steps_ = 0;
-  double step_factor_ = 1.0;
-  std::optional<double> direction_in_home_rad_;  // of the step before
-  double min_difference_ = 2.0;                  // of the stage
-  int steps_since_min_ = 0;
+  ApproachSteps approach_;  // of the stage
   State state_ = State::moving;
 };
 

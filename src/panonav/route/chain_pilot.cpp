@@ -18,9 +18,6 @@ namespace {
 constexpr double near_length = 0.1;
 // A way point is reached at this distance, the tolerance of the legs.
 constexpr double way_point_radius_m = 0.15;
-// Factors of the step when a home vector opposes the one before it, and when it agrees.
-constexpr double opposing_factor = 0.5;
-constexpr double agreeing_factor = 1.25;
 // Half of the window of headings beyond the error of odometry: the error of the compass at a
 // snapshot.
 constexpr double compass_error_rad = 0.35;
@@ -204,10 +201,7 @@ void ChainPilot::begin_homing() {
   state_ = ChainState::homing;
   homing_stage_ = 0;
   homing_steps_ = 0;
-  step_factor_ = 1.0;
-  last_direction_rad_.reset();
-  min_difference_ = 2.0;
-  steps_since_min_ = 0;
+  approach_.restart();
   approach_confidence_ = -1.0;
 }
 
@@ -283,27 +277,6 @@ ChainDecision ChainPilot::travel(const CoefficientView& view) {
   return move_to(position(way_point_));
 }
 
-// Returns the length of the next step of an approach: halved when home vectors oppose each other
-// [S06 section 3], as seen from the snapshot.
-double ChainPilot::next_step_m(const SnapshotSight& sight) {
-  const HomeVector& vector = sight.vector;
-  const double direction_rad = vector.direction_rad() - vector.heading_rad;
-  if (last_direction_rad_) {
-    const bool is_opposing = portable::cos(direction_rad - *last_direction_rad_) < 0.0;
-    step_factor_ = is_opposing ? step_factor_ * opposing_factor
-                               : std::min(1.0, step_factor_ * agreeing_factor);
-  }
-  last_direction_rad_ = direction_rad;
-  approach_confidence_ = std::max(approach_confidence_, sight.confidence);
-  ++steps_since_min_;
-  if (sight.difference < min_difference_) {
-    min_difference_ = sight.difference;
-    steps_since_min_ = 0;
-  }
-  const auto r_m = static_cast<double>(route_.header.model.typical_distance_m);
-  return step_factor_ * std::min(options_.max_step_m, r_m * vector.length());
-}
-
 ChainDecision ChainPilot::home(const CoefficientView& view) {
   SnapshotSight sight = look_at(target_, view, false);
   if (homing_stage_ == 1) {
@@ -319,8 +292,10 @@ ChainDecision ChainPilot::home(const CoefficientView& view) {
       !is_too_far &&
       sight.difference <= static_cast<double>(route_.header.model.arrived_difference);
   const std::optional<std::size_t> next = next_snapshot(target_);
-  const double advance_m = next_step_m(sight);
-  const bool stops = advance_m < options_.stop_step_m || steps_since_min_ >= patience ||
+  approach_confidence_ = std::max(approach_confidence_, sight.confidence);
+  approach_.add_difference(sight.difference);
+  const double advance_m = approach_.next_m(vector, r_m, options_.max_step_m);
+  const bool stops = advance_m < options_.stop_step_m || approach_.steps_since_min() >= patience ||
                      homing_steps_ >= options_.max_homing_steps;
   if (is_beside && (stops || (next && vector.length() <= near_length))) {
     fix_pose(vector);

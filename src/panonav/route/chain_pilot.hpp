@@ -5,6 +5,7 @@
 #include <span>
 
 #include "panonav/geometry/pose2.hpp"
+#include "panonav/relative_pose/approach_steps.hpp"
 #include "panonav/relative_pose/home_vector.hpp"
 #include "panonav/route/chain_code.hpp"
 
@@ -105,7 +106,6 @@ class ChainPilot {
   void fix_pose(const HomeVector& vector);
   void learn_drift(const Pose2& fixed);
   void begin_homing();
-  [[nodiscard]] double next_step_m(const SnapshotSight& sight);
   void begin_search();
   [[nodiscard]] Point2 spiral_place(double angle_rad) const noexcept;
   [[nodiscard]] double next_spiral_angle(double angle_rad) const noexcept;
@@ -142,11 +142,8 @@ class ChainPilot {
   // The present approach.
   int homing_stage_ = 0;
   int homing_steps_ = 0;
-  double step_factor_ = 1.0;
-  std::optional<double> last_direction_rad_;
-  double min_difference_ = 2.0;
+  ApproachSteps approach_;
   double approach_confidence_ = -1.0;  // largest one
-  int steps_since_min_ = 0;
   // The present search.
   std::size_t spiral_points_ = 0;  // points in the spiral; 0: there is no search
   double spiral_angle_rad_ = 0.0;  // direction of the present point
