@@ -122,6 +122,11 @@ void visit_fields(A& a, Is<OccupancyGrid> auto& m) {
   a(m.resolution, m.width, m.height, m.origin, m.cells);
 }
 template <class A>
+void visit_fields(A& a, Is<LaserScan> auto& m) {
+  a(m.header, m.angle_min, m.angle_max, m.angle_increment, m.time_increment, m.scan_time,
+    m.range_min, m.range_max, m.ranges, m.intensities);
+}
+template <class A>
 void visit_fields(A& a, Is<KeyValue> auto& m) {
   a(m.key, m.value);
 }
@@ -363,6 +368,7 @@ PANONAV_ROS_MESSAGE(PointCloud2);
 PANONAV_ROS_MESSAGE(Odometry);
 PANONAV_ROS_MESSAGE(Path);
 PANONAV_ROS_MESSAGE(OccupancyGrid);
+PANONAV_ROS_MESSAGE(LaserScan);
 PANONAV_ROS_MESSAGE(TFMessage);
 PANONAV_ROS_MESSAGE(TransformStamped);
 PANONAV_ROS_MESSAGE(PointStamped);

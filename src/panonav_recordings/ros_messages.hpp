@@ -247,6 +247,21 @@ struct OccupancyGrid {
   std::vector<std::int8_t> cells;  ///< row-major; 0 .. 100, -1 unknown
 };
 
+/// Distances to the nearest obstacles in a plane, at equal steps of azimuth.
+struct LaserScan {
+  static constexpr std::string_view type = "sensor_msgs/LaserScan";  ///< ROS 1's name of the type
+  Header header;                   ///< when the first distance was measured; frame of the sensor
+  float angle_min = 0.0F;          ///< azimuth of the first distance, rad, counter-clockwise
+  float angle_max = 0.0F;          ///< azimuth of the last one, rad
+  float angle_increment = 0.0F;    ///< rad
+  float time_increment = 0.0F;     ///< s between successive distances
+  float scan_time = 0.0F;          ///< s between scans; 0: unknown
+  float range_min = 0.0F;          ///< smallest distance that can be measured, m
+  float range_max = 0.0F;          ///< largest distance that can be measured, m
+  std::vector<float> ranges;       ///< m; infinity: nothing up to `range_max`; NaN: not measured
+  std::vector<float> intensities;  ///< one for each distance, or none
+};
+
 /// A key and its value.
 struct KeyValue {
   std::string key;    ///< unique within a status

@@ -52,6 +52,10 @@ constexpr std::array definitions{
                "float64[9] angular_velocity_covariance\n"
                "geometry_msgs/Vector3 linear_acceleration\n"
                "float64[9] linear_acceleration_covariance\n"},
+    Definition{"sensor_msgs/LaserScan",
+               "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\n"
+               "float32 angle_increment\nfloat32 time_increment\nfloat32 scan_time\n"
+               "float32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] intensities\n"},
     Definition{"sensor_msgs/PointField",
                "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\n"
                "uint8 UINT32=6\nuint8 FLOAT32=7\nuint8 FLOAT64=8\nstring name\nuint32 offset\n"

@@ -330,6 +330,9 @@ void read_ros_bytes(Bytes bytes) {
       case 12:
         (void)read_ros_message<recordings::ros::DiagnosticArray>(rest, encoding);
         break;
+      case 13:
+        (void)read_ros_message<recordings::ros::LaserScan>(rest, encoding);
+        break;
       default:
         break;
     }

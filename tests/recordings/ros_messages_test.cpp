@@ -105,6 +105,10 @@ TEST(RosMessages, AreTheBytesThatOthersWrite) {
                           {{header("m", whole), pose(0)}, {header("map", whole + 1), pose(1)}}});
   expect_golden(
       ros::OccupancyGrid{header("map"), whole + 5, 0.05F, 3, 2, pose(0), {-1, 0, 100, 50, -1, 7}});
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  expect_golden(ros::LaserScan{
+      header("camera"), -1.5F, 1.5F, 1.5F, 0, 0.125F, 0.25F, 2.5F, {0.5F, infinity, unknown}, {}});
   expect_golden(ros::TFMessage{{{header("odom", whole), "base_footprint", pose(0)},
                                 {header("base_footprint", whole + 1), "base", pose(1)}}});
   expect_golden(ros::PointStamped{header("world"), {3, 4.5, -0.5}});
