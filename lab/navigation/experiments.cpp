@@ -107,7 +107,8 @@ std::vector<SensorMissions> make_sensor_missions() {
   using enum simulation::ObstacleSensor;
   return {{truth, "truth", "the true free space, which no robot knows", 1.0, {}},
           {bumper, "bumper", "a bumper alone", 0.9, {}},
-          {ranges, "ranges", "a bumper and eight noisy ranges", 0.95, {}}};
+          {ranges, "ranges", "a bumper and eight noisy ranges", 0.95, {}},
+          {camera, "camera", "a bumper and the floor in the pictures", 0.95, {}}};
 }
 
 void report_sensors(const std::string& id, const std::string& what,
@@ -239,8 +240,9 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::SceneVariation variation{.seed = seed};
-    const simulation::MissionPlace place =
+    simulation::MissionPlace place =
         make_place(simulation::make_or_read_scene(options.data, scene, variation));
+    simulation::add_floor_camera(place);
     const simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, plan_exploring_drive(place, seed), simulation::make_noisy_wheels(),
         Random(seed, 1).next(), executor);

@@ -48,7 +48,7 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
                    const Pose2& start, const HomingRunOptions& options, std::uint64_t seed) {
   HomingPursuit pursuit(home, options.pursuit, options.vector);
   simulation::SimulatedRobot robot(*place.free_space, options.motion, options.obstacles, start,
-                                   seed, options.sensor);
+                                   seed, options.sensor, place.floor_camera.get());
   Random noise_of_views(seed, 2);
   HomingRun run;
   run.goal = goal;

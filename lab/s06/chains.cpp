@@ -109,7 +109,7 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
   start.heading_rad = errors.uniform(-std::numbers::pi, std::numbers::pi);
   ChainFollower follower(chain, direction);
   simulation::SimulatedRobot robot(*place.free_space, {}, simulation::ObstacleRule::pass, start,
-                                   seed, sensor);
+                                   seed, sensor, place.floor_camera.get());
   Random noise_of_views(seed, 2);
   ChainRun run;
   Pose2 moved;

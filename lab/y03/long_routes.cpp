@@ -207,12 +207,14 @@ void RouteExperiments::reproduce_loop_routes() const {
   using enum simulation::ObstacleSensor;
   std::vector<SensorRoutes> sensors{
       {ranges, "ranges", "a bumper and eight noisy ranges", {}},
+      {camera, "camera", "a bumper and the floor in the pictures", {}},
       {truth, "truth", "the true free space, which no robot knows", {}}};
   const int runs = std::min(runs_per_route, options.runs);
   for (int i = 0; i < count_routes(options); ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     RouteScene place =
         make_route_scene(simulation::make_scene("loop", {.seed = seed}), "loop", executor);
+    simulation::add_floor_camera(place);
     routes.push_back(record_and_repeat_route(place, runs, seed, executor));
     const RouteTracker tracker(routes.back().panorama);
     for (SensorRoutes& kind : sensors) {

@@ -218,7 +218,12 @@ class RouteRobot {
         pose_(start),
         sensor_(sensor),
         nobody_(place.free_space, 0, seed),
-        noise_of_ranges_(seed, 5) {}
+        noise_of_ranges_(seed, 5) {
+    if (sensor == simulation::ObstacleSensor::camera) {
+      simulation::require_floor_camera(place.floor_camera.get());
+      floor_.emplace(*place.floor_camera, nullptr, seed);
+    }
+  }
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
 
@@ -230,6 +235,7 @@ class RouteRobot {
       known_.add_ranges(
           simulation::measure_ranges(*place_.free_space, nullptr, pose_, noise_of_ranges_));
     }
+    if (floor_) known_.add_scan(floor_->scan(pose_));
     auto way = find_open_way(planned);
     if (!way && sensor_ != simulation::ObstacleSensor::truth) {
       // Contacts are known to 22.5 degrees only, so it feels again before it gives up.
@@ -241,8 +247,7 @@ class RouteRobot {
     if (way->rotation_rad != 0.0) {
       const Pose2 rotation{0.0, 0.0, way->rotation_rad};
       pose_ = pose_ * wheels_.execute(rotation, random);
-      known_.move(rotation);
-      step.odometry = rotation;
+      report_motion(rotation, step.odometry);
     }
     const bool has_touched = !drive_until_contact(way->advance, random, step.odometry);
     step.has_met_obstacle |= has_touched;
@@ -306,8 +311,8 @@ class RouteRobot {
       const double further = fraction + std::exp2(-i);
       if (is_clear_to(further)) fraction = further;
     }
-    report_motion({fraction * advance.x_m, fraction * advance.y_m, advance.heading_rad}, odometry);
     pose_ = {point_at(fraction).x_m, point_at(fraction).y_m, after.heading_rad};
+    report_motion({fraction * advance.x_m, fraction * advance.y_m, advance.heading_rad}, odometry);
     if (fraction == 1.0) return true;
     const double radius_m = place_.scene.robot_radius_m;
     const double contact_rad =
@@ -328,6 +333,7 @@ class RouteRobot {
   void report_motion(const Pose2& motion, Pose2& odometry) {
     odometry = odometry * motion;
     known_.move(motion);
+    if (floor_) floor_->move(motion, pose_);
   }
 
   const RouteScene& place_;
@@ -336,6 +342,7 @@ class RouteRobot {
   simulation::ObstacleSensor sensor_;
   simulation::People nobody_;
   Random noise_of_ranges_;
+  std::optional<simulation::FloorSensor> floor_;
   simulation::ObstacleMemory known_;
   int detour_side_ = 0;  // side of the last detour: 1 left, -1 right, 0 none
   int contacts_ = 0;     // consecutive steps that ended in contact

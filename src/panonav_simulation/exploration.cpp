@@ -42,8 +42,8 @@ bool is_home_vector_right(const HomingView& home, const Pose2& home_pose, const 
 ExplorationRun run_exploration(const MissionPlace& place, Explorer& explorer,
                                const ExplorationRobot& options, const Pose2& start,
                                std::uint64_t seed, const ExplorationStep& step) {
-  if (options.obstacles == ObstacleSensor::truth) {
-    throw ContractError("obstacle sensor", "truth", "bumper or ranges");
+  if (options.obstacles != ObstacleSensor::bumper && options.obstacles != ObstacleSensor::ranges) {
+    throw ContractError("obstacle sensor", "another", "bumper or ranges");
   }
   MissionRobot robot(place, options.base, options.motion, start, seed, 0, options.obstacles);
   Random noise_of_views(seed, 2);

@@ -85,7 +85,8 @@ struct RememberedPlace {
 /// and the people around, who walk while it drives.
 class MissionRobot final : public RobotBase {
  public:
-  /// `place` must outlive the robot. Throws OptionError, and ContractError as `People`.
+  /// `place` must outlive the robot. Throws OptionError, and ContractError as `People` and if
+  /// the robot sees with a camera that `place` does not have.
   MissionRobot(const MissionPlace& place, const BaseOptions& base, const OdometryNoise& motion,
                const Pose2& start, std::uint64_t seed, int people = 0,
                ObstacleSensor obstacles = ObstacleSensor::bumper);
@@ -98,8 +99,8 @@ class MissionRobot final : public RobotBase {
   [[nodiscard]] std::size_t contacts() const noexcept { return contacts_; }
   /// Finds the direction nearest to `direct_rad`, in steps of 15 degrees up to 90 degrees, in which
   /// half of the distance is free as far as the sensor knows. While the direct one is blocked, it
-  /// prefers the side chosen before. If none is free, directions that only ranges block count as
-  /// free; nullopt if there is none.
+  /// prefers the side chosen before. If none is free, directions that the robot only measured to be
+  /// blocked count as free; nullopt if there is none.
   [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double distance_m);
   /// Returns true if the robot was stopped by contact since the last call.
   [[nodiscard]] bool take_contact() noexcept;
@@ -132,6 +133,7 @@ class MissionRobot final : public RobotBase {
   Random random_;
   ObstacleSensor sensor_;
   Random noise_of_ranges_;
+  std::optional<FloorSensor> floor_;
   ObstacleMemory known_;
   std::size_t contacts_ = 0;
   Velocity contact_velocity_;  // the command of the last contact

@@ -24,6 +24,10 @@ MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
   validate(base_);
   motion_.drive = base_.drive;
   validate(motion_);
+  if (sensor_ == ObstacleSensor::camera) {
+    require_floor_camera(place.floor_camera.get());
+    floor_.emplace(*place.floor_camera, &people_, seed);
+  }
 }
 
 bool MissionRobot::has_clear_path(Point2 from, Point2 to) const {
@@ -57,6 +61,7 @@ void MissionRobot::command(const Velocity& velocity) {
     pose_.heading_rad = there.heading_rad;
     odometry_ = odometry_ * rotation;
     known_.move(rotation);
+    if (floor_) floor_->move(rotation, pose_);
     contact_rad_ = sense_contact_rad(*space_, people_, there, robot_radius_m_);
     known_.add(
         {robot_radius_m_ * std::cos(contact_rad_), robot_radius_m_ * std::sin(contact_rad_)});
@@ -67,6 +72,7 @@ void MissionRobot::command(const Velocity& velocity) {
   odometry_ = odometry_ * commanded;
   travelled_m_ += std::hypot(step.x_m, step.y_m);
   pose_ = there;
+  if (floor_) floor_->move(commanded, pose_);
 }
 
 void MissionRobot::back_off() {
@@ -92,6 +98,7 @@ std::optional<double> MissionRobot::find_free_direction(double direct_rad, doubl
   if (sensor_ == ObstacleSensor::ranges) {
     known_.add_ranges(measure_ranges(*space_, &people_, pose_, noise_of_ranges_));
   }
+  if (floor_) known_.add_scan(floor_->scan(pose_));
   bool heeds_ranges = true;
   const auto is_open = [&](double direction_rad, double length_m) {
     if (sensor_ != ObstacleSensor::truth) {
@@ -110,7 +117,7 @@ std::optional<double> MissionRobot::find_free_direction(double direct_rad, doubl
         [&](double direction_rad) { return is_open(direction_rad, 0.5 * distance_m); });
   };
   auto free_direction = find_direction();
-  if (!free_direction && sensor_ == ObstacleSensor::ranges) {
+  if (!free_direction && sensor_ != ObstacleSensor::truth) {
     // Between noisy ranges a door may seem too narrow; the bumper tells.
     heeds_ranges = false;
     free_direction = find_direction();

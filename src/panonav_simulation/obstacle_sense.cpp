@@ -18,6 +18,9 @@ constexpr double max_point_age_s = 10.0;
 // Half the width of the beam in which a range disproves earlier points (chosen: 5 degrees).
 constexpr double max_beam_rad = 0.09;
 
+// Error of the end of the floor in a scan: a step between the surfaces that a scanner tries.
+constexpr double floor_scan_error_m = 0.05;
+
 constexpr double direction_spacing_rad =
     2.0 * std::numbers::pi / static_cast<double>(sensor_directions);
 
@@ -134,6 +137,26 @@ void ObstacleMemory::add_ranges(const std::array<double, sensor_directions>& ran
     const double direction_rad = sensor_direction_rad(sensor);
     const double certain_m =
         ranges_m[sensor] + 2.0 * (range_noise_factor * ranges_m[sensor] + range_noise_m);
+    points_.push_back(
+        {{certain_m * std::cos(direction_rad), certain_m * std::sin(direction_rad)}, 0.0, true});
+  }
+}
+
+void ObstacleMemory::add_scan(const FloorScan& scan) {
+  const auto sectors = static_cast<std::ptrdiff_t>(scan.range_m.size());
+  std::erase_if(points_, [&](const Point& point) {
+    if (!point.is_measured) return false;
+    const double direction_rad = std::atan2(point.position.y_m, point.position.x_m);
+    const std::ptrdiff_t sector =
+        std::lround(direction_rad / (2.0 * std::numbers::pi) * static_cast<double>(sectors));
+    const auto range_m = scan.range_m[static_cast<std::size_t>((sector + sectors) % sectors)];
+    return range_m && std::hypot(point.position.x_m, point.position.y_m) < *range_m;
+  });
+  for (std::size_t i = 0; i < scan.range_m.size(); ++i) {
+    const auto range_m = scan.range_m[i];
+    if (!range_m || *range_m >= scan.max_range_m) continue;
+    const double certain_m = *range_m + floor_scan_error_m;
+    const double direction_rad = scan.azimuth_rad(i);
     points_.push_back(
         {{certain_m * std::cos(direction_rad), certain_m * std::sin(direction_rad)}, 0.0, true});
   }

@@ -7,6 +7,7 @@
 
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/pose2.hpp"
+#include "panonav/navigation/floor_scanner.hpp"
 #include "panonav_simulation/people.hpp"
 
 namespace panonav::simulation {
@@ -15,6 +16,7 @@ namespace panonav::simulation {
 enum class ObstacleSensor {
   bumper,  ///< contact, which stops the robot; it knows the side, as one of eight
   ranges,  ///< a ring of eight noisy ranges in addition to the bumper
+  camera,  ///< the floor in the pictures of its camera in addition to the bumper
   truth,   ///< the true free space, which no real robot knows; for comparison only
 };
 
@@ -57,6 +59,9 @@ class ObstacleMemory {
   /// deviations farther off: only what the noise leaves certain is an obstacle. Forgets earlier
   /// points of ranges in front of them.
   void add_ranges(const std::array<double, sensor_directions>& ranges_m);
+  /// Adds the points at which the floor of a scan ends, its error farther off. Forgets earlier
+  /// measured points in front of them.
+  void add_scan(const FloorScan& scan);
   /// Moves the robot by its odometry, robot_old_from_robot_new.
   void move(const Pose2& step);
   /// Ages all points, and forgets the old ones.

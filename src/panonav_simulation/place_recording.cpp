@@ -25,6 +25,14 @@ SimulatedPlace make_place(Scene scene, Executor& executor, std::optional<Point2>
   return {std::move(scene), std::move(space), std::move(renderer)};
 }
 
+void add_floor_camera(SimulatedPlace& place, const SensorOptions& sensor) {
+  place.floor_camera = std::make_shared<const FloorCamera>(
+      place.renderer,
+      FloorScannerOptions{.camera_height_m = place.scene.camera_height_m,
+                          .robot_radius_m = place.scene.robot_radius_m},
+      sensor);
+}
+
 std::size_t PlaceRecording::nearest_reference(Point2 position) const {
   std::size_t nearest = 0;
   for (std::size_t i = 1; i < references.size(); ++i) {

@@ -10,6 +10,7 @@
 #include "panonav/core/image.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/panorama/panorama.hpp"
+#include "panonav_simulation/floor_camera.hpp"
 #include "panonav_simulation/free_space.hpp"
 #include "panonav_simulation/renderer.hpp"
 #include "panonav_simulation/scene.hpp"
@@ -22,7 +23,12 @@ struct SimulatedPlace {
   Scene scene;
   std::shared_ptr<const FreeSpace> free_space;  ///< positions of the scene's robot
   std::shared_ptr<const Renderer> renderer;
+  /// Camera of the robots that see obstacles with it (`add_floor_camera`); null: they do not.
+  std::shared_ptr<const FloorCamera> floor_camera = nullptr;
 };
+
+/// Lets the robots of a place see the floor.
+void add_floor_camera(SimulatedPlace& place, const SensorOptions& sensor = {});
 
 /// Computes free space and light of a scene. If the free space has several components, the one that
 /// contains `inside` is used; without `inside` the largest. Throws ContractError as `FreeSpace` and

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -81,7 +82,7 @@ std::optional<OpenDirection> find_open_direction(double direct_rad, int directio
 
 SimulatedRobot::SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion,
                                ObstacleRule obstacles, const Pose2& start, std::uint64_t seed,
-                               ObstacleSensor sensor)
+                               ObstacleSensor sensor, const FloorCamera* floor_camera)
     : space_(&space),
       motion_(motion),
       obstacles_(obstacles),
@@ -92,6 +93,10 @@ SimulatedRobot::SimulatedRobot(const FreeSpace& space, const OdometryNoise& moti
   validate(motion);
   if (!space.is_free(start.position())) {
     throw ContractError("start of the robot", "an obstacle", "a free place");
+  }
+  if (sensor == ObstacleSensor::camera) {
+    require_floor_camera(floor_camera);
+    floor_.emplace(*floor_camera, nullptr, seed);
   }
 }
 
@@ -131,6 +136,7 @@ SimulatedRobot::Step SimulatedRobot::drive(double direct_rad, double advance_m) 
   if (sensor_ == ObstacleSensor::ranges) {
     known_.add_ranges(measure_ranges(*space_, nullptr, pose_, noise_of_ranges_));
   }
+  if (floor_) known_.add_scan(floor_->scan(pose_));
   Step step;
   bool has_forgotten = false;
   constexpr int max_contacts = 2 * directions_per_side + 1;  // directions that it tries
@@ -182,15 +188,32 @@ bool SimulatedRobot::drive_until_contact(double direction_rad, double advance_m)
   const double step_length_m = distance(before.position(), after.position());
   const double free_m = free_length_m(*space_, before.position(), after.position());
   const double fraction = free_m >= step_length_m ? 1.0 : free_m / step_length_m;
-  // The memory moves by odometry, which measures the part that was driven.
-  known_.move(rotation * Pose2{fraction * translation.x_m, fraction * translation.y_m, 0.0});
-  if (fraction >= 1.0) {
-    pose_ = after;
-    return true;
+  pose_ = after;
+  if (fraction < 1.0) {
+    pose_ = {before.x_m + fraction * (after.x_m - before.x_m),
+             before.y_m + fraction * (after.y_m - before.y_m), after.heading_rad};
   }
-  pose_ = {before.x_m + fraction * (after.x_m - before.x_m),
-           before.y_m + fraction * (after.y_m - before.y_m), after.heading_rad};
-  return false;
+  // Odometry measures the part that was driven.
+  move_sensors(rotation, {fraction * translation.x_m, fraction * translation.y_m, 0.0}, before);
+  return fraction >= 1.0;
+}
+
+// Moves the memory and the camera by odometry: by a rotation at the true pose `start`, then along
+// a straight line to the current pose.
+void SimulatedRobot::move_sensors(const Pose2& rotation, const Pose2& translation,
+                                  const Pose2& start) {
+  known_.move(rotation * translation);
+  if (!floor_) return;
+  constexpr double spacing_m = 0.05;
+  const double length_m = std::hypot(translation.x_m, translation.y_m);
+  const int parts = std::max(1, static_cast<int>(length_m / spacing_m));
+  floor_->move(rotation, {start.x_m, start.y_m, pose_.heading_rad});
+  for (int i = 1; i <= parts; ++i) {
+    const double share = static_cast<double>(i) / parts;
+    floor_->move({translation.x_m / parts, translation.y_m / parts, 0.0},
+                 {start.x_m + share * (pose_.x_m - start.x_m),
+                  start.y_m + share * (pose_.y_m - start.y_m), pose_.heading_rad});
+  }
 }
 
 void SimulatedRobot::back_off_from_contact(double direction_rad) {
@@ -202,8 +225,8 @@ void SimulatedRobot::back_off_from_contact(double direction_rad) {
   const Pose2 back{-back_m * std::cos(direction_rad), -back_m * std::sin(direction_rad), 0.0};
   const Pose2 there = pose_ * back;
   if (!space_->is_free_between(pose_.position(), there.position())) return;
-  pose_ = there;
-  known_.move(back);
+  const Pose2 before = std::exchange(pose_, there);
+  move_sensors({}, back, before);
 }
 
 }  // namespace panonav::simulation

@@ -8,6 +8,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "panonav_simulation/floor_camera.hpp"
 #include "panonav_simulation/free_space.hpp"
 #include "panonav_simulation/obstacle_sense.hpp"
 
@@ -54,10 +55,13 @@ class SimulatedRobot {
     bool is_stopped = false;        ///< it does not drive on
   };
 
-  /// `space` must outlive the robot. Throws OptionError, and ContractError if `start` is not free.
+  /// `space` and `floor_camera`, with which the robot sees if its sensor is the camera, must
+  /// outlive the robot. Throws OptionError, and ContractError if `start` is not free or the camera
+  /// is missing.
   SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion, ObstacleRule obstacles,
                  const Pose2& start, std::uint64_t seed,
-                 ObstacleSensor sensor = ObstacleSensor::bumper);
+                 ObstacleSensor sensor = ObstacleSensor::bumper,
+                 const FloorCamera* floor_camera = nullptr);
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
 
@@ -70,6 +74,7 @@ class SimulatedRobot {
   [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double advance_m);
   [[nodiscard]] bool drive_until_contact(double direction_rad, double advance_m);
   void back_off_from_contact(double direction_rad);
+  void move_sensors(const Pose2& rotation, const Pose2& translation, const Pose2& start);
 
   const FreeSpace* space_;
   OdometryNoise motion_;
@@ -78,6 +83,7 @@ class SimulatedRobot {
   Random random_;
   ObstacleSensor sensor_;
   Random noise_of_ranges_;
+  std::optional<FloorSensor> floor_;
   ObstacleMemory known_;
   int detour_side_ = 0;  // side of the last detour: 1 left, -1 right, 0 none
 };

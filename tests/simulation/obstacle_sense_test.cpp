@@ -86,9 +86,10 @@ TEST(Ranges, EndInObstaclesWithinTheirNoise) {
   EXPECT_LE(far, all / 50);
 }
 
-TEST(Missions, ArriveWithABumperOrRangesAlmostAsOftenAsWithTheTruth) {
+TEST(Missions, ArriveWithEachSensorAlmostAsOftenAsWithTheTruth) {
   Executor two(2);
-  const MissionPlace place = make_mission_place(make_scene("office", {.seed = 71}), two);
+  MissionPlace place = make_mission_place(make_scene("office", {.seed = 71}), two);
+  add_floor_camera(place);
   const RememberedPlace remembered = memorise_grid(place, 0.5, 5, two);
   const auto missions = sample_missions(place, remembered, {.count = 10}, 3);
   const auto count_arrived = [&](ObstacleSensor sensor) {
@@ -108,6 +109,27 @@ TEST(Missions, ArriveWithABumperOrRangesAlmostAsOftenAsWithTheTruth) {
   const int with_truth = count_arrived(ObstacleSensor::truth);
   EXPECT_GE(10 * count_arrived(ObstacleSensor::bumper), 8 * with_truth);
   EXPECT_GE(10 * count_arrived(ObstacleSensor::ranges), 8 * with_truth);
+  EXPECT_GE(10 * count_arrived(ObstacleSensor::camera), 8 * with_truth);
+  place.floor_camera.reset();
+  EXPECT_THROW(count_arrived(ObstacleSensor::camera), ContractError);
+}
+
+TEST(ObstacleMemory, HoldsTheEndsOfTheFloorUntilAScanShowsFloorThere) {
+  FloorScan scan{std::vector<std::optional<double>>(64, 1.0), 1.0};
+  scan.range_m[16] = 0.4;  // to the left
+  ObstacleMemory memory;
+  memory.add_scan(scan);
+  const double left_rad = std::numbers::pi / 2.0;
+  EXPECT_FALSE(memory.is_open(left_rad, 0.4, 0.2));
+  EXPECT_TRUE(memory.is_open(left_rad, 0.4, 0.2, false));
+  EXPECT_TRUE(memory.is_open(left_rad, 0.15, 0.2));
+  EXPECT_TRUE(memory.is_open(0.0, 0.9, 0.2));
+  scan.range_m[16].reset();  // says nothing
+  memory.add_scan(scan);
+  EXPECT_FALSE(memory.is_open(left_rad, 0.4, 0.2));
+  scan.range_m[16] = 1.0;
+  memory.add_scan(scan);
+  EXPECT_TRUE(memory.is_open(left_rad, 0.4, 0.2));
 }
 
 // Returns a room with nothing in it, from -half to half in x and y.

@@ -309,7 +309,7 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
       moments.set_image(image, panorama);
     };
   }
-  const simulation::MissionPlace place =
+  simulation::MissionPlace place =
       simulation::make_mission_place(arguments.scene, arguments.simulation, robot,
                                      make_option_lookup(declared), session.executor(), report);
   for (const auto& warning : place.scene.warnings) session.note("warning: " + warning);
@@ -319,6 +319,10 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
   simulation::MissionOptions mission_options = arguments.mission;
   if (arguments.obstacles == "ranges")
     mission_options.obstacles = simulation::ObstacleSensor::ranges;
+  if (arguments.obstacles == "camera") {
+    mission_options.obstacles = simulation::ObstacleSensor::camera;
+    simulation::add_floor_camera(place, place.sensor);
+  }
   simulation::MissionRun run = simulation::run_mission(
       place, remembered, robot.navigator(), mission, mission_options, seed,
       [&](const NavigationDecision& decision, const Pose2& pose) {
@@ -361,9 +365,9 @@ Run declare_navigate(Arguments& arguments) {
                    "Follow this recorded route where the planned path lies on it; the poses of the "
                    "views and of the route must be from the same data set");
   arguments.choice(
-      "--obstacles", values->obstacles, {"bumper", "ranges"},
-      "Sensor of the robot for obstacles: a bumper that feels contact and its side, or eight noisy "
-      "ranges in addition (default: bumper)");
+      "--obstacles", values->obstacles, {"bumper", "ranges", "camera"},
+      "Sensor of the robot for obstacles: a bumper that feels contact and its side; in addition, "
+      "eight noisy ranges or the floor in the pictures of its camera (default: bumper)");
   arguments.option("--log FILE", values->log,
                    "Write the decisions of the robot into this file, one per line");
   arguments.option("--picture FILE", values->picture,
