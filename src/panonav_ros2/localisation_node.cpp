@@ -9,6 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav_ros2/floor_scan_topic.hpp"
 #include "panonav_ros2/goal_driver.hpp"
 #include "panonav_ros2/memory_localiser.hpp"
 #include "panonav_ros2/sensor_topics.hpp"
@@ -38,6 +39,12 @@ struct LocalisationNode::Implementation {
     } else {
       localiser.load(setup.memory);
       localiser.load_interrupted_mission();
+    }
+    if (setup.node.camera_height_m > 0.0) {
+      floor_scan.emplace(participant, setup.node,
+                         setup.teacher
+                             ? setup.teacher->pictures
+                             : MemoryFile::open(setup.memory, Access::read_only).header().source);
     }
     subscribe_to_requests();
   }
@@ -138,7 +145,7 @@ struct LocalisationNode::Implementation {
 
   void observe(std::span<const std::uint8_t> message) {
     const auto arrival_time = Steady::now();
-    auto [observation, stamp_ns] = sensors.decode(message);
+    auto [observation, stamp_ns, frame] = sensors.decode(message);
     const auto moved = motion.wait_for(stamp_ns);
     if (!moved) {
       log.warn("motion", "no odometry of the time of an image (" + sensors.motion_source() +
@@ -148,6 +155,7 @@ struct LocalisationNode::Implementation {
     observation.stamp_s = 1e-9 * static_cast<double>(stamp_ns);
     observation.tilt = motion.tilt();
     observation.odometry = moved->path_from_base * setup.node.base_from_camera();
+    if (floor_scan) floor_scan->add(observation, stamp_ns, frame);
     recordings::RunMoment moment;
     if (teacher) {
       moment = teach(std::move(observation));
@@ -235,6 +243,7 @@ struct LocalisationNode::Implementation {
   Publisher<recordings::ros::TFMessage> transforms;
   Publisher<recordings::ros::DiagnosticArray> diagnostics;
   Publisher<recordings::ros::String> answers;
+  std::optional<FloorScanTopic> floor_scan;  // only by the worker thread
   std::optional<Teacher> teacher;  // used instead of the localiser; only by the worker thread
   std::atomic<std::size_t> pictures = 0, localised = 0, taught = 0;
   std::int64_t last_transform_ns = 0;

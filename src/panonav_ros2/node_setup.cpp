@@ -26,6 +26,12 @@ void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
           "position of the camera: distance in front of the origin of the base frame", -10, 10),
       option<&T::camera_y_m>(
           "position of the camera: distance to the left of the origin of the base frame", -10, 10),
+      option<&T::camera_height_m>(
+          "height of the camera above the floor; publishes the free floor as ~/floor_scan; 0: not "
+          "published",
+          0, 10),
+      option<&T::robot_radius_m>("radius of the robot, whose path shows ~/floor_scan the floor",
+                                 above(0), 10),
   };
   table.visit(options, visitor);
 }

@@ -31,6 +31,8 @@ struct LocalisationNodeOptions {
   double resume_s = 30.0;
   double camera_x_m = 0.0;
   double camera_y_m = 0.0;
+  double camera_height_m = 0.0;  ///< above the floor; 0: no `~/floor_scan`
+  double robot_radius_m = 0.2;
 
   /// Returns the pose of the camera, which is upright and faces forward.
   [[nodiscard]] Pose2 base_from_camera() const { return {camera_x_m, camera_y_m, 0.0}; }

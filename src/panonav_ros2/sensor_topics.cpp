@@ -70,21 +70,21 @@ void SensorTopics::check_publishers() const {
   }
 }
 
-std::pair<Observation, std::int64_t> SensorTopics::decode(
+std::tuple<Observation, std::int64_t, std::string> SensorTopics::decode(
     std::span<const std::uint8_t> message) const {
-  const auto named = [this](Image picture, std::int64_t stamp_ns) {
+  const auto named = [this](Image picture, const recordings::ros::Header& header) {
     Observation observation(std::move(picture));
     observation.name = picture_topic();
-    return std::pair(std::move(observation), stamp_ns);
+    return std::tuple(std::move(observation), header.stamp_ns, header.frame_id);
   };
   if (options_.pictures == PictureInput::raw) {
     const auto read = recordings::ros::read_message<recordings::ros::Image>(
         message, recordings::MessageEncoding::cdr);
-    return named(recordings::ros::to_image(read), read.header.stamp_ns);
+    return named(recordings::ros::to_image(read), read.header);
   }
   const auto read = recordings::ros::read_message<recordings::ros::CompressedImage>(
       message, recordings::MessageEncoding::cdr);
-  return named(recordings::ros::to_image(read, picture_topic()), read.header.stamp_ns);
+  return named(recordings::ros::to_image(read, picture_topic()), read.header);
 }
 
 void SensorTopics::receive(const recordings::ros::Odometry& odometry) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 
 #include "panonav/pipeline/observation.hpp"
 #include "panonav_ros2/node_setup.hpp"
@@ -28,8 +29,8 @@ class SensorTopics {
   /// Warns if several programs publish the same input.
   void check_publishers() const;
   /// Decodes an image message; the observation is named by its topic. Returns it with its time
-  /// stamp in ns. Throws as `ros::to_image`.
-  [[nodiscard]] std::pair<Observation, std::int64_t> decode(
+  /// stamp in ns and the frame of the camera. Throws as `ros::to_image`.
+  [[nodiscard]] std::tuple<Observation, std::int64_t, std::string> decode(
       std::span<const std::uint8_t> message) const;
 
  private:

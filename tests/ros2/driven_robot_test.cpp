@@ -1,7 +1,9 @@
 #include <cmath>
+#include <map>
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/navigation/floor_scanner.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/route/chain_recorder.hpp"
 #include "panonav_ros2/simulated_robot.hpp"
@@ -107,6 +109,63 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   EXPECT_TRUE(comes_true([&] { return notes_with("the robot is stopped") == 1; }));
   stop();
   EXPECT_EQ(state_of(FastPeer::next(result, 5s)), "the node ends");
+}
+
+TEST_F(LocalisationNodeOnTheWire, PublishesTheFloorAroundASimulatedRobotAsAScan) {
+  constexpr ElevationBand down_to_the_floor{-1.0, 0.3};
+  DrivenRobot robot(
+      world_,
+      [&](const Pose2& pose) {
+        return to_picture(world_.panorama(pose, 80, 256, down_to_the_floor));
+      },
+      2.0);
+  LocalisationNodeSetup setup{
+      .memory = *folder_ / "floor.panonav",
+      .node = {.use_sim_time = true, .camera_height_m = testing::ToyWorld::camera_height_m}};
+  PictureSource pictures{.kind = PictureKind::panorama};
+  pictures.layout.elevations = down_to_the_floor;
+  setup.teacher = TeacherOptions{
+      .pictures = pictures, .route = std::nullopt, .signature = {}, .preprocessing = {}};
+  start(setup);
+  auto& velocity = peer_.talk<recordings::ros::Twist>("cmd_vel");
+  auto& truth = peer_.listen<recordings::ros::PoseStamped>("ground_truth", false);
+  auto& scans = peer_.listen<recordings::ros::LaserScan>("panonav/floor_scan");
+  ASSERT_TRUE(peer_.all_matched(10s));
+  ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 2; }));
+  for (int i = 0; i < 60; ++i) {
+    FastPeer::write(velocity, recordings::ros::Twist{{0.2, 0.0, 0.0}, {}});
+    std::this_thread::sleep_for(40ms);
+  }
+  FastPeer::write(velocity, recordings::ros::Twist{});
+  std::map<std::int64_t, Pose2> poses;
+  while (FastPeer::waiting(truth) > 0) {
+    const auto each = read<recordings::ros::PoseStamped>(FastPeer::next(truth, 1s));
+    poses[each.header.stamp_ns] = recordings::ros::to_pose2(each.pose);
+  }
+  recordings::ros::LaserScan scan;
+  while (FastPeer::waiting(scans) > 0) {
+    scan = read<recordings::ros::LaserScan>(FastPeer::next(scans, 1s));
+    if (scan.header.stamp_ns >= poses.rbegin()->first - 500'000'000) break;
+  }
+  EXPECT_EQ(scan.header.frame_id, "camera");
+  ASSERT_EQ(poses.count(scan.header.stamp_ns), 1U);
+  ASSERT_EQ(scan.ranges.size(), std::size_t{FloorScanner::sectors});
+  EXPECT_NEAR(scan.angle_max, scan.angle_min + 63 * scan.angle_increment, 1e-4);
+  const Pose2 robot_is = poses[scan.header.stamp_ns];
+  int obstacles = 0;
+  int near = 0;
+  for (std::size_t i = 0; i < scan.ranges.size(); ++i) {
+    if (!std::isfinite(scan.ranges[i])) continue;
+    EXPECT_GE(scan.ranges[i], scan.range_min);
+    EXPECT_LT(scan.ranges[i], scan.range_max);
+    const double azimuth_rad = scan.angle_min + static_cast<double>(i) * scan.angle_increment;
+    const Point2 end = robot_is * Point2{scan.ranges[i] * std::cos(azimuth_rad),
+                                         scan.ranges[i] * std::sin(azimuth_rad)};
+    ++obstacles;
+    near += world_.clearance_m(end) < 0.2 ? 1 : 0;
+  }
+  EXPECT_GE(obstacles, 5);
+  EXPECT_GE(near, 0.6 * obstacles);
 }
 
 TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
