@@ -401,18 +401,28 @@ double FloorScanner::find_surface_m(const Evidence& evidence, int sector) const 
   return options_.max_range_m;
 }
 
-// Returns the distance at which the appearance of the floor ends; the range if it does not.
-double FloorScanner::find_end_of_floor_m(const Evidence& evidence, double limit, int sector) const {
+// Returns the distance at which the appearance of the floor ends; the range if it does not, nullopt
+// if fewer than half of the patches up to there look or move like the floor.
+std::optional<double> FloorScanner::find_end_of_floor_m(const Evidence& evidence, double limit,
+                                                        int sector) const {
+  const bool is_appearance_known = std::isfinite(limit);
+  int patches = 0;
+  int floor_patches = 0;
   int others = 0;
   for (int band = bands - 1; band >= 0; --band) {
+    const double near_m = -options_.camera_height_m / slopes_[(band + 1) * patch_size - 1];
+    if (near_m >= options_.max_range_m) break;
     const auto i = static_cast<std::size_t>(band * sectors + sector);
-    const bool is_floor = evidence.of_floor[i] > min_floor_evidence ||
-                          distance_to_floor(frames_.back().patches[i]) <= limit;
-    others = is_floor ? 0 : others + 1;
+    const bool is_floor =
+        evidence.of_floor[i] > min_floor_evidence ||
+        (is_appearance_known && distance_to_floor(frames_.back().patches[i]) <= limit);
+    ++patches;
+    floor_patches += is_floor ? 1 : 0;
+    others = is_floor || !is_appearance_known ? 0 : others + 1;
     if (others < min_other_patches) continue;
-    const int first_row = (band + min_other_patches) * patch_size - 1;
-    return std::min(options_.max_range_m, -options_.camera_height_m / slopes_[first_row]);
+    return -options_.camera_height_m / slopes_[(band + min_other_patches) * patch_size - 1];
   }
+  if (2 * floor_patches < patches) return std::nullopt;
   return options_.max_range_m;
 }
 
@@ -421,12 +431,12 @@ FloorScan FloorScanner::scan() const {
   if (frames_.empty()) return scan;
   const auto references = select_references();
   const double limit = floor_limit();
-  if (references.empty() && std::isinf(limit)) return scan;
   const Evidence evidence = collect_evidence(references);
   for (int sector = 0; sector < sectors; ++sector) {
-    double range_m = find_surface_m(evidence, sector);
-    if (std::isfinite(limit))
-      range_m = std::min(range_m, find_end_of_floor_m(evidence, limit, sector));
+    const double surface_m = find_surface_m(evidence, sector);
+    auto range_m = find_end_of_floor_m(evidence, limit, sector);
+    if (surface_m < options_.max_range_m)
+      range_m = std::min(surface_m, range_m.value_or(surface_m));
     scan.range_m[static_cast<std::size_t>(sector)] = range_m;
   }
   return scan;

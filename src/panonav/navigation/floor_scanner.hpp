@@ -13,8 +13,8 @@ namespace panonav {
 /// The free floor around a robot, in sectors of equal width. Sector i is centred on azimuth 2 pi i
 /// / sectors in the robot frame, counter-clockwise, forward at 0.
 struct FloorScan {
-  /// Distance from the camera to the nearest obstacle of each sector; `max_range_m` if there is
-  /// none up to there, nullopt where the pictures do not show it.
+  /// Distance from the camera to the nearest obstacle of each sector; `max_range_m` if the floor is
+  /// free up to there, nullopt where the pictures do not show it.
   std::vector<std::optional<double>> range_m;
   double max_range_m = 0.0;  ///< largest distance that was examined
 
@@ -102,8 +102,8 @@ class FloorScanner {
                     Evidence& evidence) const;
   [[nodiscard]] Evidence collect_evidence(const std::vector<const Frame*>& references) const;
   [[nodiscard]] double find_surface_m(const Evidence& evidence, int sector) const;
-  [[nodiscard]] double find_end_of_floor_m(const Evidence& evidence, double limit,
-                                           int sector) const;
+  [[nodiscard]] std::optional<double> find_end_of_floor_m(const Evidence& evidence, double limit,
+                                                          int sector) const;
 
   FloorScannerOptions options_;
   std::vector<double> distances_m_;  // of the surfaces that are tried
