@@ -166,6 +166,9 @@ Run declare_ros2(Arguments& arguments) {
       {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
        "[signature]", "[preprocessing]"},
       [values] { return values->teach; }, "without --teach");
+  arguments.reject_options_unless(
+      {"--robot-radius-m"}, [values] { return values->setup.node.camera_height_m > 0.0; },
+      "without --camera-height-m");
   arguments.show_in_help({"--motion", "--pictures", "--use-sim-time"});
   arguments.hide_from_help(
       {"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
