@@ -235,7 +235,11 @@ class RouteRobot {
       known_.add_ranges(
           simulation::measure_ranges(*place_.free_space, nullptr, pose_, noise_of_ranges_));
     }
-    if (floor_) known_.add_scan(floor_->scan(pose_));
+    unscanned_m_ += std::hypot(planned.x_m, planned.y_m);
+    if (floor_ && unscanned_m_ >= scan_spacing_m) {
+      known_.add_scan(floor_->scan(pose_));
+      unscanned_m_ = 0.0;
+    }
     auto way = find_open_way(planned);
     if (!way && sensor_ != simulation::ObstacleSensor::truth) {
       // Contacts are known to 22.5 degrees only, so it feels again before it gives up.
@@ -257,6 +261,8 @@ class RouteRobot {
 
  private:
   static constexpr int directions_per_side = 11;
+  // Two steps: the nearest floor that it sees is 0.4 m away.
+  static constexpr double scan_spacing_m = 0.19;
   /// A rotation on the spot and a step after it.
   struct Way {
     double rotation_rad = 0.0;
@@ -343,6 +349,7 @@ class RouteRobot {
   simulation::People nobody_;
   Random noise_of_ranges_;
   std::optional<simulation::FloorSensor> floor_;
+  double unscanned_m_ = 0.0;  // commanded distance since the last scan
   simulation::ObstacleMemory known_;
   int detour_side_ = 0;  // side of the last detour: 1 left, -1 right, 0 none
   int contacts_ = 0;     // consecutive steps that ended in contact
