@@ -75,7 +75,9 @@ void require_rays(int rays_per_axis) {
 }
 
 double light_spacing_m(const Scene& scene) {
-  return std::clamp(distance(scene.floor_low, scene.floor_high) / 25.0, 0.03, 1.0);
+  const double diagonal_m = distance(scene.floor_low, scene.floor_high);
+  // A street of hundreds of metres would take minutes at the spacing of a hall.
+  return std::max(std::clamp(diagonal_m / 25.0, 0.03, 1.0), diagonal_m / 200.0);
 }
 
 LitTriangles validate_and_subdivide(const Scene& scene) {

@@ -98,9 +98,9 @@ struct Radiance {
 
 /// Ray tracer for a scene, based on Embree. Light and shadows are computed once, in the
 /// constructor, at points a 25th of the floor's diagonal apart (some tenths of a second for a
-/// room); after that a ray costs a fraction of a microsecond. The same scene, viewpoint and
-/// instruction set give the same bits on any number of threads. All members may be called from
-/// several threads at once.
+/// room), at most 1 m or a 200th of it; after that a ray costs a fraction of a microsecond. The
+/// same scene, viewpoint and instruction set give the same bits on any number of threads. All
+/// members may be called from several threads at once.
 class Renderer {
  public:
   /// Copies what it needs of the scene and computes the light on the threads of `executor`. Throws

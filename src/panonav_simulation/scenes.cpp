@@ -10,8 +10,9 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr std::array<std::string_view, 8> built_in_names{
-    "office", "hall", "hall_periodic", "arena", "lab", "loop", "corridor", "garden"};
+constexpr std::array<std::string_view, 10> built_in_names{
+    "office", "hall",     "hall_periodic", "arena",  "lab",
+    "loop",   "corridor", "garden",        "street", "industrial_hall"};
 
 }  // namespace
 
@@ -32,6 +33,8 @@ Scene make_scene(std::string_view name, const SceneVariation& variation) {
   if (name == "loop") return make_loop(variation);
   if (name == "corridor") return make_corridor(variation);
   if (name == "garden") return make_garden(variation);
+  if (name == "street") return make_street(variation);
+  if (name == "industrial_hall") return make_industrial_hall(variation);
   std::string known;
   for (const auto& each : built_in_names) known += (known.empty() ? "" : ", ") + std::string(each);
   throw ContractError("scene", name, known);

@@ -19,14 +19,16 @@ struct SceneVariation {
 };
 
 /// Returns the names of the built-in scenes:
-/// - office: 5 x 2 m of free floor amid desks and shelves, as in [M04] and [M03]
-/// - hall: 7 x 7 m of free floor in a hall with things along its walls
-/// - hall_periodic: the same with pillars and pictures repeated every 2 m
-/// - arena: 1.4 x 1.2 m of table with toy houses, camera 8 cm above it, as in [S06]
-/// - lab: a 7 x 5 m room, for [Y03] and [S06] section 3
-/// - loop: a round trip of 20 m, as in [F11]
-/// - corridor: a round trip through corridors with many identical doors
-/// - garden: outdoors, with hedges, trees, a house and a sky
+/// - office: 5 x 2 m of free floor amid desks and shelves [M04] [M03]
+/// - hall: 7 x 7 m of free floor, things along the walls
+/// - hall_periodic: the same with pillars and pictures every 2 m
+/// - arena: 1.4 x 1.2 m of table with toy houses [S06]
+/// - lab: a 7 x 5 m room [Y03] [S06]
+/// - loop: a round trip of 20 m [F11]
+/// - corridor: a round trip past many identical doors
+/// - garden: hedges, trees, a house and a sky
+/// - street: 620 m of houses, trees and parked cars
+/// - industrial_hall: 104 x 62 m of aisles around racks, machines and crates
 [[nodiscard]] std::span<const std::string_view> scene_names();
 
 /// Makes a built-in scene. Throws ContractError for an unknown name (the message lists the

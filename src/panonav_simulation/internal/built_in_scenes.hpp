@@ -12,5 +12,7 @@ namespace panonav::simulation {
 [[nodiscard]] Scene make_loop(const SceneVariation& variation);
 [[nodiscard]] Scene make_corridor(const SceneVariation& variation);
 [[nodiscard]] Scene make_garden(const SceneVariation& variation);
+[[nodiscard]] Scene make_street(const SceneVariation& variation);
+[[nodiscard]] Scene make_industrial_hall(const SceneVariation& variation);
 
 }  // namespace panonav::simulation

@@ -1,4 +1,4 @@
-// Outdoor scenes and tables: the garden, and the arena on a table.
+// Outdoor scenes and tables: the garden, the street, and the arena on a table.
 
 #include <algorithm>
 #include <array>
@@ -46,15 +46,31 @@ void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
   builder.scene().meshes.push_back(std::move(mesh));
 }
 
-void add_house(SceneBuilder& builder, const std::string& name, const Footing& footing, Vector3 size,
-               Colour wall_colour, Colour roof_colour) {
+// Materials of one kind of house.
+struct HouseKind {
+  int walls = 0;
+  int roof = 0;
+  int window = 0;
+  int door = 0;
+};
+
+HouseKind make_house_kind(SceneBuilder& builder, Colour wall_colour, Colour roof_colour) {
   Random& random = builder.random();
-  const int walls = builder.add_textured_material(
+  HouseKind kind;
+  kind.walls = builder.add_textured_material(
       brick_texture(random, 128, 6, 12, wall_colour,
                     {1.1F * wall_colour[0], 1.1F * wall_colour[1], 1.1F * wall_colour[2]}));
-  const int roof = builder.add_textured_material(
+  kind.roof = builder.add_textured_material(
       brick_texture(random, 128, 8, 8, roof_colour,
                     {0.7F * roof_colour[0], 0.7F * roof_colour[1], 0.7F * roof_colour[2]}));
+  kind.window = builder.add_textured_material(window_texture(random, 64));
+  kind.door = builder.add_textured_material(door_texture(random, 64, {0.35F, 0.22F, 0.15F}));
+  return kind;
+}
+
+void add_house(SceneBuilder& builder, const std::string& name, const HouseKind& kind,
+               const Footing& footing, Vector3 size) {
+  const auto [walls, roof, window, door] = kind;
   builder.add_box(name, walls, walls, footing, {0.0, 0.0, 0.0}, size, 0.6 * size.z_m);
   const double c = std::cos(footing.turn_rad);
   const double s = std::sin(footing.turn_rad);
@@ -73,8 +89,6 @@ void add_house(SceneBuilder& builder, const std::string& name, const Footing& fo
     builder.add_quadrilateral(name, walls, at(0.9 * x, -hy, z0), at(0.9 * x, hy, z0),
                               at(0.9 * x, 0.0, z1), at(0.9 * x, 0.0, z1));
   }
-  const int window = builder.add_textured_material(window_texture(random, 64));
-  const int door = builder.add_textured_material(door_texture(random, 64, {0.35F, 0.22F, 0.15F}));
   const double out = 0.5 * size.y_m * 1.01;
   for (const double side : {-1.0, 1.0}) {
     const double y = side * out;
@@ -199,11 +213,122 @@ Scene make_garden(const SceneVariation& variation) {
   add_trees_and_boxes(builder, plot);
   const Colour plaster = sample_colour(random, 0.4, 0.8, 0.2);
   const Footing house{{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)};
-  add_house(builder, "house", house, {9.0, 6.0, 3.2}, plaster, {0.5F, 0.25F, 0.2F});
+  add_house(builder, "house", make_house_kind(builder, plaster, {0.5F, 0.25F, 0.2F}), house,
+            {9.0, 6.0, 3.2});
   const Colour tar = sample_colour(random, 0.15, 0.4, 0.2);
   const Footing shed{{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)};
-  add_house(builder, "shed", shed, {3.0, 2.2, 2.0}, builder.palette().wood, tar);
+  add_house(builder, "shed", make_house_kind(builder, builder.palette().wood, tar), shed,
+            {3.0, 2.2, 2.0});
   add_far_trees(builder, middle);
+  return builder.finish();
+}
+
+namespace {
+
+constexpr double street_length_m = 620.0;
+constexpr double roadway_m = 9.0;
+
+// Adds a parked car: a body with a cabin on it, beside the roadway.
+void add_car(SceneBuilder& builder, const std::string& name, int paint, int glass,
+             const Footing& footing) {
+  builder.add_box(name, paint, paint, footing, {0.0, 0.0, 0.2}, {4.1, 1.7, 0.65});
+  builder.add_box(name, glass, paint, footing, {-0.2, 0.0, 0.85}, {2.2, 1.5, 0.55});
+}
+
+// Kinds of houses, trees and cars along a street; each plot has one of them.
+struct StreetKinds {
+  std::array<HouseKind, 10> houses;
+  std::array<TreeKind, 5> trees;
+  std::array<int, 6> paints{};
+  int glass = 0;
+};
+
+StreetKinds make_street_kinds(SceneBuilder& builder) {
+  Random& random = builder.random();
+  StreetKinds kinds;
+  for (HouseKind& kind : kinds.houses) {
+    const Colour walls = sample_colour(random, 0.2, 0.85, 0.2);
+    const Colour roof = sample_colour(random, 0.15, 0.5, 0.3);
+    kind = make_house_kind(builder, walls, roof);
+  }
+  for (TreeKind& kind : kinds.trees) kind = make_tree_kind(builder);
+  for (int& paint : kinds.paints) {
+    paint = builder.add_plain_material(sample_colour(random, 0.05, 0.9, 0.4));
+  }
+  kinds.glass = builder.add_plain_material({0.12F, 0.14F, 0.16F});
+  return kinds;
+}
+
+// Adds the plots of one side: houses of random kinds and widths behind front gardens, with gaps,
+// trees, hedges, and cars at the kerb. `side` is 1 in the north of the roadway and -1 in the south.
+void add_plots(SceneBuilder& builder, const StreetKinds& kinds, double side) {
+  Random& random = builder.random();
+  const double kerb_m = side > 0.0 ? roadway_m : 0.0;
+  const FloorArea kerbs{{-10.0, -4.0}, {street_length_m + 10.0, roadway_m + 4.0}};
+  double along_m = -20.0;
+  for (int number = 0; along_m < street_length_m + 20.0; ++number) {
+    const std::string plot = (side > 0.0 ? "north " : "south ") + std::to_string(number);
+    const Vector3 size{random.uniform(7.0, 14.0), random.uniform(7.0, 10.0),
+                       random.uniform(3.0, 8.0)};
+    const double width_m = size.x_m + random.uniform(3.0, 7.0);
+    const double middle_m = along_m + 0.5 * width_m;
+    const double front_m = random.uniform(4.5, 9.0);
+    add_house(builder, plot + " house", kinds.houses[random.index(kinds.houses.size())],
+              {{middle_m, kerb_m + side * (front_m + 0.5 * size.y_m)}, random.normal(0.0, 0.05)},
+              size);
+    if (random.uniform() < 0.6) {
+      add_tree(builder, plot + " tree", kinds.trees[random.index(kinds.trees.size())],
+               {along_m + random.uniform(0.0, 2.0), kerb_m + side * random.uniform(2.6, 4.0)},
+               random.uniform(3.5, 9.0));
+    }
+    if (random.uniform() < 0.5) {
+      builder.add_box(plot + " hedge", kinds.trees[0].leaves, kinds.trees[0].leaves,
+                      {{middle_m, kerb_m + side * 3.0}, 0.0}, {0.0, 0.0, 0.0},
+                      {random.uniform(3.0, size.x_m), 0.6, random.uniform(0.7, 1.6)}, 1.5);
+    }
+    if (random.uniform() < 0.6) {
+      constexpr double car_radius_m = 2.1;
+      const Footing kerb{{middle_m + random.uniform(-2.0, 2.0), kerb_m + side * 1.1}, 0.0};
+      Footing parked = builder.place_movable(kerb, car_radius_m, kerbs);
+      // A car stands along the kerb on every day.
+      parked = {{parked.centre.x_m, kerb.centre.y_m}, 0.0};
+      add_car(builder, plot + " car", kinds.paints[random.index(kinds.paints.size())], kinds.glass,
+              parked);
+    }
+    along_m += width_m;
+  }
+}
+
+}  // namespace
+
+Scene make_street(const SceneVariation& variation) {
+  SceneBuilder builder("street", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {street_length_m, roadway_m};
+  scene.robot_radius_m = 0.4;
+  scene.camera_height_m = 1.0;
+  scene.ambient = 0.6F;
+  scene.tour = {{5.0, 2.0}, {105.0, 2.0}, {105.0, 7.0}, {5.0, 7.0}};
+  const double azimuth = random.uniform(-std::numbers::pi, std::numbers::pi);
+  scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.7F});
+  const Point2 middle{0.5 * street_length_m, 0.5 * roadway_m};
+  constexpr double far_m = 900.0;
+  add_sky(builder, middle, far_m);
+  const int grass =
+      builder.add_textured_material(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
+  builder.add_floor(grass, {middle.x_m - far_m, -far_m}, {middle.x_m + far_m, far_m}, 4.0, -0.02);
+  const int tar =
+      builder.add_textured_material(noise_texture(random, 256, {0.3F, 0.3F, 0.31F}, 0.15, 1.2));
+  builder.add_floor(tar, {-60.0, 0.0}, {street_length_m + 60.0, roadway_m}, 5.0);
+  const int paving = builder.add_textured_material(
+      brick_texture(random, 128, 4, 4, {0.55F, 0.53F, 0.5F}, {0.35F, 0.34F, 0.33F}));
+  for (const double kerb_m : {-2.2, roadway_m}) {
+    builder.add_floor(paving, {-60.0, kerb_m}, {street_length_m + 60.0, kerb_m + 2.2}, 2.0, 0.01);
+  }
+  const StreetKinds kinds = make_street_kinds(builder);
+  for (const double side : {1.0, -1.0}) add_plots(builder, kinds, side);
   return builder.finish();
 }
 
@@ -256,7 +381,8 @@ Scene make_arena(const SceneVariation& variation) {
                             footing.turn_rad};
         const Colour plaster = vary_colour(random, paint);
         const Vector3 size{length, random.uniform(0.09, 0.14), random.uniform(0.1, 0.17)};
-        add_house(builder, "house " + std::to_string(number++), place, size, plaster, tiles);
+        add_house(builder, "house " + std::to_string(number++),
+                  make_house_kind(builder, plaster, tiles), place, size);
         if (!has_two_houses) break;
       }
     }

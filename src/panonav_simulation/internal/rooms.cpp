@@ -1,4 +1,4 @@
-// Scenes that consist of one room: office, lab and hall.
+// Scenes that consist of one room: office, lab, hall and industrial hall.
 
 #include <algorithm>
 #include <array>
@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "panonav_simulation/furniture.hpp"
 #include "panonav_simulation/internal/built_in_scenes.hpp"
@@ -219,6 +220,133 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
                       corners[2], corners[3], 4.65, 0.6, 2.0, 2.6);
   add_lamps(builder, room, room_height_m, 3.0, 0.6, 0.6);
   scene.tour = {{0.5, 0.5}, {6.5, 0.5}, {6.5, 6.5}, {0.5, 6.5}};
+  return builder.finish();
+}
+
+namespace {
+
+// Materials that the things in an industrial hall share.
+struct HallMaterials {
+  std::array<int, 6> goods{};
+  std::array<int, 8> paints{};
+  int steel = 0;
+};
+
+// Adds rows of pallet racks, whose goods differ from bay to bay.
+void add_racks(SceneBuilder& builder, const std::string& name, const HallMaterials& materials,
+               const FloorArea& block) {
+  Random& random = builder.random();
+  constexpr double bay_m = 2.8;
+  const double height_m = random.uniform(3.5, 6.0);
+  int row = 0;
+  for (double y = block.low.y_m + 0.8; y < block.high.y_m; y += 3.6, ++row) {
+    for (double x = block.low.x_m + 0.5 * bay_m; x + 0.5 * bay_m <= block.high.x_m; x += bay_m) {
+      const int goods = materials.goods[random.index(materials.goods.size())];
+      builder.add_box(name + " rack " + std::to_string(row), goods, materials.steel, {{x, y}, 0.0},
+                      {0.0, 0.0, 0.0}, {bay_m - 0.1, 1.1, random.uniform() < 0.15 ? 1.3 : height_m},
+                      1.4);
+    }
+  }
+}
+
+// Adds machines: large bodies with a tank or a cabinet on some of them.
+void add_machines(SceneBuilder& builder, const std::string& name, const HallMaterials& materials,
+                  const FloorArea& block) {
+  Random& random = builder.random();
+  int number = 0;
+  for (double x = block.low.x_m + 2.5; x < block.high.x_m - 2.0; x += 5.0) {
+    for (double y = block.low.y_m + 2.2; y < block.high.y_m - 2.0; y += 5.0) {
+      const std::string machine = name + " machine " + std::to_string(number++);
+      const Footing footing{{x, y}, random.normal(0.0, 0.1)};
+      const int paint = materials.paints[random.index(materials.paints.size())];
+      const Vector3 size{random.uniform(1.5, 3.8), random.uniform(1.2, 3.2),
+                         random.uniform(0.9, 2.6)};
+      builder.add_box(machine, paint, materials.steel, footing, {0.0, 0.0, 0.0}, size);
+      const int other = materials.paints[random.index(materials.paints.size())];
+      if (random.uniform() < 0.5) {
+        builder.add_cylinder(machine, other, footing.centre, size.z_m, size.z_m + 1.8, 0.5, 12);
+      } else {
+        builder.add_box(machine, other, other, footing, {0.3 * size.x_m, 0.0, size.z_m},
+                        {0.8, 0.9, random.uniform(0.4, 1.5)});
+      }
+    }
+  }
+}
+
+// Adds crates and cabinets that are moved from day to day.
+void add_stores(SceneBuilder& builder, const std::string& name, const FloorArea& block) {
+  Random& random = builder.random();
+  int number = 0;
+  for (double x = block.low.x_m + 1.0; x < block.high.x_m - 0.5; x += 2.6) {
+    for (double y = block.low.y_m + 1.0; y < block.high.y_m - 0.5; y += 3.0) {
+      if (random.uniform() < 0.3) continue;
+      const Footing planned{{x + random.uniform(-0.4, 0.4), y + random.uniform(-0.4, 0.4)},
+                            random.uniform(-3.0, 3.0)};
+      const Footing footing = builder.place_movable(planned, 0.9, block);
+      add_crate(builder, name + " crate " + std::to_string(number++), footing,
+                {random.uniform(0.6, 1.6), random.uniform(0.5, 1.1), random.uniform(0.5, 2.2)});
+    }
+  }
+}
+
+}  // namespace
+
+Scene make_industrial_hall(const SceneVariation& variation) {
+  SceneBuilder builder("industrial_hall", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {104.0, 62.0};
+  scene.robot_radius_m = 0.4;
+  scene.camera_height_m = 1.0;
+  scene.ambient = 0.35F;
+  // Aisles 4 m wide run around 4 x 3 blocks of 20 x 14 m.
+  constexpr double aisle_m = 4.0;
+  constexpr double block_x_m = 20.0;
+  constexpr double block_y_m = 14.0;
+  constexpr double pitch_x_m = block_x_m + aisle_m;
+  constexpr double pitch_y_m = block_y_m + aisle_m;
+  const FloorArea aisles{{2.0, 2.0}, {102.0, 60.0}};
+  for (int i = 0; i <= 4; ++i) {
+    const double x_m = aisles.low.x_m + i * pitch_x_m;
+    scene.drivable.push_back({{x_m, aisles.low.y_m}, {x_m + aisle_m, aisles.high.y_m}});
+  }
+  for (int j = 0; j <= 3; ++j) {
+    const double y_m = aisles.low.y_m + j * pitch_y_m;
+    scene.drivable.push_back({{aisles.low.x_m, y_m}, {aisles.high.x_m, y_m + aisle_m}});
+  }
+  scene.tour = {{4.0, 4.0}, {52.0, 4.0}, {52.0, 22.0}, {4.0, 22.0}};
+  constexpr double hall_height_m = 8.0;
+  const FloorArea hall{scene.floor_low, scene.floor_high};
+  furnish_room_shell(builder, hall, hall_height_m);
+  add_lamps(builder, hall, hall_height_m, 13.0, 14.0, 36.0);
+  HallMaterials materials;
+  for (int& goods : materials.goods) {
+    goods = builder.add_textured_material(bookshelf_texture(random, 256, 2));
+  }
+  for (int& paint : materials.paints) {
+    paint = builder.add_textured_material(
+        noise_texture(random, 64, sample_colour(random, 0.08, 0.85, 0.35), 0.12, 2.2));
+  }
+  materials.steel = builder.add_plain_material({0.3F, 0.32F, 0.35F});
+  // Four blocks each of racks, machines and stores, in random order.
+  std::array<std::size_t, 12> kinds{0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2};
+  for (std::size_t i = kinds.size() - 1; i > 0; --i) {
+    std::swap(kinds[i], kinds[random.index(i + 1)]);
+  }
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const Point2 low{aisles.low.x_m + aisle_m + i * pitch_x_m,
+                       aisles.low.y_m + aisle_m + j * pitch_y_m};
+      const FloorArea block{low, {low.x_m + block_x_m, low.y_m + block_y_m}};
+      const std::string name = "block " + std::to_string(3 * i + j);
+      const std::size_t kind = kinds[static_cast<std::size_t>(3 * i + j)];
+      if (kind == 0) add_racks(builder, name, materials, block);
+      if (kind == 1) add_machines(builder, name, materials, block);
+      if (kind == 2) add_stores(builder, name, block);
+      builder.add_cylinder(name + " column", materials.steel, low, 0.0, hall_height_m, 0.25, 8);
+    }
+  }
   return builder.finish();
 }
 
