@@ -76,6 +76,27 @@ ReproductionPlan plan_y03(const Experiments& context) {
   return plan;
 }
 
+ReproductionPlan plan_routes(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 1}, {"runs", options.runs, options.scenes}});
+  require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
+  const RouteMethodExperiments routes{context};
+  ReproductionPlan plan;
+  for (const std::string& scene : options.built_in) {
+    if (!simulation::has_scene(options.data, scene)) continue;
+    for (const double length_m : options.route_lengths_m) {
+      // Places of a few rooms have no room for long routes.
+      if (length_m > 60.0 && scene != "street" && scene != "industrial_hall") continue;
+      plan.push_back({length_m, [=] { routes.compare_routes(scene, length_m); }});
+    }
+  }
+  const double length_m = options.route_lengths_m.front();
+  plan.push_back({7.0 * length_m, [=, scene = options.built_in.front()] {
+                    routes.compare_conditions(scene, length_m);
+                  }});
+  return plan;
+}
+
 ReproductionPlan plan_elsewhere(const Experiments& context) {
   const ReproductionOptions& options = context.options;
   require_minima({{"scenes", options.scenes, 1},
@@ -173,7 +194,7 @@ struct Paper {
 };
 
 const Paper& find_paper(std::string_view name) {
-  static const std::array<Paper, 7> papers{{
+  static const std::array<Paper, 8> papers{{
       {"f11",
        {.seed = 901, .scenes = 20, .runs = 20},
        {.seed = 901, .scenes = 2, .runs = 1, .columns = 256, .max_views = 1000},
@@ -221,10 +242,17 @@ const Paper& find_paper(std::string_view name) {
         .walks = 2,
         .walk_pictures = 40},
        plan_elsewhere},
+      {"routes",
+       {.seed = 9001,
+        .scenes = 2,
+        .runs = 4,
+        .built_in = {"industrial_hall", "street", "garden", "industrial_warehouse"}},
+       {.seed = 9001, .scenes = 1, .runs = 1, .built_in = {"hall"}, .route_lengths_m = {15.0}},
+       plan_routes},
   }};
   const auto found = std::ranges::find(papers, name, &Paper::name);
   if (found != papers.end()) return *found;
-  throw ContractError("paper", name, "f11, m03, m04, navigation, s06, y03, elsewhere");
+  throw ContractError("paper", name, "f11, m03, m04, navigation, s06, y03, elsewhere, routes");
 }
 
 }  // namespace

@@ -56,13 +56,15 @@ struct ReproductionOptions {
   int views = 200;              ///< [F11]: of the first set; three quarters in the second
   int max_views = 10'000;       ///< [F11]: of the largest map
   int swept = 10;               ///< [Y03]: scenes used in the sweeps, 1 to scenes
-  /// Elsewhere: the built-in scenes used; all available worlds and recordings are used.
+  /// Elsewhere: the built-in scenes used, beside all available worlds and recordings. Routes: the
+  /// scenes and worlds used, as far as they are available; the first one also in other light.
   std::vector<std::string> built_in{"office", "hall", "lab", "loop", "corridor", "garden"};
   bool floors = true;       ///< elsewhere: also arrange whole floors of the worlds
   int days = 30;            ///< elsewhere: simulated days of a changing place
   int day_pictures = 120;   ///< elsewhere: per day and robot, half a metre apart
   int walks = 20;           ///< elsewhere: per place; their memories are merged pairwise
   int walk_pictures = 600;  ///< elsewhere: per walk, 10 cm apart
+  std::vector<double> route_lengths_m{60.0, 200.0, 500.0};  ///< routes: the shortest one first
 };
 
 /// Returns the options of a full run of a paper, or with `quick` of a smoke test with few scenes
@@ -88,14 +90,15 @@ struct Reproduction {
 using ReproductionProgress = std::function<void(double fraction)>;
 
 /// Runs the experiments of a paper. Same options: same rows, except for times (units ms, us, s) and
-/// their ratios (unit x), and same images on any number of threads. Throws ContractError on an
-/// unknown paper or options out of range, OptionError, FileError.
+/// their ratios (unit x), and same images on any number of threads. Throws ContractError,
+/// OptionError, FileError.
 /// - m03: Monte-Carlo localisation [M03 section 4.1]
 /// - m04: localisation, the spring lattice and missions [M04]
 /// - s06: visual homing and chains of snapshots [S06]
 /// - f11: visual odometry and topological maps [F11]
 /// - y03: route panoramas [Y03]
 /// - navigation: missions [M04 section 3.5] over mapped drives, under changed light and furniture
+/// - routes: memories of routes and their rivals
 /// - elsewhere: places, home vectors, tilts and days on data not used for development, with rivals
 [[nodiscard]] Reproduction reproduce(std::string_view paper, const ReproductionOptions& options,
                                      Executor& executor, const ReproductionProgress& progress = {});

@@ -109,6 +109,19 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
       ids, [](const std::string& id) { return id.starts_with("elsewhere.merge.loop."); }));
 }
 
+TEST_F(Reproductions, RoutesAreTheSameOnOneAndTwoThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  ReproductionOptions options = default_options("routes", true);
+  options.route_lengths_m = {5.0};
+  expect_same_on_one_and_two_threads("routes", options, 50, 0);
+  for (const char* const id :
+       {"routes.hall.5.snapshot_chain.reached", "routes.hall.5.mushroom_body.bytes",
+        "routes.hall.5.min_warping.time", "routes.hall.off.route_panorama.reached",
+        "routes.hall.day.SeqSLAM.reached"}) {
+    EXPECT_TRUE(ids.contains(id)) << id;
+  }
+}
+
 TEST_F(Reproductions, RefuseWhatMakesNoSenseAndFoldersThatCannotBeMade) {
   Executor executor(1);
   const auto refuse = [&](const char* paper, auto change) {

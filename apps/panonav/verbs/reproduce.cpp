@@ -53,7 +53,8 @@ ExitCode reproduce(const ReproduceArguments& arguments, Session& session) {
 /// Returns " (default: 3 for elsewhere, 2 for f11, ...)".
 std::string format_defaults(const auto& option) {
   std::vector<std::string> values;
-  for (const char* paper : {"elsewhere", "f11", "m03", "m04", "navigation", "s06", "y03"}) {
+  for (const char* paper :
+       {"elsewhere", "f11", "m03", "m04", "navigation", "routes", "s06", "y03"}) {
     values.push_back(std::to_string(lab::default_options(paper).*option) + " for " + paper);
   }
   return " (default: " + join_texts(values) + ")";
@@ -105,13 +106,15 @@ Run declare_reproduce(Arguments& arguments) {
                                        {"m03", "runs in each variant of an office"},
                                        {"f11", "paths in each Gazebo world"},
                                        {"navigation", "missions in each kind of place"},
+                                       {"routes", "routes of each length in each place"},
                                        {"y03", "drives along routes of 60 m in each place"}}));
   arguments.option("--rows", values->rows, 1,
                    format_meanings(&Options::rows, {{"elsewhere, m03, m04", "rows of the views"}}));
-  arguments.option("--data FOLDER", values->data,
-                   "For elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
-                   "Gazebo worlds (default: the environment variable PANONAV_DATA; if it is not "
-                   "set, these experiments are skipped)");
+  arguments.option(
+      "--data FOLDER", values->data,
+      "For elsewhere, f11, m03, navigation, routes, s06, y03: folder with the recordings and "
+      "Gazebo worlds (default: the environment variable PANONAV_DATA; if it is not "
+      "set, these experiments are skipped)");
   const auto parts = lab::tracking_reproduction_parts();
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
                    "For m03: run only this part of the experiments (default: all parts)");
