@@ -10,6 +10,14 @@ namespace panonav {
 /// follower's may be off.
 inline constexpr HeadingWindow compared_headings{0.0F, 0.8F};
 
+/// Returns how confident a robot in a home area is of a home vector; -1 if it does not use it.
+/// Beside a snapshot, where vectors have no direction, the similarity of the images decides.
+[[nodiscard]] inline double usable_confidence(double confidence, double difference,
+                                              const ChainModel& model) {
+  if (difference <= static_cast<double>(model.arrived_difference)) return 2.0 - difference;
+  return confidence >= static_cast<double>(model.homing_confidence) ? confidence : -1.0;
+}
+
 /// Compares a view with a snapshot at headings within the window.
 [[nodiscard]] inline SnapshotSight look_at_snapshot(const CoefficientView& snapshot,
                                                     const CoefficientView& view,
