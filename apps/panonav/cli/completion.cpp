@@ -76,6 +76,11 @@ std::vector<std::pair<std::string, std::vector<std::string>>> list_second_words(
   return found;
 }
 
+/// True if the word alone is a verb, too.
+bool is_verb(std::span<const Description> verbs, std::string_view word) {
+  return std::ranges::any_of(verbs, [word](const auto& d) { return d.verb.name == word; });
+}
+
 /// `'localise'|'localize'`: a pattern of `case`.
 std::string case_pattern(const Verb& verb) {
   std::string text = "'";
@@ -96,6 +101,14 @@ std::string make_bash_script(std::span<const Description> verbs) {
       join_words(list_first_words(verbs)) +
       " --help --version' -- \"$current\"))\n    return\n  fi\n";
   for (const auto& [first, seconds] : list_second_words(verbs)) {
+    if (is_verb(verbs, first)) {
+      for (const std::string& second : seconds) {
+        script += "  [[ $verb == " + first +
+                  " && $COMP_CWORD -gt 2 && ${COMP_WORDS[2]} == " + second + " ]] && verb='" +
+                  first + " " + second + "'\n";
+      }
+      continue;
+    }
     script += "  if [[ $verb == " + first +
               " ]]; then\n"
               "    if ((COMP_CWORD == 2)); then\n"
@@ -198,6 +211,14 @@ std::string make_zsh_script(std::span<const Description> verbs) {
       "  if (( CURRENT == 2 )); then\n" +
       make_zsh_verb_proposals(verbs) + "    return\n  fi\n";
   for (const auto& [first, seconds] : list_second_words(verbs)) {
+    if (is_verb(verbs, first)) {
+      for (const std::string& second : seconds) {
+        script += "  if [[ $verb == " + first + " && $words[3] == " + second +
+                  " ]] && (( CURRENT > 3 )); then\n    verb='" + first + " " + second +
+                  "'\n    shift words\n    (( CURRENT-- ))\n  fi\n";
+      }
+      continue;
+    }
     script += "  if [[ $verb == " + first +
               " ]]; then\n"
               "    if (( CURRENT == 3 )); then\n      compadd " +

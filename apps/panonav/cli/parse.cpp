@@ -33,14 +33,16 @@ bool is_help_flag(std::string_view word) {
 }  // namespace
 
 const Verb* find_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
+  const Verb* found = nullptr;  // a verb of one word, unless there is one of both words
   for (const auto& verb : verbs) {
     const auto [first, second] = split_verb(verb.name);
     if (words.empty() || (first != words[0] && (verb.alias.empty() || verb.alias != words[0]))) {
       continue;
     }
-    if (second.empty() || (words.size() > 1 && second == words[1])) return &verb;
+    if (words.size() > 1 && second == words[1]) return &verb;
+    if (second.empty() && found == nullptr) found = &verb;
   }
-  return nullptr;
+  return found;
 }
 
 const Verb& find_required_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
@@ -150,7 +152,7 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   if (!words.empty() && is_help_flag(words[0])) return make_print_command({}, overview(verbs));
   if (words.size() > 1 && is_help_flag(words[1])) {
     const auto two_word_verbs = find_verbs_beginning_with(verbs, words[0]);
-    if (!two_word_verbs.empty())
+    if (!two_word_verbs.empty() && find_verb(verbs, words.first(1)) == nullptr)
       return make_print_command({}, "Verbs of two words: " + join_texts(two_word_verbs));
   }
   const Verb& verb = find_required_verb(verbs, words);

@@ -2,6 +2,9 @@
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/chain_route.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -28,6 +31,8 @@ struct HomeArguments {
   PictureArguments pictures;
   HomingArguments homing;
   std::optional<std::string> report;
+  bool area = false;
+  std::optional<int> back_from;
 };
 
 ordered_json to_json(const HomeAnswer& answer, const std::string& goal) {
@@ -150,7 +155,72 @@ ExitCode home_from_memory(const Arguments& declared, const HomeArguments& argume
   return answer_all(arguments, guide, goal, recording, session);
 }
 
+ordered_json to_json(const HomeStep& step, const DatasetEntry& entry) {
+  ordered_json json{{"file", entry.file},
+                    {"stamp_s", to_json_or_null(entry.stamp_s)},
+                    {"state", step.decision ? to_string(step.decision->state) : "away"},
+                    {"turn_rad", nullptr},
+                    {"advance_m", nullptr},
+                    {"pose", pose_json(step.pose)},
+                    {"distance_m", step.distance_m},
+                    {"direction_rad", step.direction_rad},
+                    {"deviation_m", step.deviation_m},
+                    {"drift_m_per_m", {step.drift_m_per_m.x_m, step.drift_m_per_m.y_m}}};
+  if (step.decision) {
+    json["turn_rad"] = step.decision->turn_rad;
+    json["advance_m"] = step.decision->advance_m;
+  }
+  return json;
+}
+
+std::string format_step(const HomeStep& step, const DatasetEntry& entry, Session& session) {
+  const bool is_lost = step.decision && step.decision->state == ChainState::lost;
+  const std::string state = step.decision ? to_string(step.decision->state) : "away";
+  std::string text = entry.file + "  " + (is_lost ? session.red(state) : session.green(state)) +
+                     "  home is " + describe_direction(step.direction_rad) + ", " +
+                     session.format_length(step.distance_m, 2) + " away, within " +
+                     session.format_length(2.0 * step.deviation_m, 2);
+  if (step.decision) {
+    text += "  turn " + format_fixed(degrees(step.decision->turn_rad), 1) + " degrees  advance " +
+            session.format_length(step.decision->advance_m, 2);
+  }
+  return text;
+}
+
+/// Leads a robot home that left the home area GOAL; prints a line for each image with odometry.
+ExitCode home_to_area(const HomeArguments& arguments, Session& session) {
+  const auto file = MemoryFile::open(*arguments.memory, Access::read_only);
+  const auto run = open_recording(arguments.current, arguments.pictures, file, session);
+  HomeAreaGuide guide(file, run.source, arguments.goal);
+  const auto count = static_cast<int>(run.entries.size());
+  if (arguments.back_from && *arguments.back_from > count) {
+    throw UsageError("--back-from is " + std::to_string(*arguments.back_from) + "; allowed: 1 to " +
+                     std::to_string(count) + ", the number of images");
+  }
+  std::optional<ChainState> state;
+  std::size_t answered = 0;
+  for (int i = 0; i < count; ++i) {
+    const DatasetEntry& entry = run.entries[static_cast<std::size_t>(i)];
+    if (!entry.odometry) continue;
+    const HomeStep step =
+        guide.step(read_observation(entry), i + 1 >= arguments.back_from.value_or(count));
+    ++answered;
+    session.print(session.json() ? session.json_line(to_json(step, entry))
+                                 : format_step(step, entry, session));
+    if (step.decision) state = step.decision->state;
+    if (state == ChainState::arrived || state == ChainState::lost) break;
+  }
+  if (answered == 0) {
+    throw FileError(arguments.current, "has no odometry; needed to find home by its area (--area)");
+  }
+  return state == ChainState::lost ? ExitCode::no_answer : ExitCode::done;
+}
+
 ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session& session) {
+  if (arguments.area) {
+    if (!arguments.memory) throw UsageError("--area needs --memory FILE, which has the home GOAL");
+    return home_to_area(arguments, session);
+  }
   if (arguments.report) prepare_report_folder(*arguments.report, "home");
   if (arguments.memory) return home_from_memory(declared, arguments, session);
   const auto& views = arguments.homing.views;
@@ -179,14 +249,27 @@ ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session
 Run declare_home(Arguments& arguments) {
   auto values = std::make_shared<HomeArguments>();
   arguments.positional("GOAL", values->goal,
-                       "Image of the place to return to; with --memory: name or id of a view");
+                       "Image of the place to return to; with --memory: name or id of a view; with "
+                       "--area: name of a home that panonav home learn has stored");
   arguments.positional("CURRENT", values->current,
-                       "Current image, or a data set with several current images");
+                       "Current image, or a data set with several current images; with --area: a "
+                       "recording with odometry that begins at home");
   arguments.option("--memory FILE", values->memory, "Memory file that contains the view GOAL");
+  arguments.flag("--area", values->area,
+                 "Lead the robot to the home GOAL of --memory by odometry and by the surroundings "
+                 "that it learnt");
+  arguments.option("--back-from N", values->back_from, 1,
+                   "Number of the image from which on the robot is on its way back; default: the "
+                   "last one");
   declare_pictures(arguments, values->pictures);
   values->pictures.check = PictureArguments::Check::heads;
   declare_report(arguments, values->report, "a page with both views and the direction home");
   declare_homing(arguments, values->homing);
+  arguments.reject_options_unless(
+      {"--back-from"}, [values] { return values->area; }, "without --area");
+  arguments.reject_options_unless(
+      {"--report", "--horizon", "--published", "[signature]", "[preprocessing]", "[homing]"},
+      [values] { return !values->area; }, "with --area, which uses the options of the memory");
   return [values, &arguments](Session& session) { return home(arguments, *values, session); };
 }
 
@@ -203,7 +286,8 @@ Verb home_verb() {
           "already at home or because the images are not more similar than random images.",
           "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
           "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
-          "  panonav home office_run/view_00012.png office_run --json",
+          "  panonav home office_run/view_00012.png office_run --json\n"
+          "  panonav home dock flight_run --memory office.panonav --area --back-from 40",
           declare_home};
 }
 

@@ -13,6 +13,8 @@
 #include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/route/chain_follower.hpp"
 #include "panonav/route/chain_recorder.hpp"
+#include "panonav/route/home_area.hpp"
+#include "panonav/route/home_finder.hpp"
 #include "panonav/route/snapshot_chain.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -77,6 +79,48 @@ class ChainGuide {
   HomingEncoder encoder_;
   ChainFollower follower_;
   std::optional<Pose2> odometry_;  // at the last view
+};
+
+/// Learns the surroundings of the place at which a walk begins, and stores them in the memory as a
+/// chain whose first snapshot is home. The motions between images are those of the poses. Throws as
+/// `record_chain`. `progress` is called after each image.
+HomeArea learn_home_area(MemoryFile& memory, const std::string& name, const DrivePoses& walk,
+                         const HomeAreaOptions& options, Executor& executor,
+                         const std::function<void()>& progress = {});
+
+/// Where a robot is relative to its home, and its next motion.
+struct HomeStep {
+  /// Motion on the way back; nullopt on the way out.
+  std::optional<ChainDecision> decision;
+  Pose2 pose;                ///< area_from_robot
+  double distance_m = 0.0;   ///< from home
+  double direction_rad = 0;  ///< to home, in the robot frame
+  double deviation_m = 0.0;  ///< of the position, in the worst direction
+  Point2 drift_m_per_m;      ///< that odometry does not see, along the axes of the area
+};
+
+/// Leads a robot back to a home whose surroundings are stored in a memory, observation by
+/// observation.
+class HomeAreaGuide {
+ public:
+  /// The robot is at home, at the heading of the learning walk's first view. `source` and `name` as
+  /// of `ChainGuide`. Throws as `ChainGuide`.
+  HomeAreaGuide(const MemoryFile& memory, const std::optional<PictureSource>& source,
+                const std::optional<std::string>& name, const OdometryNoise& noise = {},
+                const HomeFinderOptions& options = {});
+
+  /// Takes the next observation; its image is used only where the robot may be near home.
+  /// `is_back`: the robot is on the way back, so the next motion is decided. Throws as
+  /// `ChainGuide::step`.
+  [[nodiscard]] HomeStep step(const Observation& observation, bool is_back);
+
+  /// Returns the area.
+  [[nodiscard]] const SnapshotChain& area() const noexcept { return finder_.area(); }
+
+ private:
+  HomeFinder finder_;
+  HomingEncoder encoder_;
+  std::optional<Pose2> odometry_;  // at the last observation
 };
 
 /// Returns the word for a state.
