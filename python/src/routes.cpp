@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -361,12 +364,120 @@ void bind_chains(py::module_& m) {
       "route follow`, until the robot has arrived or is lost.");
 }
 
+HomeArea learn_home_of(const Dataset& dataset, const std::filesystem::path& memory,
+                       const std::string& name, bool odometry, const HomeAreaOptions& options,
+                       int threads) {
+  InterruptibleExecutor executor(threads);
+  MemoryFile file =
+      memory_exists(memory)
+          ? MemoryFile::open(memory, Access::read_write)
+          : MemoryFile::create(memory, make_header_from_recording(dataset, {}, {}, executor));
+  const DrivePoses walk = find_drive_poses(dataset, file, name, odometry, executor);
+  return learn_home_area(file, name, walk, options, executor);
+}
+
+void bind_homes(py::module_& m) {
+  Record<HomeArea>(m, "HomeArea", "The surroundings of a home, learnt from a walk around it.")
+      .field(
+          "snapshots", [](const HomeArea& a) { return a.chain.snapshots(); },
+          "Number of snapshots.")
+      .field(
+          "bytes", [](const HomeArea& a) { return a.chain.pack().size(); },
+          "Size of the packed form.")
+      .field("returns", &HomeArea::returns, "Times that the walk was seen to pass home.")
+      .field(
+          "homeward_component", [](const HomeArea& a) { return a.homeward_component(); },
+          "Mean over the views that are not stored; 1: straight home.")
+      .field(
+          "field",
+          [](const HomeArea& a) {
+            py::array_t<double> rows({static_cast<py::ssize_t>(a.held_out.size()), py::ssize_t{4}});
+            for (std::size_t i = 0; i < a.held_out.size(); ++i) {
+              const HeldOutView& view = a.held_out[i];
+              constexpr double none = std::numeric_limits<double>::quiet_NaN();
+              const Point2 home = view.home_vector.value_or(Point2{none, none});
+              const std::array<double, 4> row{view.pose.x_m, view.pose.y_m, home.x_m, home.y_m};
+              std::ranges::copy(row, rows.mutable_data(static_cast<py::ssize_t>(i), 0));
+            }
+            return rows;
+          },
+          "(views, 4) of x_m, y_m and the home vector in m; NaN where there is none.");
+  Record<HomeStep>(m, "HomeStep", "Where a robot is relative to its home.")
+      .field(
+          "state",
+          [](const HomeStep& s) {
+            return std::string(s.decision ? to_string(s.decision->state) : "away");
+          },
+          "'travelling', 'homing', 'searching', 'arrived' or 'lost'; 'away' on the way out.")
+      .field(
+          "turn_rad",
+          [](const HomeStep& s) {
+            return s.decision ? std::optional(s.decision->turn_rad) : std::nullopt;
+          },
+          "Direction of the next motion in the robot frame.")
+      .field(
+          "advance_m",
+          [](const HomeStep& s) {
+            return s.decision ? std::optional(s.decision->advance_m) : std::nullopt;
+          },
+          "Length of the next motion.")
+      .field("pose", &HomeStep::pose, "In the frame of the home.")
+      .field("distance_m", &HomeStep::distance_m, "From home.")
+      .field("direction_rad", &HomeStep::direction_rad, "To home, in the robot frame.")
+      .field("deviation_m", &HomeStep::deviation_m,
+             "Standard deviation of the position in its worst direction.");
+  using SharedGuide = Shared<HomeAreaGuide>;
+  py::class_<SharedGuide>(m, "HomeAreaGuide",
+                          "Leads a robot home by odometry and by the surroundings of its home.")
+      .def(
+          py::init([](const std::filesystem::path& memory, const std::optional<std::string>& name,
+                      const std::optional<PictureSource>& source, const py::kwargs& keywords) {
+            HomeFinderOptions options;
+            OdometryNoise noise;
+            Keywords(keywords).options(options).options(noise).finish();
+            const py::gil_scoped_release free;
+            return std::make_unique<SharedGuide>(MemoryFile::open(memory, Access::read_only),
+                                                 source, name, noise, options);
+          }),
+          py::arg("memory"), py::arg("name") = "home", py::arg("source") = py::none(),
+          append_option_list("The robot is at home, at the heading of the first image of the walk.",
+                             {options_of<HomeFinderOptions>(), options_of<OdometryNoise>()})
+              .c_str())
+      .def(
+          "step",
+          [](SharedGuide& guide, const py::object& observation, bool back) {
+            const Observation current = to_observation(observation);
+            return guide.change([&](HomeAreaGuide& g) { return g.step(current, back); });
+          },
+          py::arg("observation"), py::kw_only(), py::arg("back") = true,
+          "Takes the next observation, which needs odometry. `back`: the robot is on its way back; "
+          "decides the motion to be carried out before the next observation.");
+  m.def(
+      "learn_home",
+      [](const std::filesystem::path& memory, const py::object& recording, const std::string& name,
+         const std::optional<PictureSource>& source, bool odometry, int threads,
+         const py::kwargs& keywords) {
+        HomeAreaOptions options;
+        Keywords(keywords).options(options).finish();
+        const Dataset dataset = to_dataset_for_memory(memory, recording, source);
+        const py::gil_scoped_release free;
+        return learn_home_of(dataset, memory, name, odometry, options, threads);
+      },
+      py::arg("memory"), py::arg("recording"), py::arg("name") = "home",
+      py::arg("source") = py::none(), py::kw_only(), py::arg("odometry") = false,
+      py::arg("threads") = 0,
+      append_option_list("Learns the surroundings of a home, like `panonav home learn`.",
+                         {options_of<HomeAreaOptions>()})
+          .c_str());
+}
+
 }  // namespace
 
 void bind_routes(py::module_& m) {
   bind_recording(m);
   bind_following(m);
   bind_chains(m);
+  bind_homes(m);
 }
 
 }  // namespace panonav::python

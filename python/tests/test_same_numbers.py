@@ -410,6 +410,27 @@ def test_chains(tmp_path):
         panonav.follow_route(memory, drive)
 
 
+def test_homes(tmp_path):
+    walk = tmp_path / "walk"
+    panonav.simulate("loop", walk, path="tour", spacing_m=0.25, kind="panorama", heading="path",
+                     rows=24, columns=128, rays_per_axis=1)
+    memory = tmp_path / "home.panonav"
+    area = panonav.learn_home(memory, walk, max_bytes=600)
+    printed = command_json("home", "learn", tmp_path / "theirs.panonav", walk, "--max-bytes", 600)[0]
+    assert all(printed[key] == getattr(area, key) for key in ("snapshots", "bytes", "returns", "homeward_component"))
+    assert area.bytes <= 600
+    assert area.field.shape == (printed["held_out"], 4)
+    entries = panonav.Dataset(walk)
+    guide = panonav.HomeAreaGuide(memory, source=entries.source)
+    steps = [guide.step(entry, back=index + 1 >= 20) for index, entry in enumerate(entries)]
+    found = command_json("home", "home", walk, "--memory", memory, "--area", "--back-from", 20)
+    for step, line in zip(steps, found):
+        assert step.state == line["state"]
+        assert (step.turn_rad, step.distance_m, step.deviation_m) == (
+            line["turn_rad"], line["distance_m"], line["deviation_m"])
+    assert steps[0].state == "away" and steps[0].turn_rad is None
+
+
 def test_scale_by_camera_height(tmp_path):
     drive = panonav.simulate("office", tmp_path / "drive", path="tour", spacing_m=0.3, kind="panorama", heading="path")
     (tmp_path / "walk").mkdir()
