@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "lab/s06/chains.hpp"
+#include "lab/s06/home_areas.hpp"
 #include "lab/s06/support.hpp"
 #include "lab/s06/worlds.hpp"
 #include "panonav/core/error.hpp"
@@ -107,6 +108,8 @@ ReproductionPlan plan_s06(const Experiments& context) {
   plan.push_back({2.0 * few_starts, [=] { reproduce_homing_in_scenes(few_starts, context); }});
   plan.push_back(
       {10.0, [=] { reproduce_snapshot_chains((context.options.starts + 99) / 100, context); }});
+  plan.push_back(
+      {15.0, [=] { reproduce_home_areas((context.options.starts + 19) / 20, context); }});
   for (const std::string& name : simulation::find_worlds(options.data)) {
     plan.push_back({0.1 * options.starts, [=] { reproduce_homing_in_world(name, context); }});
   }
