@@ -1,5 +1,6 @@
 #include "panonav_ros2/goal_driver.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -26,6 +27,7 @@ void GoalDriver::set_memory(const LoadedMemory& memory) {
   navigator_.reset();
   route_driver_.reset();
   chain_driver_.reset();
+  explorer_.reset();
   memory_ = &memory;
   mission_file_.emplace(memory.path, setup_.node.resume_s);
 }
@@ -35,10 +37,10 @@ std::optional<Mission> GoalDriver::load_interrupted_mission() {
 }
 
 void GoalDriver::start(const Mission& mission) {
-  end("another goal");
   try {
     if (memory_ == nullptr)
       throw Error("the memory is being made; allowed: first finish, then this");
+    end("another goal");
     route_driver_.reset();
     chain_driver_.reset();
     if (mission.goal) {
@@ -54,9 +56,66 @@ void GoalDriver::start(const Mission& mission) {
   mission_ = mission;
   if (route_driver_)
     mission_.min_correlation = route_driver_->follower().tracker().limits().min_correlation;
+  begin();
+}
+
+void GoalDriver::begin() {
   const std::lock_guard lock(mutex_);
   has_mission_ = true;
   last_command_ = Steady::now();
+}
+
+void GoalDriver::start_exploration(bool has_ranges) {
+  try {
+    if (explorer_ && !explorer_->explorer().view_poses().empty()) {
+      throw Error("the exploration was started before; allowed: cancel");
+    }
+    const ExplorationSetup& exploration = setup_.exploration.value();
+    const Pose2 camera = setup_.node.base_from_camera();
+    explorer_.emplace(
+        setup_.memory, exploration.pictures,
+        RobotExplorerOptions{
+            .exploration = exploration.exploration,
+            .base = setup_.navigator.base,
+            .odometry = setup_.tracker.odometry.value_or(OdometryNoise{}),
+            .robot_radius_m = setup_.node.robot_radius_m + std::hypot(camera.x_m, camera.y_m),
+            .has_ranges = has_ranges,
+            .signature = exploration.signature,
+            .preprocessing = exploration.preprocessing});
+  } catch (const Error& refusal) {
+    results_.publish(make_message(error, std::string("refused: ") + refusal.what(), {}));
+    throw;
+  }
+  begin();
+}
+
+void GoalDriver::explore(const Observation& observation, const SensedObstacles& sensed) {
+  if (!has_mission()) return;
+  using State = ExplorationDecision::State;
+  const RobotExplorer::Step step = explorer_->step(observation, sensed);
+  const std::string state(to_string(step.decision.state));
+  if (step.decision.state == State::lost) {
+    end(state, error);
+  } else if (step.decision.state == State::done) {
+    end(state + (explorer_->explorer().progress().is_complete
+                     ? ": nothing is left to explore"
+                     : ": the largest distance (max_metres) is driven"),
+        fine);
+  } else {
+    send(step.velocity);
+    if (step.decided) feedback_.publish(make_message(fine, state, describe_exploration()));
+  }
+}
+
+std::vector<recordings::ros::KeyValue> GoalDriver::describe_exploration() const {
+  const Explorer& explorer = explorer_->explorer();
+  const ExplorationProgress progress = explorer.progress();
+  const double share = progress.floor_m2 > 0.0 ? progress.covered_m2 / progress.floor_m2 : 0.0;
+  return {{"views", std::to_string(explorer.view_poses().size())},
+          {"covered", format_fixed(share, 3)},
+          {"floor_m2", format_fixed(progress.floor_m2, 2)},
+          {"travelled_m", format_fixed(explorer.travelled_m(), 2)},
+          {"deviation_m", format_fixed(progress.position_deviation_m, 3)}};
 }
 
 void GoalDriver::make_route_driver(const Mission& mission) {
@@ -171,8 +230,19 @@ void GoalDriver::end(const std::string& why, std::uint8_t level) {
     if (!std::exchange(has_mission_, false)) return;
     velocities_.publish({});
   }
-  mission_file_->remove();
-  results_.publish(make_message(level, why, {}));
+  if (!explorer_) {
+    mission_file_->remove();
+    results_.publish(make_message(level, why, {}));
+    return;
+  }
+  std::string fault;
+  try {
+    explorer_->finish();
+  } catch (const Error& failure) {
+    fault = std::string("; the memory is not complete: ") + failure.what();
+  }
+  results_.publish(
+      make_message(fault.empty() ? level : error, why + fault, describe_exploration()));
 }
 
 void GoalDriver::stop_if_silent() {

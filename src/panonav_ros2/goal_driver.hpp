@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "panonav/pipeline/robot_explorer.hpp"
 #include "panonav/pipeline/route_driver.hpp"
 #include "panonav_ros2/mission.hpp"
 #include "panonav_ros2/node_setup.hpp"
@@ -22,9 +23,9 @@ struct LoadedMemory {
   Tracker tracker;
 };
 
-/// Drives a robot to a goal or along a route by velocities on `cmd_vel`, and reports on
-/// `~/goal/feedback` and `~/goal/result`. To be called by the localising thread, unless stated
-/// otherwise.
+/// Drives a robot to a goal, along a route or through an unknown place by velocities on `cmd_vel`,
+/// and reports on `~/goal/feedback` and `~/goal/result`. To be called by the localising thread,
+/// unless stated otherwise.
 class GoalDriver {
  public:
   GoalDriver(Participant& participant, const LocalisationNodeSetup& setup, WarningLog& log,
@@ -42,7 +43,21 @@ class GoalDriver {
   /// Sends the velocity for this image if there is a mission. `pose` is the camera's pose in the
   /// map, `nullopt` if the robot is not localised.
   void drive(const Observation& observation, const std::optional<Pose2>& pose);
-  /// Stops the robot and reports why, if there is a mission. May be called from any thread, but not
+
+  /// Starts the exploration that makes the memory of the node. `has_ranges`: `explore` gets ranges.
+  /// Reports it and throws Error if there was one before or the file exists.
+  void start_exploration(bool has_ranges);
+  /// Sends the velocity for this image if there is an exploration. At its end its memory is stored.
+  void explore(const Observation& observation, const SensedObstacles& sensed);
+  /// Returns the present or last exploration; null if there is none, or a memory was set since.
+  [[nodiscard]] const RobotExplorer* explorer() const noexcept {
+    return explorer_ ? &*explorer_ : nullptr;
+  }
+  /// True between `start` and `end`. May be called from any thread.
+  [[nodiscard]] bool has_mission() const;
+
+  /// Stops the robot, stores the memory of an exploration and reports why, if there is a mission.
+  /// May be called from any thread, but not
   /// while another thread is in a function above.
   void end(const std::string& why, std::uint8_t level = warning);
   /// Stops the robot if no velocity was sent for `command_timeout_s`, for whatever reason. May be
@@ -54,6 +69,7 @@ class GoalDriver {
   static constexpr std::uint8_t warning = 1;
   static constexpr std::uint8_t error = 2;
 
+  void begin();
   void make_route_driver(const Mission& mission);
   void set_goal(Point2 goal);
   void drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose);
@@ -61,7 +77,7 @@ class GoalDriver {
   void drive_along_chain(const Observation& observation);
   void send(const Velocity& velocity);
   void publish_areas();
-  [[nodiscard]] bool has_mission() const;
+  [[nodiscard]] std::vector<recordings::ros::KeyValue> describe_exploration() const;
   [[nodiscard]] recordings::ros::DiagnosticArray make_message(
       std::uint8_t level, const std::string& state,
       std::vector<recordings::ros::KeyValue> values) const;
@@ -80,6 +96,7 @@ class GoalDriver {
   // Used instead of the navigator: along a route panorama, along a chain of snapshots.
   std::optional<RouteDriver> route_driver_;
   std::optional<ChainDriver> chain_driver_;
+  std::optional<RobotExplorer> explorer_;
 
   mutable std::mutex mutex_;  // guards the following members and the order of velocities
   bool has_mission_ = false;

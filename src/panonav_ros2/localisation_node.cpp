@@ -9,9 +9,11 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "panonav_ros2/floor_scan_topic.hpp"
 #include "panonav_ros2/goal_driver.hpp"
 #include "panonav_ros2/memory_localiser.hpp"
+#include "panonav_ros2/obstacle_topics.hpp"
 #include "panonav_ros2/sensor_topics.hpp"
 
 namespace panonav::ros2 {
@@ -36,6 +38,12 @@ struct LocalisationNode::Implementation {
         answers(participant, "~/command/result") {
     if (setup.teacher) {
       teacher.emplace(setup.memory, *setup.teacher);
+    } else if (setup.exploration) {
+      if (memory_exists(setup.memory)) {
+        throw FileError(setup.memory.string(), "exists; allowed for an exploration: a new file");
+      }
+      obstacles.emplace(participant, setup.frames, log, motion);
+      is_memory_unexplored = true;
     } else {
       localiser.load(setup.memory);
       localiser.load_interrupted_mission();
@@ -159,6 +167,8 @@ struct LocalisationNode::Implementation {
     recordings::RunMoment moment;
     if (teacher) {
       moment = teach(std::move(observation));
+    } else if (is_memory_unexplored) {
+      moment = explore(observation, stamp_ns);
     } else {
       moment = localiser.localise(std::move(observation), stamp_ns, *moved);
       if (moment.sure && moment.pose) ++localised;
@@ -183,6 +193,25 @@ struct LocalisationNode::Implementation {
     return moment;
   }
 
+  recordings::RunMoment explore(const Observation& observation, std::int64_t stamp_ns) {
+    recordings::RunMoment moment;
+    if (!driver.has_mission()) {
+      moment.state = driver.explorer() == nullptr ? "waiting for the command explore"
+                                                  : "the exploration has ended";
+      return moment;
+    }
+    const auto sensed =
+        obstacles->take(stamp_ns, observation.odometry.value(), setup.node.base_from_camera());
+    driver.explore(observation, {sensed.contact_rad, sensed.ranges});
+    const RobotExplorer& robot = *driver.explorer();
+    taught = robot.explorer().view_poses().size();
+    motion.set_map_from_path(robot.map_from_odometry());
+    moment.state = "exploring";
+    moment.values = {{"views", std::to_string(taught)}};
+    if (!driver.has_mission()) load_explored_memory();
+    return moment;
+  }
+
   /// Executes a command from `~/command` and returns the answer.
   std::string execute(const std::string& words) {
     const std::size_t blank = words.find(' ');
@@ -192,9 +221,15 @@ struct LocalisationNode::Implementation {
       if (command == "finish" && teacher) {
         finish_teaching();
       } else if (command == "cancel") {
+        const bool was_exploring = is_memory_unexplored && driver.has_mission();
         driver.end("cancelled");
+        if (was_exploring) load_explored_memory();
       } else if (teacher) {
         reject_command(words, "finish, because the memory is being made");
+      } else if (is_memory_unexplored && command == "explore") {
+        driver.start_exploration(obstacles->has_scan());
+      } else if (is_memory_unexplored) {
+        reject_command(words, "explore, cancel, because the memory is being made");
       } else if (command == "relocalise") {
         localiser.start_globally();
       } else if (command == "repeat" && !argument.empty()) {
@@ -232,6 +267,20 @@ struct LocalisationNode::Implementation {
     if (const auto pose = motion.map_from_base()) localiser.start_at(*pose);
   }
 
+  /// Localises the robot in the memory that it has made; where it is lost, globally.
+  void load_explored_memory() {
+    const RobotExplorer& robot = *driver.explorer();
+    if (robot.explorer().view_poses().empty()) throw Error("no view was stored; no memory is made");
+    const bool is_lost = robot.state() == ExplorationDecision::State::lost;
+    localiser.load(setup.memory);
+    is_memory_unexplored = false;
+    if (is_lost) {
+      motion.set_map_from_path(std::nullopt);
+    } else if (const auto pose = motion.map_from_base()) {
+      localiser.start_at(*pose);
+    }
+  }
+
   const LocalisationNodeSetup setup;
   WarningLog log;
   RobotMotion motion;
@@ -244,7 +293,9 @@ struct LocalisationNode::Implementation {
   Publisher<recordings::ros::DiagnosticArray> diagnostics;
   Publisher<recordings::ros::String> answers;
   std::optional<FloorScanTopic> floor_scan;  // only by the worker thread
-  std::optional<Teacher> teacher;  // used instead of the localiser; only by the worker thread
+  std::optional<ObstacleTopics> obstacles;
+  bool is_memory_unexplored = false;  // an exploration makes it; only used by the worker thread
+  std::optional<Teacher> teacher;     // used instead of the localiser; only by the worker thread
   std::atomic<std::size_t> pictures = 0, localised = 0, taught = 0;
   std::int64_t last_transform_ns = 0;
 };

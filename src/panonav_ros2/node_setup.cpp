@@ -30,8 +30,10 @@ void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
           "height of the camera above the floor; publishes the free floor as ~/floor_scan; 0: not "
           "published",
           0, 10),
-      option<&T::robot_radius_m>("radius of the robot, whose path shows ~/floor_scan the floor",
-                                 above(0), 10),
+      option<&T::robot_radius_m>(
+          "radius of the robot around the origin of the base frame, for an exploration and for "
+          "~/floor_scan",
+          above(0), 10),
   };
   table.visit(options, visitor);
 }

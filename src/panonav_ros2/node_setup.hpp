@@ -7,6 +7,7 @@
 #include <string>
 
 #include "panonav/core/options.hpp"
+#include "panonav/pipeline/robot_explorer.hpp"
 #include "panonav/pipeline/robot_navigator.hpp"
 #include "panonav/pipeline/tracker.hpp"
 #include "panonav_ros2/participant.hpp"
@@ -46,6 +47,14 @@ struct FrameNames {
   std::string base = "base_link";
 };
 
+/// An exploration by the robot itself. Drive and limits of velocities are those of goals.
+struct ExplorationSetup {
+  PictureSource pictures;
+  ExplorationOptions exploration;
+  SignatureOptions signature;
+  PreprocessingOptions preprocessing;
+};
+
 struct LocalisationNodeSetup {
   std::filesystem::path memory;
   ParticipantOptions participant;
@@ -55,6 +64,8 @@ struct LocalisationNodeSetup {
   RobotNavigatorOptions navigator;  ///< for goals; its base options also for routes
   /// Set if the first drive makes a new memory, until the command "finish".
   std::optional<TeacherOptions> teacher;
+  /// Set if an exploration makes a new memory, after the command "explore".
+  std::optional<ExplorationSetup> exploration;
 };
 
 using NowNs = std::function<std::int64_t()>;  ///< current time, simulated or of the system

@@ -4,6 +4,8 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <thread>
 #include <utility>
 
@@ -59,6 +61,8 @@ struct SimulatedRobot::Implementation {
         odometries(participant, "odom", {.depth = 50}),
         transforms(participant, "/tf", {.depth = 100}),
         pictures(participant, "image"),
+        scans(participant, "scan"),
+        contacts(participant, "contact"),
         truths(participant, "ground_truth", {.depth = 50}) {
     subscribe<recordings::ros::Twist>(
         participant, log, "cmd_vel", {},
@@ -104,7 +108,7 @@ struct SimulatedRobot::Implementation {
   void step(double step_s) {
     now_s += step_s;
     if (now_s > velocity_until_s) velocity = {};
-    const Pose2 moved = base.drive(velocity, step_s).moved;
+    const auto [moved, is_stopped] = base.drive(velocity, step_s);
     const recordings::ros::Pose odom_from_base = recordings::ros::to_pose(base.odometry());
     const std::int64_t stamp_ns = std::llround(1e9 * now_s);
     clocks.publish({stamp_ns});
@@ -117,9 +121,47 @@ struct SimulatedRobot::Implementation {
     odometries.publish(message);
     transforms.publish({{{{stamp_ns, "odom"}, "base_link", odom_from_base}}});
     truths.publish({{stamp_ns, "map"}, recordings::ros::to_pose(base.pose())});
+    if (is_stopped && (velocity.forward_m_s != 0.0 || velocity.left_m_s != 0.0)) {
+      contacts.publish({{stamp_ns, "base_link"}, find_contact_point()});
+    }
     if (now_s < next_picture_s || is_taking_picture.exchange(true)) return;
     next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
+    if (surroundings.ranges) publish_scan(stamp_ns);
     camera_work.add([this, stamp_ns, pose = base.pose()] { capture_image(stamp_ns, pose); });
+  }
+
+  void publish_scan(std::int64_t stamp_ns) {
+    const auto ranges_m = surroundings.ranges(base.pose(), Random(seed, picture_number).next());
+    recordings::ros::LaserScan scan{.header = {stamp_ns, "base_link"}};
+    scan.angle_increment =
+        static_cast<float>(2.0 * std::numbers::pi / static_cast<double>(ranges_m.size()));
+    scan.angle_max = scan.angle_increment * static_cast<float>(ranges_m.size() - 1);
+    scan.range_max = static_cast<float>(surroundings.max_range_m);
+    for (const double range_m : ranges_m) {
+      scan.ranges.push_back(range_m < surroundings.max_range_m
+                                ? static_cast<float>(range_m)
+                                : std::numeric_limits<float>::infinity());
+    }
+    scans.publish(scan);
+  }
+
+  /// Returns the point of the hull in the average direction of those, of eight, in which the robot
+  /// cannot move a little; ahead if it can.
+  [[nodiscard]] recordings::ros::Vector3 find_contact_point() const {
+    constexpr double little_m = 0.03;
+    Point2 sum;
+    for (int i = 0; i < 8; ++i) {
+      const double direction_rad = i * std::numbers::pi / 4.0;
+      const Point2 unit{std::cos(direction_rad), std::sin(direction_rad)};
+      if (surroundings.is_free(base.pose() * Point2{little_m * unit.x_m, little_m * unit.y_m})) {
+        continue;
+      }
+      sum = {sum.x_m + unit.x_m, sum.y_m + unit.y_m};
+    }
+    const double length = std::hypot(sum.x_m, sum.y_m);
+    const Point2 unit = length > 0.0 ? Point2{sum.x_m / length, sum.y_m / length}
+                                     : Point2{velocity.forward_m_s < 0.0 ? -1.0 : 1.0, 0.0};
+    return {surroundings.robot_radius_m * unit.x_m, surroundings.robot_radius_m * unit.y_m, 0.0};
   }
 
   /// Renders an image; runs on a separate thread, so that the simulation does not wait.
@@ -143,6 +185,8 @@ struct SimulatedRobot::Implementation {
   Publisher<recordings::ros::Odometry> odometries;
   Publisher<recordings::ros::TFMessage> transforms;
   Publisher<recordings::ros::Image> pictures;
+  Publisher<recordings::ros::LaserScan> scans;
+  Publisher<recordings::ros::PointStamped> contacts;
   Publisher<recordings::ros::PoseStamped> truths;
   Velocity velocity;
   double now_s = 0.0;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "panonav/core/image.hpp"
 #include "panonav/core/options.hpp"
@@ -26,12 +27,17 @@ struct SimulatedSurroundings {
   Pose2 start;
   std::function<bool(Point2 place)> is_free;
   std::function<Image(const Pose2& pose, std::uint64_t seed)> picture;
+  /// Measures ranges in equally spaced directions, the first one forward, counter-clockwise;
+  /// `max_range_m` where nothing is. Empty: the robot publishes no scan.
+  std::function<std::vector<double>(const Pose2& pose, std::uint64_t seed)> ranges;
+  double max_range_m = 3.0;
+  double robot_radius_m = 0.2;
 };
 
 /// A simulated robot with the ROS 2 interface of a real one, in simulated time. It publishes
-/// /clock, odom, odom -> base_link on /tf, images on image and, for evaluation, ground_truth; it
-/// subscribes to cmd_vel and to set_pose (PoseStamped), which moves the robot without its odometry
-/// noticing. Obstacles stop it.
+/// /clock, odom, odom -> base_link on /tf, images on image, with each image ranges on scan, points
+/// of contact on contact and, for evaluation, ground_truth; it subscribes to cmd_vel and to
+/// set_pose (PoseStamped), which moves the robot without its odometry noticing. Obstacles stop it.
 class SimulatedRobot {
  public:
   /// Throws OptionError, and as `Participant`.

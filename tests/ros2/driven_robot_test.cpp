@@ -1,5 +1,6 @@
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -20,7 +21,8 @@ class DrivenRobot {
       : robot_({.node = "robot"}, {.time_factor = time_factor},
                {{0.8, 0.8, 0.3},
                 [&world](Point2 place) { return testing::robot_fits(world, place); },
-                [picture](const Pose2& pose, std::uint64_t) { return picture(pose); }},
+                [picture](const Pose2& pose, std::uint64_t) { return picture(pose); },
+                [&world](const Pose2& pose, std::uint64_t) { return measure_ranges(world, pose); }},
                {}, 1, [](const std::string& line) { ADD_FAILURE() << line; }),
         thread_([this] { robot_.run(); }) {}
   ~DrivenRobot() {
@@ -29,6 +31,20 @@ class DrivenRobot {
   }
 
  private:
+  static std::vector<double> measure_ranges(const testing::ToyWorld& world, const Pose2& pose) {
+    std::vector<double> ranges_m(16, 0.0);
+    for (std::size_t i = 0; i < ranges_m.size(); ++i) {
+      const double direction_rad = static_cast<double>(i) * std::numbers::pi / 8.0;
+      const Point2 unit{std::cos(direction_rad), std::sin(direction_rad)};
+      double& range_m = ranges_m[i];
+      while (range_m < 3.0 &&
+             world.clearance_m(pose * Point2{range_m * unit.x_m, range_m * unit.y_m}) > 0.02) {
+        range_m += 0.02;
+      }
+    }
+    return ranges_m;
+  }
+
   SimulatedRobot robot_;
   std::thread thread_;
 };
@@ -264,6 +280,68 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   write_file(mission, std::string_view("1 2 3 repeat"));
   start(setup);
   EXPECT_EQ(notes_with("is damaged"), 1U);
+}
+
+TEST_F(LocalisationNodeOnTheWire, ExploresAndIsLocalisedInWhatItMadeOrStopsWhereItIsToldTo) {
+  std::optional<DrivenRobot> robot;
+  robot.emplace(world_, picture, 6.0);
+  LocalisationNodeSetup setup{.memory = *folder_ / "explored.panonav",
+                              .node = {.use_sim_time = true}};
+  setup.navigator.base.speed_m_s = 0.5;
+  setup.exploration = ExplorationSetup{source(), {.radius_m = 0.4, .max_metres = 6.0}, {}, {}};
+  start(setup);
+  auto& feedback = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/feedback");
+  auto& result = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/result");
+  auto& truth = peer_.listen<recordings::ros::PoseStamped>("ground_truth", false);
+  auto& velocity = peer_.listen<recordings::ros::Twist>("cmd_vel");
+  auto& pose = peer_.listen<recordings::ros::PoseWithCovarianceStamped>("panonav/pose");
+  ASSERT_TRUE(peer_.all_matched(10s));
+  ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 3; }));
+  const auto value_of = [](const FastPeer::Bytes& cdr, const std::string& key) {
+    if (cdr.empty()) return std::string("nothing");
+    const auto status = read<recordings::ros::DiagnosticArray>(cdr).status.at(0);
+    for (const auto& each : status.values) {
+      if (each.key == key) return each.value;
+    }
+    return status.message;
+  };
+  const Pose2 beginning = newest_pose(truth);
+  EXPECT_EQ(FastPeer::waiting(velocity), 0U);  // it stands until the command
+  EXPECT_EQ(ask("relocalise").find("refused: "), 0U);
+  EXPECT_EQ(ask("explore"), "explore done");
+  EXPECT_EQ(ask("explore").find("refused: "), 0U);
+  (void)FastPeer::next(result, 5s);  // the refusal
+  const auto first = FastPeer::next(feedback, 10s);
+  EXPECT_EQ(value_of(first, "state"), "exploring");
+  EXPECT_EQ(value_of(first, "views"), "1");
+  const auto ended = FastPeer::next(result, 60s);
+  EXPECT_EQ(value_of(ended, "state"), "done: the largest distance (max_metres) is driven");
+  const int views = std::atoi(value_of(ended, "views").c_str());
+  EXPECT_GE(views, ObservationModel::min_views);  // so that it is localised
+  EXPECT_GT(std::atof(value_of(ended, "covered").c_str()), 0.1);
+  EXPECT_LT(distance(newest_pose(truth).position(), beginning.position()), 0.3);
+  EXPECT_EQ(node_->counts().taught, static_cast<std::size_t>(views));
+  const Pose2 seen = recordings::ros::to_pose2(
+      read<recordings::ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 20s)).pose.pose);
+  EXPECT_LT(std::hypot(seen.x_m, seen.y_m), 0.4);  // the map's origin is the first view
+  EXPECT_EQ(MemoryFile::open(setup.memory, Access::read_only).load().views().size(),
+            static_cast<std::size_t>(views));
+  EXPECT_EQ(ask("explore").find("refused: "), 0U);  // its memory is made
+  stop();
+
+  setup.memory = *folder_ / "cancelled.panonav";
+  start(setup);
+  ASSERT_TRUE(peer_.all_matched(10s));
+  ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 3; }));
+  EXPECT_EQ(ask("explore"), "explore done");
+  ASSERT_TRUE(comes_true([&] { return node_->counts().taught >= 2; }));
+  (void)ask("cancel");
+  EXPECT_EQ(value_of(FastPeer::next(result, 20s), "state"), "cancelled");
+  EXPECT_GE(MemoryFile::open(setup.memory, Access::read_only).load().views().size(), 2U);
+  std::this_thread::sleep_for(200ms);
+  const Pose2 stopped = newest_pose(truth);
+  std::this_thread::sleep_for(200ms);
+  EXPECT_LT(distance(newest_pose(truth).position(), stopped.position()), 1e-9);
 }
 
 }  // namespace

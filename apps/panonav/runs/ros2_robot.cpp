@@ -5,6 +5,7 @@
 #include "cli/stop_signals.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav_ros2/simulated_robot.hpp"
+#include "panonav_simulation/obstacle_sense.hpp"
 
 namespace panonav::command {
 
@@ -29,12 +30,20 @@ ExitCode Ros2Robot::run(const simulation::SimulatedWorld& world, Session& sessio
                            scene.tour[1].y_m - scene.tour[0].y_m};
     start = {scene.tour[0].x_m, scene.tour[0].y_m, std::atan2(direction.y_m, direction.x_m)};
   }
+  const double robot_radius_m = world.options().free_space.robot_radius_m;
   ros2::SimulatedRobot robot(
       {.node = "panonav_simulation"}, options_->robot,
       {start, [&](Point2 place) { return world.free_space().is_free(place); },
        [&](const Pose2& pose, std::uint64_t number) {
          return world.capture_image(pose, number, session.executor());
-       }},
+       },
+       [&](const Pose2& pose, std::uint64_t number) {
+         Random noise(number);
+         const auto ranges_m =
+             simulation::measure_ranges(world.free_space(), nullptr, pose, noise, robot_radius_m);
+         return std::vector<double>(ranges_m.begin(), ranges_m.end());
+       },
+       simulation::max_range_m, robot_radius_m},
       world.options().odometry, seed, [&](const std::string& line) { session.note(line); });
   const StopSignals signals([&] { robot.stop(); });
   session.note("panonav simulate: a robot is in " + scene.name + " at " +

@@ -9,8 +9,7 @@
 #include "cli/option_values.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
-#include "panonav/pipeline/memoriser.hpp"
-#include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/robot_explorer.hpp"
 #include "panonav_simulation/exploration.hpp"
 #include "panonav_simulation/memory_mission.hpp"
 #include "runs/simulated_recording.hpp"
@@ -45,27 +44,15 @@ struct Judgement {
 /// Stores the images that become views, and the map at the end.
 class MemoryWriter {
  public:
-  MemoryWriter(const std::string& path, const PictureSource& source)
-      : memoriser_(path, {.source = source, .map = false}) {}
+  MemoryWriter(const std::string& path, const PictureSource& source) : memory_(path, source) {}
 
   void set_image(const Image& image) { image_ = image; }
-  void add_view() {
-    Observation observation(image_.value());
-    names_.push_back("view_" + std::to_string(names_.size() + 1));
-    observation.name = names_.back();
-    memoriser_.add(std::move(observation));
-  }
-  void finish(const Explorer& explorer, Executor& executor) {
-    static_cast<void>(memoriser_.finish(executor));
-    std::vector<ViewId> ids;
-    for (const std::string& name : names_) ids.push_back(memoriser_.find(name).value());
-    store_map(*memoriser_.file(), explorer.map(ids), LengthUnit::metres);
-  }
+  void add_view() { memory_.add(Observation(image_.value())); }
+  void finish(const Explorer& explorer, Executor& executor) { memory_.finish(explorer, executor); }
 
  private:
-  Memoriser memoriser_;
+  ExplorationMemory memory_;
   std::optional<Image> image_;
-  std::vector<std::string> names_;
 };
 
 simulation::MissionPlace make_place(const simulation::SimulatedWorld& world, MemoryWriter& writer,

@@ -18,9 +18,11 @@ struct Ros2Arguments {
   std::string memory;
   std::optional<int> domain;
   bool teach = false;
+  bool explore = false;
   std::optional<std::string> route;
   PictureArguments pictures;
   ros2::TeacherOptions teacher;
+  ExplorationOptions exploration;
   ros2::LocalisationNodeSetup setup;
 };
 
@@ -101,13 +103,22 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
     const auto [from, to] = ros2::parse_remapping(text);
     arguments.setup.participant.remappings.insert_or_assign(from, to);
   }
-  if (arguments.teach) {
+  if (arguments.teach && arguments.explore) {
+    throw UsageError("--teach and --explore cannot be combined; choose one");
+  }
+  const bool makes_memory = arguments.teach || arguments.explore;
+  if (makes_memory) {
     const auto pictures = make_picture_source(arguments.pictures, session);
     if (!pictures) throw UsageError("set --kind to the type of the images");
     note_default_band(*pictures, elevation_flag, session);
-    arguments.setup.teacher = arguments.teacher;
-    arguments.setup.teacher->pictures = *pictures;
-    arguments.setup.teacher->route = arguments.route;
+    arguments.teacher.pictures = *pictures;
+    arguments.teacher.route = arguments.route;
+  }
+  if (arguments.teach) arguments.setup.teacher = arguments.teacher;
+  if (arguments.explore) {
+    const auto& made = arguments.teacher;
+    arguments.setup.exploration = ros2::ExplorationSetup{made.pictures, arguments.exploration,
+                                                         made.signature, made.preprocessing};
   }
   std::atomic<bool> stopped = false;
   std::atomic<ros2::LocalisationNode*> running = nullptr;
@@ -120,13 +131,13 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
   running = &node;
   if (stopped) return ExitCode::done;
   session.note("panonav ros2: " + arguments.memory +
-               (arguments.teach ? " is being made" : " is loaded") + "; the node is ready");
+               (makes_memory ? " is being made" : " is loaded") + "; the node is ready");
   node.run();
   running = nullptr;
   const auto counts = node.counts();
   session.note(format_count(counts.pictures, "image") + ", localised at " +
                std::to_string(counts.localised) + ", " +
-               (arguments.teach ? format_count(counts.taught, "view") + " stored, " : "") +
+               (makes_memory ? format_count(counts.taught, "view") + " stored, " : "") +
                std::to_string(counts.dropped) + " dropped because of too fast a rate, " +
                format_count(counts.notes, "warning"));
   return ExitCode::done;
@@ -142,6 +153,9 @@ Run declare_ros2(Arguments& arguments) {
   arguments.flag("--teach", values->teach,
                  "Make the new memory file MEMORY from a first drive; the message 'finish' on the "
                  "topic ~/command ends the drive");
+  arguments.flag("--explore", values->explore,
+                 "Make the new memory file MEMORY by an exploration: the message 'explore' on the "
+                 "topic ~/command starts it, and 'cancel' ends it");
   arguments.option("--route NAME", values->route,
                    "With --teach: also record the drive as a route with this name");
   arguments.option("--node-name NAME", setup.participant.node, "Name of the node");
@@ -159,16 +173,22 @@ Run declare_ros2(Arguments& arguments) {
   arguments.options("signature", values->teacher.signature);
   arguments.options("preprocessing", values->teacher.preprocessing);
   arguments.options("ros2", setup.node);
+  arguments.options("exploration", values->exploration);
   arguments.options("monte_carlo", setup.tracker.filter);
   arguments.options("odometry", setup.tracker.odometry.emplace(), "odometry");
   arguments.options("base", setup.navigator.base);
   arguments.reject_options_unless(
-      {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
-       "[signature]", "[preprocessing]"},
-      [values] { return values->teach; }, "without --teach");
+      {"--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg", "[signature]",
+       "[preprocessing]"},
+      [values] { return values->teach || values->explore; }, "without --teach or --explore");
   arguments.reject_options_unless(
-      {"--robot-radius-m"}, [values] { return values->setup.node.camera_height_m > 0.0; },
-      "without --camera-height-m");
+      {"--route"}, [values] { return values->teach; }, "without --teach");
+  arguments.reject_options_unless(
+      {"[exploration]"}, [values] { return values->explore; }, "without --explore");
+  arguments.reject_options_unless(
+      {"--robot-radius-m"},
+      [values] { return values->explore || values->setup.node.camera_height_m > 0.0; },
+      "without --explore or --camera-height-m");
   arguments.show_in_help({"--motion", "--pictures", "--use-sim-time"});
   arguments.hide_from_help(
       {"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
@@ -189,6 +209,7 @@ Verb ros2_verb() {
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
           "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
           "-25 35\n"
+          "  panonav ros2 new.panonav --explore --kind panorama --elevation-deg -30 40\n"
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
           declare_ros2,
           {},

@@ -198,6 +198,18 @@ bool CoverageMap::is_open_between(Point2 from, Point2 to) const noexcept {
   return true;
 }
 
+CoverageMap::Areas CoverageMap::measure_areas() const noexcept {
+  std::size_t floor = 0;
+  std::size_t covered = 0;
+  for (const std::uint8_t flags : flags_) {
+    if ((flags & (blocked_bit | floor_bit)) != floor_bit) continue;
+    ++floor;
+    covered += (flags & covered_bit) != 0 ? 1 : 0;
+  }
+  const double cell_m2 = options_.cell_m * options_.cell_m;
+  return {static_cast<double>(floor) * cell_m2, static_cast<double>(covered) * cell_m2};
+}
+
 double CoverageMap::compute_gain_m2(Point2 position) const {
   std::size_t cells = 0;
   visit_disc(position, options_.radius_m, [&](std::size_t cell) {

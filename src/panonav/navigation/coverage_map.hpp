@@ -63,6 +63,12 @@ class CoverageMap {
     std::vector<Point2> path;  ///< from the robot to `position`, through cells that are not blocked
   };
 
+  /// Areas of the floor on which the robot has room.
+  struct Areas {
+    double floor_m2 = 0.0;    ///< floor that is known
+    double covered_m2 = 0.0;  ///< part of it in the catchment area of a view
+  };
+
   /// Cost: O(cells + length of all lines + area of all catchment areas); some milliseconds for
   /// 100 m2. Throws ContractError on options out of range.
   CoverageMap(const FloorObservations& floor, const CoverageOptions& options);
@@ -76,6 +82,8 @@ class CoverageMap {
   /// True if no blocked cell is on the straight line.
   [[nodiscard]] bool is_open_between(Point2 from, Point2 to) const noexcept;
 
+  /// Measures the areas. Cost: O(cells).
+  [[nodiscard]] Areas measure_areas() const noexcept;
   /// Returns the frontier area in the catchment area of a view at `position`.
   [[nodiscard]] double compute_gain_m2(Point2 position) const;
   /// Finds the position with the largest frontier area for its path length. nullopt if no reachable

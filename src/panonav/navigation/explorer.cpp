@@ -121,8 +121,8 @@ class Explorer::Implementation {
         coverage_.robot_radius_m = assumed_radius_m_;
         map_ = make_map();
       }
-      if (!choose_target() || robot_.travelled_m() >= options_.max_metres)
-        state_ = State::returning;
+      is_complete_ = !choose_target();
+      if (is_complete_ || robot_.travelled_m() >= options_.max_metres) state_ = State::returning;
     }
     const bool is_driving_back = state_ == State::recovering || state_ == State::returning;
     driving_back_ = is_driving_back ? driving_back_ + 1 : 0;
@@ -133,6 +133,15 @@ class Explorer::Implementation {
   }
 
   [[nodiscard]] const ExplorerPose& robot() const noexcept { return robot_; }
+
+  [[nodiscard]] ExplorationProgress progress() const {
+    if (!map_) return {};
+    const CoverageMap::Areas areas = map_->measure_areas();
+    return {.floor_m2 = areas.floor_m2,
+            .covered_m2 = areas.covered_m2,
+            .position_deviation_m = robot_.compute_position_deviation_m(),
+            .is_complete = is_complete_};
+  }
 
  private:
   // A position that moves with the pose of a view when the map is corrected.
@@ -347,6 +356,7 @@ class Explorer::Implementation {
   int contacts_ = 0;                     // on the way to the target
   int driving_back_ = 0;                 // observations since it drives back
   bool is_new_ = false;                  // the first view was just memorised
+  bool is_complete_ = false;             // no view point is left
   Pose2 before_;                         // pose at the last observation
 };
 
@@ -373,6 +383,9 @@ TopologicalMap Explorer::map(std::span<const ViewId> ids) const {
 }
 double Explorer::travelled_m() const noexcept {
   return implementation_->robot().travelled_m();
+}
+ExplorationProgress Explorer::progress() const {
+  return implementation_->progress();
 }
 
 }  // namespace panonav

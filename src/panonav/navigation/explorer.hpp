@@ -69,6 +69,14 @@ struct ExplorationDecision {
 /// Returns "exploring", "recovering", "returning", "done" or "lost".
 [[nodiscard]] std::string_view to_string(ExplorationDecision::State state);
 
+/// Progress of an exploration, by the knowledge of the explorer.
+struct ExplorationProgress {
+  double floor_m2 = 0.0;              ///< floor that was found, on which the robot has room
+  double covered_m2 = 0.0;            ///< part of it in the catchment area of a view
+  double position_deviation_m = 0.0;  ///< of the pose, relative to the views around
+  bool is_complete = false;           ///< nothing is left to explore
+};
+
 /// Leads a robot through an unknown place so that the views that it memorises cover the floor with
 /// their catchment areas [M04 section 1]. Knows images, odometry, contact and ranges, but no true
 /// pose and no map. Each observation is compared with the views around: their home vectors correct
@@ -104,6 +112,9 @@ class Explorer {
   [[nodiscard]] TopologicalMap map(std::span<const ViewId> ids) const;
   /// Returns the length of the path by odometry.
   [[nodiscard]] double travelled_m() const noexcept;
+  /// Returns the progress at the last observation; zeros before the first. Cost: O(cells of the
+  /// map).
+  [[nodiscard]] ExplorationProgress progress() const;
 
  private:
   class Implementation;

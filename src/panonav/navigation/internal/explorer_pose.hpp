@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -44,6 +45,10 @@ class ExplorerPose {
   /// Returns the path length since a view was recognised.
   [[nodiscard]] double unrecognised_m() const noexcept { return unrecognised_m_; }
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
+  /// Returns the standard deviation of the position relative to the views around.
+  [[nodiscard]] double compute_position_deviation_m() const noexcept {
+    return std::sqrt(position_variance_m2_);
+  }
   /// True if the robot is in the catchment radius of a view.
   [[nodiscard]] bool is_near_a_view() const;
   /// Returns the map of the views; see `Explorer::map`.
