@@ -1,4 +1,9 @@
+#include <algorithm>
+#include <cmath>
+
 #include "memories.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/robot_explorer.hpp"
 #include "panonav/pipeline/robot_navigator.hpp"
 
 namespace panonav::python {
@@ -20,6 +25,142 @@ RobotNavigatorOptions make_navigator_options(const std::optional<std::string>& e
   if (route) parsed.options(options.known_route, "route");
   parsed.finish();
   return options;
+}
+
+/// Converts rows of direction_rad and length_m.
+std::vector<ExplorationReport::Range> to_ranges(const py::object& rows, double max_range_m,
+                                                double deviation_m) {
+  std::vector<ExplorationReport::Range> ranges;
+  if (rows.is_none()) return ranges;
+  const auto numbers = to_number_rows(rows, "ranges", 2);
+  const auto values = numbers.unchecked<2>();
+  for (py::ssize_t i = 0; i < values.shape(0); ++i) {
+    require(std::isfinite(values(i, 0)), "direction of a range", values(i, 0), "finite");
+    require(values(i, 1) >= 0.0, "length of a range", values(i, 1), ">= 0");
+    ranges.push_back({values(i, 0), std::min(values(i, 1), max_range_m), values(i, 1) < max_range_m,
+                      deviation_m});
+  }
+  return ranges;
+}
+
+RobotExplorerOptions read_explorer_options(double robot_radius_m, bool has_ranges,
+                                           const py::kwargs& keywords) {
+  RobotExplorerOptions options{.robot_radius_m = robot_radius_m, .has_ranges = has_ranges};
+  Keywords(keywords)
+      .options(options.exploration)
+      .options(options.base)
+      .options(options.odometry, "odometry")
+      .options(options.signature)
+      .options(options.preprocessing)
+      .finish();
+  return options;
+}
+
+void bind_exploration_records(py::module_& m) {
+  Record<ExplorationDecision>(m, "ExplorationDecision", "One decision of an exploring robot.")
+      .field(
+          "state", [](const ExplorationDecision& d) { return to_string(d.state); },
+          "'exploring', 'recovering', 'returning', 'done' or 'lost'.")
+      .field("direction_rad", &ExplorationDecision::direction_rad, "In the current robot frame.")
+      .field("advance_m", &ExplorationDecision::advance_m, "Distance to drive; 0 at the end.")
+      .field("memorise", &ExplorationDecision::memorise, "True if the image became a view.");
+  Record<ExplorationProgress>(m, "ExplorationProgress",
+                              "Progress of an exploration, by its own knowledge.")
+      .field("floor_m2", &ExplorationProgress::floor_m2,
+             "Floor that was found, on which the robot has room.")
+      .field("covered_m2", &ExplorationProgress::covered_m2,
+             "Part of it in the catchment area of a view.")
+      .field("position_deviation_m", &ExplorationProgress::position_deviation_m,
+             "Standard deviation of the position, relative to the views around.")
+      .field("is_complete", &ExplorationProgress::is_complete,
+             "True if nothing is left to explore.");
+  Record<RobotExplorer::Step>(m, "ExplorationStep", "The motion of a robot after an observation.")
+      .field("decision", &RobotExplorer::Step::decision, "The latest decision.")
+      .field("velocity", &RobotExplorer::Step::velocity, "Until the next observation.")
+      .field("decided", &RobotExplorer::Step::decided,
+             "True if this observation caused a decision; otherwise the motion continues.");
+}
+
+using SharedExplorer = Shared<RobotExplorer>;
+
+void bind_explorer_properties(py::class_<SharedExplorer>& type) {
+  type.def_property_readonly(
+          "pose",
+          [](const SharedExplorer& explorer) {
+            return explorer.read([](const RobotExplorer& e) { return e.explorer().pose(); });
+          },
+          "Estimated pose at the last decision, in the frame of the first view.")
+      .def_property_readonly(
+          "views",
+          [](const SharedExplorer& explorer) {
+            return to_pose_rows(explorer.read([](const RobotExplorer& e) {
+              const auto poses = e.explorer().view_poses();
+              return std::vector<Pose2>(poses.begin(), poses.end());
+            }));
+          },
+          "Estimated poses of the views, (n, 3) of x_m, y_m, heading_rad.")
+      .def_property_readonly(
+          "progress",
+          [](const SharedExplorer& explorer) {
+            return explorer.read([](const RobotExplorer& e) { return e.explorer().progress(); });
+          },
+          "Progress, by the knowledge of the robot.")
+      .def_property_readonly(
+          "travelled_m",
+          [](const SharedExplorer& explorer) {
+            return explorer.read([](const RobotExplorer& e) { return e.explorer().travelled_m(); });
+          },
+          "Length of the path by odometry.");
+}
+
+void bind_explorer(py::module_& m) {
+  py::class_<SharedExplorer> type(
+      m, "RobotExplorer",
+      "Drives a robot that makes the memory of an unknown place by itself: "
+      "takes an image with odometry, returns a velocity.");
+  type.def(py::init([](const std::filesystem::path& memory, const PictureSource& source,
+                       double robot_radius_m, bool has_ranges, const py::kwargs& keywords) {
+             return std::make_unique<SharedExplorer>(
+                 memory, source, read_explorer_options(robot_radius_m, has_ranges, keywords));
+           }),
+           py::arg("memory"), py::arg("source"), py::kw_only(), py::arg("robot_radius_m") = 0.2,
+           py::arg("has_ranges") = false,
+           append_option_list(
+               "`memory`: a new file. `robot_radius_m`: radius around the camera that the robot "
+               "needs. `has_ranges`: `step` gets ranges; without them, floor is assumed to be free "
+               "until the robot touches an obstacle.",
+               {options_of<ExplorationOptions>(), options_of<BaseOptions>(),
+                options_of<OdometryNoise>("odometry"), options_of<SignatureOptions>(),
+                options_of<PreprocessingOptions>()})
+               .c_str())
+      .def(
+          "step",
+          [](SharedExplorer& explorer, const py::object& observation,
+             std::optional<double> contact_rad, const py::object& ranges, double max_range_m,
+             double range_deviation_m) {
+            const Observation seen = to_observation(observation);
+            const auto measured = to_ranges(ranges, max_range_m, range_deviation_m);
+            return explorer.change([&](RobotExplorer& e) {
+              return e.step(seen, {contact_rad, measured});
+            });
+          },
+          py::arg("observation"), py::arg("contact_rad") = py::none(),
+          py::arg("ranges") = py::none(), py::kw_only(), py::arg("max_range_m") = 3.0,
+          py::arg("range_deviation_m") = 0.02,
+          "Call it for each image, which needs odometry; its true pose is not used. `contact_rad`: "
+          "direction, in the robot frame, in which the robot touches an obstacle. `ranges`: (n, 2) "
+          "of direction_rad, length_m; from `max_range_m` on there is no obstacle.")
+      .def(
+          "finish",
+          [](SharedExplorer& explorer) {
+            explorer.change([](RobotExplorer& e) {
+              e.finish();
+              return 0;
+            });
+          },
+          "Writes all views and their map; call it at the end, also of an interrupted "
+          "exploration.");
+  bind_explorer_properties(type);
 }
 
 }  // namespace
@@ -141,6 +282,8 @@ void bind_navigation(py::module_& m) {
             });
           },
           "Edges as pairs of views.");
+  bind_exploration_records(m);
+  bind_explorer(m);
 }
 
 }  // namespace panonav::python

@@ -118,6 +118,52 @@ def test_navigator(office):
         navigator.step(numpy.zeros((8, 16), numpy.uint8), obstacle=True)
 
 
+def test_an_explorer_makes_the_memory_of_a_simulated_robot(tmp_path):
+    memory = tmp_path / "explored.panonav"
+    world = panonav.SimulatedWorld("office", **SMALL)
+    robot = panonav.SimulatedRobot(world, (*world.tour[0], 0.0), seed=3)
+    start = robot.pose
+    directions = [math.pi / 4 * i for i in range(8)]
+
+    def measure():
+        """Free length for the robot's centre in each direction, and its radius."""
+        x, y, heading = robot.pose.x_m, robot.pose.y_m, robot.pose.heading_rad
+        for direction in directions:
+            length = 0.0
+            while length < 2.5 and world.is_free((x + length * math.cos(heading + direction),
+                                                  y + length * math.sin(heading + direction))):
+                length += 0.05
+            yield direction, length + world.robot_radius_m if length < 2.5 else math.inf
+
+    explorer = panonav.RobotExplorer(memory, world.source, robot_radius_m=world.robot_radius_m, has_ranges=True,
+                                     radius_m=0.4, max_metres=7)
+    clear, states, views = True, [], []
+    while not states or states[-1] not in ("done", "lost"):
+        step = explorer.step(robot.observe(), None if clear else 0.0, list(measure()))
+        states.append(step.decision.state)
+        if step.decided and step.decision.memorise:
+            views.append(robot.pose)
+        clear = robot.drive(step.velocity.forward_m_s, step.velocity.turn_rad_s, 0.1)
+        assert len(states) < 3000
+    assert states[0] == "exploring" and states[-1] == "done" and step.velocity.to_dict()["forward_m_s"] == 0
+    assert math.dist((robot.pose.x_m, robot.pose.y_m), (start.x_m, start.y_m)) < 0.3
+    assert 7 <= explorer.travelled_m < 20 and explorer.views.shape == (len(views), 3) and len(views) >= 8
+    progress = explorer.progress
+    assert not progress.is_complete and 0 < progress.covered_m2 < progress.floor_m2
+    assert math.dist((start.x_m + explorer.pose.x_m, start.y_m + explorer.pose.y_m),
+                     (robot.pose.x_m, robot.pose.y_m)) < 0.3
+    explorer.finish()
+    file = panonav.MemoryFile(memory)
+    assert file.names() == [f"view_{i + 1}" for i in range(len(views))]
+    assert panonav.PlaceRecogniser(memory).localise(robot.observe()).position is not None
+    for wrong in (lambda: panonav.RobotExplorer(memory, world.source),
+                  lambda: panonav.RobotExplorer(tmp_path / "x", world.source, radius=1),
+                  lambda: explorer.step(numpy.zeros((32, 128), numpy.uint8)),
+                  lambda: explorer.step(robot.observe(), ranges=[[math.nan, 1]])):
+        with pytest.raises(panonav.Error):
+            wrong()
+
+
 def test_calibration_finds_the_mirror(tmp_path):
     world = panonav.SimulatedWorld("office")
     picture = world.capture_image(world.random_pose(1))
