@@ -8,6 +8,7 @@
 #include <set>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav_simulation/mirror.hpp"
