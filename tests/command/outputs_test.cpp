@@ -97,6 +97,7 @@ TEST_F(Outputs, EveryFlagOfEveryVerbIsEitherReadOrGuarded) {
       {"map", {"m.panonav", "run"}},
       {"arrange", {"m.panonav"}},
       {"home", {"run", "run"}},
+      {"home learn", {"m.panonav", "run"}},
       {"route record", {"m.panonav", "run"}},
       {"route follow", {"m.panonav", "run"}},
       {"navigate", {"m.panonav", "--goal", "1", "--scene", "office"}},
