@@ -120,7 +120,7 @@ LocalLayout ReferenceLayout::around(const FloorPosition& there,
   const auto within = [&](double spacings) {
     const auto end = std::ranges::upper_bound(near, (1.0 + rounding_share) * spacings * spacing_m_,
                                               {}, [&](Point2 p) { return distance(p, position); });
-    return std::span(near.begin(), end);
+    return std::span(near).first(static_cast<std::size_t>(end - near.begin()));
   };
   if (count_apart(near, min_apart_spacings * spacing_m_) >= min_area_views) {
     const bool is_inside = is_surrounded(position, within(max_neighbour_spacings));
