@@ -209,7 +209,7 @@ Verb ros2_verb() {
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
           "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
           "-25 35\n"
-          "  panonav ros2 new.panonav --explore --kind panorama --elevation-deg -30 40\n"
+          "  panonav ros2 new.panonav --explore --kind mirror --camera mirror.toml\n"
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
           declare_ros2,
           {},
