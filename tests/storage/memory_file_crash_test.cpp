@@ -1,5 +1,6 @@
 // Memory files whose writer dies or whose disk is full.
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -52,6 +53,10 @@ TEST_F(MemoryFileCrash, EveryAcknowledgedViewSurvivesAKill) {
     });
     ASSERT_GT(child, 0);
     ::close(ends[1]);
+    if (round % 2 == 0) {  // on any machine, half of the kills come after the first append
+      pollfd appended{ends[0], POLLIN, 0};
+      ASSERT_EQ(::poll(&appended, 1, -1), 1);
+    }
     std::this_thread::sleep_for(std::chrono::microseconds(random.index(60000)));
     ASSERT_EQ(::kill(child, SIGKILL), 0);
     int status = 0;
@@ -80,8 +85,8 @@ TEST_F(MemoryFileCrash, EveryAcknowledgedViewSurvivesAKill) {
     // At most the one view that was written but not acknowledged is there besides.
     ASSERT_LE(memory.size(), acknowledged.size() + 1);
   }
-  EXPECT_GE(kills_while_appending, kills / 4) << "most kills came before the first append";
-  EXPECT_GT(acknowledged.size(), 50U);
+  EXPECT_GE(kills_while_appending, kills / 2);
+  EXPECT_GE(acknowledged.size(), static_cast<std::size_t>(kills / 2));
 }
 
 // Appends views from the number on in a process that ends without closing the file.
