@@ -319,7 +319,9 @@ FloorScanner::Alignment FloorScanner::align(const Frame& reference) const {
 void FloorScanner::add_evidence(const Frame& reference, const std::vector<float>& gradients,
                                 double weight, Evidence& evidence) const {
   const Frame& frame = frames_.back();
-  const auto [pose, noise] = align(reference);
+  const Alignment alignment = align(reference);
+  const Pose2 pose = alignment.reference_from_robot;
+  const double noise = alignment.noise;
   const auto noise2 = static_cast<float>(noise * noise);
   const auto compare = [&](int y, int x, double row, double column) {
     const float difference = frame.values[index(y, x)] - sample(reference, row, column);
