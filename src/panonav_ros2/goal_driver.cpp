@@ -60,6 +60,8 @@ void GoalDriver::start(const Mission& mission) {
 }
 
 void GoalDriver::begin() {
+  velocity_ = {};
+  is_obstructed_ = false;
   const std::lock_guard lock(mutex_);
   has_mission_ = true;
   last_command_ = Steady::now();
@@ -153,8 +155,17 @@ void GoalDriver::set_goal(Point2 goal) {
   }
 }
 
+void GoalDriver::report_contact(Point2 contact) {
+  // A robot in contact that rotates, or drives away, is not obstructed.
+  is_obstructed_ |= velocity_.forward_m_s * contact.x_m + velocity_.left_m_s * contact.y_m > 0.0;
+}
+
 void GoalDriver::drive(const Observation& observation, const std::optional<Pose2>& pose) {
   if (!has_mission()) return;
+  if (is_obstructed_ && !mission_.goal) {
+    end("an obstacle is on the route", error);
+    return;
+  }
   if (chain_driver_) {
     drive_along_chain(observation);
     return;
@@ -168,7 +179,7 @@ void GoalDriver::drive(const Observation& observation, const std::optional<Pose2
 }
 
 void GoalDriver::drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose) {
-  RobotReport report;
+  RobotReport report{.obstacle = std::exchange(is_obstructed_, false)};
   if (pose) report.estimate = memory_->tracker.find_nearest_view(pose->position());
   const RobotNavigator::Step step = navigator_->step(observation, report);
   const NavigationDecision& decision = step.decision;
@@ -218,6 +229,7 @@ void GoalDriver::drive_along_chain(const Observation& observation) {
 }
 
 void GoalDriver::send(const Velocity& velocity) {
+  velocity_ = velocity;
   const std::lock_guard lock(mutex_);
   velocities_.publish(
       {{velocity.forward_m_s, velocity.left_m_s, 0.0}, {0.0, 0.0, velocity.turn_rad_s}});

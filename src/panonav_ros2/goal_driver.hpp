@@ -40,6 +40,9 @@ class GoalDriver {
 
   /// Starts a mission and ends the previous one. Reports it and throws Error if there is no path.
   void start(const Mission& mission);
+  /// Reports that the robot touches an obstacle at a point in the base frame. If it was driving
+  /// towards that point, the next `drive` plans another path to a goal, or ends a route.
+  void report_contact(Point2 contact);
   /// Sends the velocity for this image if there is a mission. `pose` is the camera's pose in the
   /// map, `nullopt` if the robot is not localised.
   void drive(const Observation& observation, const std::optional<Pose2>& pose);
@@ -97,6 +100,8 @@ class GoalDriver {
   std::optional<RouteDriver> route_driver_;
   std::optional<ChainDriver> chain_driver_;
   std::optional<RobotExplorer> explorer_;
+  Velocity velocity_ = {};      // the last one sent
+  bool is_obstructed_ = false;  // by an obstacle in its direction
 
   mutable std::mutex mutex_;  // guards the following members and the order of velocities
   bool has_mission_ = false;

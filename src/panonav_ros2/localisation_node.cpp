@@ -31,6 +31,7 @@ struct LocalisationNode::Implementation {
         log(std::move(note)),
         participant(setup.participant, [this](const std::string& line) { log.warn("qos", line); }),
         sensors(participant, setup.node, setup.frames, log, motion, queue),
+        obstacles(participant, setup.frames, log, motion),
         driver(participant, setup, log, motion, [this] { return sensors.now_ns(); }),
         localiser(participant, setup, motion, driver, [this] { return sensors.now_ns(); }),
         transforms(participant, "/tf", {.depth = 100}),
@@ -42,7 +43,6 @@ struct LocalisationNode::Implementation {
       if (memory_exists(setup.memory)) {
         throw FileError(setup.memory.string(), "exists; allowed for an exploration: a new file");
       }
-      obstacles.emplace(participant, setup.frames, log, motion);
       is_memory_unexplored = true;
     } else {
       localiser.load(setup.memory);
@@ -50,8 +50,9 @@ struct LocalisationNode::Implementation {
     }
     if (setup.node.camera_height_m > 0.0) {
       floor_scan.emplace(participant, setup.node,
-                         setup.teacher
-                             ? setup.teacher->pictures
+                         setup.teacher ? setup.teacher->pictures
+                         : setup.exploration
+                             ? setup.exploration->pictures
                              : MemoryFile::open(setup.memory, Access::read_only).header().source);
     }
     subscribe_to_requests();
@@ -170,6 +171,7 @@ struct LocalisationNode::Implementation {
     } else if (is_memory_unexplored) {
       moment = explore(observation, stamp_ns);
     } else {
+      if (const auto contact = obstacles.take_contact()) driver.report_contact(*contact);
       moment = localiser.localise(std::move(observation), stamp_ns, *moved);
       if (moment.sure && moment.pose) ++localised;
       const std::chrono::duration<double, std::milli> delay = Steady::now() - arrival_time;
@@ -201,7 +203,7 @@ struct LocalisationNode::Implementation {
       return moment;
     }
     const auto sensed =
-        obstacles->take(stamp_ns, observation.odometry.value(), setup.node.base_from_camera());
+        obstacles.take(stamp_ns, observation.odometry.value(), setup.node.base_from_camera());
     driver.explore(observation, {sensed.contact_rad, sensed.ranges});
     const RobotExplorer& robot = *driver.explorer();
     taught = robot.explorer().view_poses().size();
@@ -227,7 +229,7 @@ struct LocalisationNode::Implementation {
       } else if (teacher) {
         reject_command(words, "finish, because the memory is being made");
       } else if (is_memory_unexplored && command == "explore") {
-        driver.start_exploration(obstacles->has_scan());
+        driver.start_exploration(obstacles.has_scan());
       } else if (is_memory_unexplored) {
         reject_command(words, "explore, cancel, because the memory is being made");
       } else if (command == "relocalise") {
@@ -287,13 +289,13 @@ struct LocalisationNode::Implementation {
   WorkQueue queue;
   Participant participant;
   SensorTopics sensors;
+  ObstacleTopics obstacles;
   GoalDriver driver;
   MemoryLocaliser localiser;
   Publisher<recordings::ros::TFMessage> transforms;
   Publisher<recordings::ros::DiagnosticArray> diagnostics;
   Publisher<recordings::ros::String> answers;
   std::optional<FloorScanTopic> floor_scan;  // only by the worker thread
-  std::optional<ObstacleTopics> obstacles;
   bool is_memory_unexplored = false;  // an exploration makes it; only used by the worker thread
   std::optional<Teacher> teacher;     // used instead of the localiser; only by the worker thread
   std::atomic<std::size_t> pictures = 0, localised = 0, taught = 0;

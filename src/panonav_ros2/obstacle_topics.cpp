@@ -88,6 +88,11 @@ void ObstacleTopics::receive(const recordings::ros::PointStamped& message) {
   contact_ = Point2{at.position.x, at.position.y};
 }
 
+std::optional<Point2> ObstacleTopics::take_contact() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(contact_, std::nullopt);
+}
+
 bool ObstacleTopics::has_scan() const {
   const std::lock_guard lock(mutex_);
   return scan_.has_value();
@@ -96,13 +101,13 @@ bool ObstacleTopics::has_scan() const {
 ObstacleTopics::Sensed ObstacleTopics::take(std::int64_t stamp_ns, const Pose2& path_from_camera,
                                             const Pose2& base_from_camera) {
   Sensed sensed;
+  if (const auto contact = take_contact()) {
+    const Point2 there = inverse(base_from_camera) * *contact;
+    sensed.contact_rad = std::atan2(there.y_m, there.x_m);
+  }
   std::optional<Scan> scan;
   {
     const std::lock_guard lock(mutex_);
-    if (const auto contact = std::exchange(contact_, std::nullopt)) {
-      const Point2 there = inverse(base_from_camera) * *contact;
-      sensed.contact_rad = std::atan2(there.y_m, there.x_m);
-    }
     if (scan_ && std::abs(scan_->stamp_ns - stamp_ns) <= max_age_ns) scan = scan_;
   }
   const auto moved = scan ? motion_.wait_for(scan->stamp_ns) : std::nullopt;

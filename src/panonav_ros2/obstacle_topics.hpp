@@ -20,6 +20,10 @@ class ObstacleTopics {
   ObstacleTopics(Participant& participant, const FrameNames& frames, WarningLog& log,
                  RobotMotion& motion);
 
+  /// Returns the contact since the last call of this or `take`, in the base frame. May be called
+  /// from any thread.
+  [[nodiscard]] std::optional<Point2> take_contact();
+
   /// True if a scan was received. May be called from any thread.
   [[nodiscard]] bool has_scan() const;
 

@@ -195,6 +195,7 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   start(setup);
   auto& velocity = peer_.talk<recordings::ros::Twist>("cmd_vel");
   auto& set_pose = peer_.talk<recordings::ros::PoseStamped>("set_pose");
+  auto& contact = peer_.talk<recordings::ros::PointStamped>("contact");
   auto& truth = peer_.listen<recordings::ros::PoseStamped>("ground_truth", false);
   auto& result = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/result");
   ASSERT_TRUE(peer_.all_matched(10s));
@@ -231,6 +232,17 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   EXPECT_EQ(ask("repeat drive"), "repeat done");
   EXPECT_TRUE(arrives());
   EXPECT_FALSE(fs::exists(mission));
+
+  // One that touches something stops there.
+  carried_back();
+  EXPECT_EQ(ask("repeat drive"), "repeat done");
+  ASSERT_TRUE(comes_true([&] { return robot_is().x_m > 1.3; }));
+  FastPeer::write(contact, recordings::ros::PointStamped{{0, "base_link"}, {0.2, 0.0, 0.0}});
+  const auto obstructed = FastPeer::next(result, 10s);
+  ASSERT_FALSE(obstructed.empty());
+  EXPECT_EQ(read<recordings::ros::DiagnosticArray>(obstructed).status.at(0).message,
+            "an obstacle is on the route");
+  EXPECT_LT(robot_is().x_m, 2.0);
 
   // A chain of snapshots leads back to where it began; a route panorama does not.
   EXPECT_EQ(ask("return drive").find("refused: "), 0U);
@@ -285,8 +297,9 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
 TEST_F(LocalisationNodeOnTheWire, ExploresAndIsLocalisedInWhatItMadeOrStopsWhereItIsToldTo) {
   std::optional<DrivenRobot> robot;
   robot.emplace(world_, picture, 6.0);
-  LocalisationNodeSetup setup{.memory = *folder_ / "explored.panonav",
-                              .node = {.use_sim_time = true}};
+  LocalisationNodeSetup setup{
+      .memory = *folder_ / "explored.panonav",
+      .node = {.use_sim_time = true, .camera_height_m = testing::ToyWorld::camera_height_m}};
   setup.navigator.base.speed_m_s = 0.5;
   setup.exploration = ExplorationSetup{source(), {.radius_m = 0.4, .max_metres = 6.0}, {}, {}};
   start(setup);
