@@ -11,7 +11,7 @@
 namespace panonav::kernels {
 namespace {
 
-std::vector<std::uint8_t> random_bytes(Random& random, std::size_t count) {
+std::vector<std::uint8_t> random_octets(Random& random, std::size_t count) {
   std::vector<std::uint8_t> bytes(count);
   for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random.next());
   return bytes;
@@ -33,8 +33,8 @@ TEST_P(Distance, MaskedL1IsTheSumOfDifferencesForEveryLengthAndOffset) {
   Random random(11);
   for (std::size_t count = 0; count <= 300; ++count) {
     const std::size_t offset = random.index(64);
-    const auto a = random_bytes(random, count + offset);
-    const auto b = random_bytes(random, count + offset);
+    const auto a = random_octets(random, count + offset);
+    const auto b = random_octets(random, count + offset);
     const auto mask = random_mask(random, count + offset);
     std::uint32_t expected = 0;
     for (std::size_t i = offset; i < offset + count; ++i) {
@@ -68,8 +68,8 @@ struct SketchCase {
 SketchCase random_case(Random& random, std::size_t octets, std::size_t groups,
                        std::size_t stored_groups) {
   SketchCase made;
-  made.sketches = random_bytes(random, octets * stored_groups * 64);
-  made.values = random_bytes(random, stored_groups * 8);
+  made.sketches = random_octets(random, octets * stored_groups * 64);
+  made.values = random_octets(random, stored_groups * 8);
   made.mask = random_mask(random, stored_groups * 8);
   for (std::size_t i = 0; i < made.values.size(); ++i) made.values[i] &= made.mask[i];
   for (std::size_t i = 0; i < stored_groups; ++i) made.steps.push_back(1 + random.index(200));
@@ -116,8 +116,8 @@ TEST_P(Distance, CellBoundsFollowTheirDefinition) {
   Random random(14);
   for (const std::size_t pairs : {1U, 2U, 7U, 16U, 100U}) {
     const std::size_t blocks = 1 + random.index(5);
-    const auto codes = random_bytes(random, blocks * pairs * cell_block);
-    auto tables = random_bytes(random, pairs * 32);
+    const auto codes = random_octets(random, blocks * pairs * cell_block);
+    auto tables = random_octets(random, pairs * 32);
     for (auto& entry : tables) entry = static_cast<std::uint8_t>(entry / (2 * pairs));
     if (pairs == 100) std::ranges::fill(tables, 255);  // more than a byte holds
     std::vector<std::uint8_t> expected;

@@ -12,14 +12,12 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double radius_m = 4.0;
-
 HomingView seen(const ToyWorld& room, const Pose2& pose) {
   return homing_view(round_room_signature(room, pose));
 }
 
 TEST(AzimuthFlow, ATurnOnTheSpotIsATurnAndNothingElse) {
-  const ToyWorld room = round_room(radius_m, 1);
+  const ToyWorld room = round_room(round_room_radius_m, 1);
   for (const double turn : {-0.2, 0.0, 0.1}) {
     const auto flow =
         refine_flow(seen(room, {0.5, 0.2, 0.3}), seen(room, {0.5, 0.2, 0.3 + turn}), {}, 4);
@@ -45,7 +43,7 @@ TEST(AzimuthFlow, TheSecondHarmonicIsTheNearerSide) {
 // Along a wall, near it: without the correction every step looks like a turn to the same side.
 TEST(AzimuthFlow, AlongAWallTurnsAreRight) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const ToyWorld room = round_room(radius_m, seed);
+    const ToyWorld room = round_room(round_room_radius_m, seed);
     double with = 0.0;
     double without = 0.0;
     constexpr int steps = 20;

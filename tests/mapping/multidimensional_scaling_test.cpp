@@ -11,7 +11,7 @@
 namespace panonav {
 namespace {
 
-std::vector<Point2> random_points(std::size_t count, std::uint64_t seed) {
+std::vector<Point2> random_points_in_room(std::size_t count, std::uint64_t seed) {
   Random random(seed);
   std::vector<Point2> points(count);
   for (Point2& point : points) point = {random.uniform(0.0, 5.0), random.uniform(0.0, 3.0)};
@@ -28,7 +28,7 @@ std::vector<double> distances_between(const std::vector<Point2>& points,
 }
 
 TEST(MultidimensionalScaling, TrueDistancesGiveTheTrueShape) {
-  const auto points = random_points(40, 1);
+  const auto points = random_points_in_room(40, 1);
   std::vector<std::size_t> all(points.size());
   std::iota(all.begin(), all.end(), 0U);
   for (const auto& landmarks : {all, std::vector<std::size_t>{3, 17, 20, 31}}) {

@@ -15,14 +15,13 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double radius_m = 4.0;
-constexpr int round = 110;  // views
+constexpr int views_in_round = 110;
 
 // A round of 10 m, looking ahead, with a view every 9 cm.
 std::vector<Pose2> drive(int first, int views, double round_radius_m) {
   std::vector<Pose2> poses;
   for (int i = first; i < first + views; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / round;
+    const double angle = 2.0 * std::numbers::pi * i / views_in_round;
     poses.push_back(
         {round_radius_m * std::sin(angle), -round_radius_m * std::cos(angle), wrap_angle(angle)});
   }
@@ -56,7 +55,7 @@ void expect_near(const Pose2& found, const Pose2& truth, double within_m, double
 }
 
 TEST(AlignSessions, FindsHowTwoDrivesInOneRoomLieAndJoinsTheirMaps) {
-  const ToyWorld world = round_room(radius_m, 5);
+  const ToyWorld world = round_room(round_room_radius_m, 5);
   const auto first_truth = drive(0, 110, 1.6);
   const auto second_truth = drive(40, 110, 1.7);
   Sessions sessions;
@@ -94,15 +93,17 @@ TEST(AlignSessions, FindsHowTwoDrivesInOneRoomLieAndJoinsTheirMaps) {
 TEST(AlignSessions, AnotherRoomHasNoPlaceInCommon) {
   for (const std::uint64_t seed : {6, 7, 8, 9}) {
     Sessions sessions;
-    const TopologicalMap first = sessions.add(round_room(radius_m, 5), drive(0, 110, 1.6));
-    const TopologicalMap second = sessions.add(round_room(radius_m, seed), drive(0, 110, 1.6));
+    const TopologicalMap first =
+        sessions.add(round_room(round_room_radius_m, 5), drive(0, 110, 1.6));
+    const TopologicalMap second =
+        sessions.add(round_room(round_room_radius_m, seed), drive(0, 110, 1.6));
     EXPECT_FALSE(align_sessions(sessions.memory, first, second)) << seed;
   }
 }
 
 TEST(AlignSessions, ViewsOfBothSessionsArePlacesInCommon) {
   Sessions sessions;
-  const TopologicalMap first = sessions.add(round_room(radius_m, 5), drive(0, 110, 1.6));
+  const TopologicalMap first = sessions.add(round_room(round_room_radius_m, 5), drive(0, 110, 1.6));
   TopologicalMap second = first;
   const Pose2 moved{3.0, -1.0, 2.0};
   for (TopologicalMap::Node& node : second.nodes) node.pose = moved * node.pose;
@@ -117,7 +118,7 @@ TEST(AlignSessions, ViewsOfBothSessionsArePlacesInCommon) {
 
 TEST(AlignSessions, NothingIsAlignedWithNothing) {
   Sessions sessions;
-  const TopologicalMap first = sessions.add(round_room(radius_m, 5), drive(0, 20, 1.6));
+  const TopologicalMap first = sessions.add(round_room(round_room_radius_m, 5), drive(0, 20, 1.6));
   EXPECT_FALSE(align_sessions(sessions.memory, first, {}));
   EXPECT_FALSE(align_sessions(sessions.memory, {}, first));
   TopologicalMap foreign = first;

@@ -15,17 +15,11 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double radius_m = 4.0;
-
-VisualMemory empty_memory() {
-  return {round_room_shape, 0.1F, std::nullopt};
-}
-
 enum class Known { positions, links };
 
 // A straight way with a view every 2 cm, at random headings.
 VisualMemory along_a_line(const ToyWorld& room, int views, Known known) {
-  VisualMemory memory = empty_memory();
+  VisualMemory memory = empty_round_room_memory();
   Random random(3);
   std::optional<ViewId> before;
   for (int i = 0; i < views; ++i) {
@@ -44,7 +38,7 @@ double difference_of(const VisualMemory& memory, ViewId a, ViewId b) {
 }
 
 TEST(SparseMemory, EveryDroppedViewHasOneThatStandsForIt) {
-  const ToyWorld room = round_room(radius_m, 1);
+  const ToyWorld room = round_room(round_room_radius_m, 1);
   for (const Known known : {Known::positions, Known::links}) {
     const auto memory = along_a_line(room, 100, known);
     const SparseMemoryOptions options{.max_difference = 0.05};
@@ -64,7 +58,7 @@ TEST(SparseMemory, EveryDroppedViewHasOneThatStandsForIt) {
 }
 
 TEST(SparseMemory, MoreLossKeepsLess) {
-  const auto memory = along_a_line(round_room(radius_m, 2), 100, Known::positions);
+  const auto memory = along_a_line(round_room(round_room_radius_m, 2), 100, Known::positions);
   std::size_t before = memory.size() + 1;
   double loss_before = -1.0;
   for (const double difference : {0.0, 0.02, 0.08, 0.3}) {
@@ -83,8 +77,8 @@ TEST(SparseMemory, MoreLossKeepsLess) {
 }
 
 TEST(SparseMemory, FarPlacesThatLookAlikeAreKept) {
-  const ToyWorld room = round_room(radius_m, 3);
-  VisualMemory memory = empty_memory();
+  const ToyWorld room = round_room(round_room_radius_m, 3);
+  VisualMemory memory = empty_round_room_memory();
   const auto view = round_room_signature(room, {});
   memory.append(view, {.name = "here", .pose = ReferencePose{0.0, 0.0, {}}});
   memory.append(view, {.name = "there", .pose = ReferencePose{5.0, 0.0, {}}});
@@ -95,9 +89,9 @@ TEST(SparseMemory, FarPlacesThatLookAlikeAreKept) {
 }
 
 TEST(SparseMemory, NewerViewsReplaceOutdatedOnes) {
-  const ToyWorld before = round_room(radius_m, 4);
-  const ToyWorld after = round_room(radius_m, 5);  // everything looks different now
-  VisualMemory memory = empty_memory();
+  const ToyWorld before = round_room(round_room_radius_m, 4);
+  const ToyWorld after = round_room(round_room_radius_m, 5);  // everything looks different now
+  VisualMemory memory = empty_round_room_memory();
   for (int i = 0; i < 5; ++i) {
     const Pose2 pose{0.5 * i, 0.0, 0.0};
     memory.append(round_room_signature(before, pose),
@@ -120,7 +114,7 @@ TEST(SparseMemory, NewerViewsReplaceOutdatedOnes) {
 }
 
 TEST(SparseMemory, WhatWasConnectedStaysConnected) {
-  const auto memory = along_a_line(round_room(radius_m, 7), 60, Known::links);
+  const auto memory = along_a_line(round_room(round_room_radius_m, 7), 60, Known::links);
   const auto selection = select_references(memory, {.max_difference = 0.1});
   ASSERT_GT(selection.redundant.size(), 20U);
   TopologicalMap map;
@@ -149,10 +143,10 @@ TEST(SparseMemory, WhatWasConnectedStaysConnected) {
 }
 
 TEST(SparseMemory, DegenerateMemories) {
-  VisualMemory memory = empty_memory();
+  VisualMemory memory = empty_round_room_memory();
   EXPECT_TRUE(select_references(memory).kept.empty());
   EXPECT_EQ(measure_loss(memory, {}).queries, 0U);
-  const ToyWorld room = round_room(radius_m, 6);
+  const ToyWorld room = round_room(round_room_radius_m, 6);
   const auto view = round_room_signature(room, {});
   memory.append(view, {.name = "one"});
   EXPECT_EQ(select_references(memory).kept.size(), 1U);

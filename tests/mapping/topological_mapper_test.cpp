@@ -17,17 +17,12 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double radius_m = 4.0;
-constexpr int round = 110;  // views
-const VisualOdometryOptions in_metres{.scale_m = radius_m};
-
-VisualMemory empty_memory() {
-  return {round_room_shape, 0.1F, std::nullopt};
-}
+constexpr int views_of_round = 110;
+const VisualOdometryOptions in_metres{.scale_m = round_room_radius_m};
 
 /// A mapper with the memory that it looks at.
 struct Mapping {
-  VisualMemory memory = empty_memory();
+  VisualMemory memory = empty_round_room_memory();
   TopologicalMapper mapper;
   explicit Mapping(const MappingOptions& options = {}) : mapper(memory, options, in_metres) {}
 
@@ -43,7 +38,7 @@ struct Mapping {
 std::vector<Pose2> rounds(int views) {
   std::vector<Pose2> poses;
   for (int i = 0; i < views; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / round;
+    const double angle = 2.0 * std::numbers::pi * i / views_of_round;
     poses.push_back({1.6 * std::sin(angle), -1.6 * std::cos(angle), wrap_angle(angle)});
   }
   return poses;
@@ -61,8 +56,8 @@ FourierSignature empty_view() {
 }
 
 TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
-  const ToyWorld world = round_room(radius_m, 5);
-  const auto truth = rounds(round + 40);
+  const ToyWorld world = round_room(round_room_radius_m, 5);
+  const auto truth = rounds(views_of_round + 40);
   Mapping open({.close_loops = false});
   Mapping closed;
   std::size_t closures = 0;
@@ -90,8 +85,8 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
 }
 
 TEST(TopologicalMapper, ClosesTheLoopOfADriveThatEndsWhereItBegan) {
-  const ToyWorld world = round_room(radius_m, 5);
-  const auto truth = rounds(round + 1);
+  const ToyWorld world = round_room(round_room_radius_m, 5);
+  const auto truth = rounds(views_of_round + 1);
   Mapping open({.close_loops = false});
   Mapping closed;
   for (const Pose2& pose : truth) {
@@ -109,8 +104,8 @@ TEST(TopologicalMapper, ClosesTheLoopOfADriveThatEndsWhereItBegan) {
 }
 
 TEST(TopologicalMapper, WheelsSetTheScale) {
-  const ToyWorld world = round_room(radius_m, 6);
-  const auto truth = rounds(round + 20);
+  const ToyWorld world = round_room(round_room_radius_m, 6);
+  const auto truth = rounds(views_of_round + 20);
   Mapping mapping;
   for (std::size_t i = 0; i < truth.size(); ++i) {
     mapping.add(round_room_signature(world, truth[i]),
@@ -132,8 +127,8 @@ std::vector<Pose2> poses_with_wheels(std::span<const FourierSignature> views,
 }
 
 TEST(TopologicalMapper, FollowsTheWheelsWhereTheTurnsOfTheViewsDrift) {
-  const ToyWorld world = round_room(radius_m, 12);
-  const auto truth = rounds(round);
+  const ToyWorld world = round_room(round_room_radius_m, 12);
+  const auto truth = rounds(views_of_round);
   std::vector<FourierSignature> views;
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const Pose2 drifted = truth[i] * Pose2{0.0, 0.0, 0.01 * static_cast<double>(i)};
@@ -144,8 +139,8 @@ TEST(TopologicalMapper, FollowsTheWheelsWhereTheTurnsOfTheViewsDrift) {
 }
 
 TEST(TopologicalMapper, ClosuresAndViewsCorrectTheWheels) {
-  const ToyWorld world = round_room(radius_m, 13);
-  const auto truth = rounds(2 * round);
+  const ToyWorld world = round_room(round_room_radius_m, 13);
+  const auto truth = rounds(2 * views_of_round);
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     Random random(seed);
     std::vector<Pose2> alone{Pose2{}};
@@ -164,8 +159,8 @@ TEST(TopologicalMapper, ClosuresAndViewsCorrectTheWheels) {
 }
 
 TEST(TopologicalMapper, RefusesClosuresThatTheWheelsRuleOut) {
-  const ToyWorld world = round_room(radius_m, 14);
-  const auto truth = rounds(2 * round);
+  const ToyWorld world = round_room(round_room_radius_m, 14);
+  const auto truth = rounds(2 * views_of_round);
   const auto count_closures_with = [&](const Pose2& error) {
     Mapping mapping;
     std::size_t closures = 0;
@@ -178,15 +173,15 @@ TEST(TopologicalMapper, RefusesClosuresThatTheWheelsRuleOut) {
   };
   EXPECT_GT(count_closures_with({}), 5U);
   // Wheels that drive along a line: the second round is at another place that looks the same.
-  const Pose2 straight{0.0, 0.0, -2.0 * std::numbers::pi / round};
+  const Pose2 straight{0.0, 0.0, -2.0 * std::numbers::pi / views_of_round};
   EXPECT_EQ(count_closures_with(straight), 0U);
 }
 
 TEST(TopologicalMapper, SameViewsGiveTheSameBits) {
-  const ToyWorld world = round_room(radius_m, 7);
+  const ToyWorld world = round_room(round_room_radius_m, 7);
   Mapping one;
   Mapping two;
-  for (const Pose2& pose : rounds(round + 20)) {
+  for (const Pose2& pose : rounds(views_of_round + 20)) {
     one.add(round_room_signature(world, pose));
     two.add(round_room_signature(world, pose));
   }
@@ -194,7 +189,7 @@ TEST(TopologicalMapper, SameViewsGiveTheSameBits) {
 }
 
 TEST(TopologicalMapper, OneViewTwoViews) {
-  const ToyWorld world = round_room(radius_m, 8);
+  const ToyWorld world = round_room(round_room_radius_m, 8);
   Mapping mapping;
   mapping.mapper.finish();
   EXPECT_TRUE(mapping.mapper.map().nodes.empty());
@@ -207,7 +202,7 @@ TEST(TopologicalMapper, OneViewTwoViews) {
 }
 
 TEST(TopologicalMapper, EqualViewsStayAtOnePlace) {
-  const ToyWorld world = round_room(radius_m, 9);
+  const ToyWorld world = round_room(round_room_radius_m, 9);
   Mapping mapping;
   for (int i = 0; i < 50; ++i) {
     EXPECT_TRUE(mapping.add(round_room_signature(world, {0.3, 0.1, 0.2})).closures.empty());
@@ -222,8 +217,8 @@ TEST(TopologicalMapper, EqualViewsStayAtOnePlace) {
 }
 
 TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
-  const ToyWorld world = round_room(radius_m, 10);
-  const auto truth = rounds(round + 60);
+  const ToyWorld world = round_room(round_room_radius_m, 10);
+  const auto truth = rounds(views_of_round + 60);
   Mapping mapping;
   for (std::size_t i = 0; i < 60; ++i) mapping.add(round_room_signature(world, truth[i]));
   for (std::size_t i = 0; i < VisualOdometry::max_tried_views; ++i) {
@@ -251,7 +246,7 @@ TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
 }
 
 TEST(TopologicalMapper, PassesOverASingleViewWithoutStructure) {
-  const ToyWorld world = round_room(radius_m, 12);
+  const ToyWorld world = round_room(round_room_radius_m, 12);
   const auto truth = rounds(4);
   Mapping mapping;
   mapping.add(round_room_signature(world, truth[0]));
@@ -271,7 +266,7 @@ TEST(TopologicalMapper, PassesOverASingleViewWithoutStructure) {
 }
 
 TEST(TopologicalMapper, AStepOfTheWheelsMayPassOverNodes) {
-  const ToyWorld world = round_room(radius_m, 11);
+  const ToyWorld world = round_room(round_room_radius_m, 11);
   const auto truth = rounds(4);
   const auto moved = [&](std::size_t from, std::size_t to) {
     return inverse(truth[from]) * truth[to];
@@ -297,7 +292,7 @@ TEST(TopologicalMapper, AStepOfTheWheelsMayPassOverNodes) {
 }
 
 TEST(TopologicalMapper, RefusesWhatHasNoMeaning) {
-  const ToyWorld world = round_room(radius_m, 11);
+  const ToyWorld world = round_room(round_room_radius_m, 11);
   Mapping mapping;
   const auto signature = round_room_signature(world, {});
   mapping.add(signature);

@@ -15,8 +15,6 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double radius_m = 4.0;
-
 OdometryView view_at(const ToyWorld& world, const Pose2& pose) {
   return OdometryView(striped_signature(world, pose));
 }
@@ -27,19 +25,19 @@ std::vector<Point2> positions(const std::vector<Pose2>& poses) {
   return points;
 }
 
-FourierSignature empty_view() {
+FourierSignature view_without_structure() {
   return compute_signature(Panorama(1, 256, std::nullopt), 14);
 }
 
 TEST(VisualOdometry, ShortStepsAreReadFromTwoViews) {
-  const ToyWorld world = striped_round_room(radius_m, 1);
+  const ToyWorld world = striped_round_room(round_room_radius_m, 1);
   int steps = 0;
   for (const double direction : {-2.5, -1.0, 0.0, 0.7, 3.0}) {
     for (const double turn : {-1.0, 0.0, 0.4}) {
       const Pose2 before{0.3, -0.2, 0.5};
       const Pose2 motion{0.15 * std::cos(direction), 0.15 * std::sin(direction), turn};
       const auto step = visual_step(view_at(world, before), view_at(world, before * motion),
-                                    {.scale_m = radius_m});
+                                    {.scale_m = round_room_radius_m});
       ASSERT_TRUE(step.has_value());
       EXPECT_NEAR(step->before_from_after.x_m, motion.x_m, 0.02);
       EXPECT_NEAR(step->before_from_after.y_m, motion.y_m, 0.02);
@@ -51,7 +49,7 @@ TEST(VisualOdometry, ShortStepsAreReadFromTwoViews) {
 }
 
 TEST(VisualOdometry, ThereAndBackIsNoMotion) {
-  const ToyWorld world = striped_round_room(radius_m, 2);
+  const ToyWorld world = striped_round_room(round_room_radius_m, 2);
   const auto a = view_at(world, {0.0, 0.0, 0.3});
   const auto b = view_at(world, {0.2, 0.1, -0.9});
   const auto there = visual_step(a, b);
@@ -64,7 +62,7 @@ TEST(VisualOdometry, ThereAndBackIsNoMotion) {
 }
 
 TEST(VisualOdometry, TheSameViewTwiceIsNoMotion) {
-  const ToyWorld world = striped_round_room(radius_m, 3);
+  const ToyWorld world = striped_round_room(round_room_radius_m, 3);
   const auto view = view_at(world, {0.5, 0.0, 1.0});
   for (const VisualOdometryOptions::Rule rule :
        {VisualOdometryOptions::Rule::published, VisualOdometryOptions::Rule::home_vector}) {
@@ -76,8 +74,8 @@ TEST(VisualOdometry, TheSameViewTwiceIsNoMotion) {
 }
 
 TEST(VisualOdometry, ViewsWithoutStructureShowNoStep) {
-  const ToyWorld world = striped_round_room(radius_m, 3);
-  const OdometryView nothing(empty_view());
+  const ToyWorld world = striped_round_room(round_room_radius_m, 3);
+  const OdometryView nothing(view_without_structure());
   const auto view = view_at(world, {});
   for (const VisualOdometryOptions::Rule rule :
        {VisualOdometryOptions::Rule::published, VisualOdometryOptions::Rule::home_vector}) {
@@ -105,9 +103,10 @@ TEST(VisualOdometry, RefusesStepsBetweenUnrelatedScenes) {
   int neighbours = 0;
   constexpr int pairs = 40;
   for (int i = 0; i < pairs; ++i) {
-    const OdometryView here = view_at(striped_round_room(radius_m, 100 + i), {});
-    const OdometryView there = view_at(striped_round_room(radius_m, 200 + i), {});
-    const OdometryView near = view_at(striped_round_room(radius_m, 100 + i), {0.1, 0.05, 0.2});
+    const OdometryView here = view_at(striped_round_room(round_room_radius_m, 100 + i), {});
+    const OdometryView there = view_at(striped_round_room(round_room_radius_m, 200 + i), {});
+    const OdometryView near =
+        view_at(striped_round_room(round_room_radius_m, 100 + i), {0.1, 0.05, 0.2});
     const VisualOdometryOptions options{.max_residual = 1.0};
     believed += visual_step(here, there, options) ? 1 : 0;
     unchecked += visual_step(here, there, {.max_residual = 1.0, .min_probability = 0.0}) ? 1 : 0;
@@ -118,7 +117,7 @@ TEST(VisualOdometry, RefusesStepsBetweenUnrelatedScenes) {
 }
 
 TEST(VisualOdometry, FollowsARoundTrip) {
-  const ToyWorld world = striped_round_room(radius_m, 4);
+  const ToyWorld world = striped_round_room(round_room_radius_m, 4);
   std::vector<Pose2> truth;
   for (int i = 0; i < 80; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / 80.0;
@@ -171,9 +170,9 @@ TEST(VisualOdometry, ExpectsTurnsAsBeforeInASymmetricRoom) {
 
 TEST(VisualOdometry, LengthsDoNotDependOnTheSizeOfTheRoom) {
   const auto drive = [](bool steady_speed) {
-    VisualOdometry odometry({.scale_m = radius_m, .steady_speed = steady_speed});
+    VisualOdometry odometry({.scale_m = round_room_radius_m, .steady_speed = steady_speed});
     double last_m = 0.0;
-    for (const double room_m : {radius_m, 2.5 * radius_m}) {
+    for (const double room_m : {round_room_radius_m, 2.5 * round_room_radius_m}) {
       const ToyWorld world = striped_round_room(room_m, 3);
       for (int i = 0; i < 20; ++i) {
         const auto step = odometry.add(view_at(world, {-1.0 + 0.1 * i, 0.2, 0.3}));
@@ -219,7 +218,7 @@ TEST(VisualOdometry, KnownStepsTellTheScale) {
 
 TEST(VisualOdometry, RefusesWhatHasNoMeaning) {
   EXPECT_THROW(VisualOdometry({.scale_m = 0.0}), OptionError);
-  const ToyWorld world = striped_round_room(radius_m, 3);
+  const ToyWorld world = striped_round_room(round_room_radius_m, 3);
   EXPECT_THROW(OdometryView(striped_signature(world, {}, 2)), ContractError);
   const auto view = view_at(world, {});
   const OdometryView other(striped_signature(world, {}, 9));

@@ -16,8 +16,8 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double spacing_m = 0.3;
-constexpr Point2 high{8.0, 4.0};
+constexpr double crossing_spacing_m = 0.3;
+constexpr Point2 far_corner{8.0, 4.0};
 constexpr double wall_x_m = 4.0;  // between the two rooms
 
 PhaseReading exact_phases(const Pose2& a, const Pose2& b) {
@@ -38,7 +38,9 @@ struct TwoPieces {
   std::vector<Lattice::Spring> through_door;
 
   explicit TwoPieces(std::uint64_t seed)
-      : world(two_rooms(seed, false)), remembered(world, high, spacing_m, seed), lattice() {
+      : world(two_rooms(seed, false)),
+        remembered(world, far_corner, crossing_spacing_m, seed),
+        lattice() {
     const Pose2 other_frame{20.0, -5.0, 2.0};
     const auto is_right = [&](ViewId view) { return remembered.pose_of(view).x_m >= wall_x_m; };
     for (const ViewId view : remembered.memory.views()) {
@@ -121,7 +123,8 @@ TEST(Crossing, LeadsARobotFromOnePieceOfAnArrangementIntoTheOther) {
       ++runs;
       if (decision.state != NavigationDecision::State::arrived) continue;
       ++arrived;
-      EXPECT_LE(distance(end.position(), place.remembered.pose_of(goal).position()), spacing_m);
+      EXPECT_LE(distance(end.position(), place.remembered.pose_of(goal).position()),
+                crossing_spacing_m);
       EXPECT_TRUE(std::ranges::count(decision.events, NavigationDecision::Event::crossing) > 0)
           << describe(decision);
     }

@@ -18,13 +18,13 @@
 namespace panonav::testing {
 namespace {
 
-constexpr double spacing_m = 0.4;
+constexpr double grid_spacing_m = 0.4;
 constexpr double max_lateral_m = 0.4;
 
 // Two rooms, a grid of views in them, and a route from one into the other.
 struct World {
   ToyWorld walls = two_rooms(1, false);
-  RememberedWorld remembered{walls, {8.0, 4.0}, spacing_m, 1};
+  RememberedWorld remembered{walls, {8.0, 4.0}, grid_spacing_m, 1};
   MemoryViewSource source{remembered.memory};
   std::vector<Pose2> path = smooth_path(
       std::vector<Point2>{{0.8, 0.8}, {2.6, 1.0}, {3.4, 2.6}, {4.6, 2.8}, {5.4, 1.9}, {7.2, 1.2}},
@@ -122,7 +122,7 @@ TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
     const Drive run = drive(navigator, goal, start, 3, {});
     EXPECT_EQ(run.decisions.back().state, NavigationDecision::State::arrived);
     EXPECT_LE(distance(run.path.back().position(), world().remembered.pose_of(goal).position()),
-              0.5 * spacing_m);
+              0.5 * grid_spacing_m);
     EXPECT_TRUE(run.look_of(NavigationDecision::Event::route).has_value());
     EXPECT_FALSE(run.look_of(NavigationDecision::Event::route_left).has_value());
     EXPECT_GT(2 * run.on_route(), run.decisions.size());

@@ -21,7 +21,7 @@ namespace {
 constexpr double spacing_m = 0.3;
 constexpr Point2 high{8.0, 4.0};
 
-struct Drive {
+struct DriveToGoal {
   NavigationDecision end;
   bool has_arrived = false;  // within half a spacing of the goal
   double travelled_m = 0.0;
@@ -82,13 +82,13 @@ struct Scene {
     return testing::free_pose(world, random, {low_x, 0.0}, {high_x, high.y_m});
   }
   // Drives until the navigator stops. `kidnap_step`: then the robot is put down at `kidnap_to`.
-  Drive drive(ViewId goal, const Pose2& start, DriveKind kind, std::uint64_t seed,
-              double light = 1.0, int kidnap_step = 0, const Pose2& kidnap_to = {}) {
+  DriveToGoal drive(ViewId goal, const Pose2& start, DriveKind kind, std::uint64_t seed,
+                    double light = 1.0, int kidnap_step = 0, const Pose2& kidnap_to = {}) {
     SimulatedRobot robot(world, start, kind, seed);
     Random noise(seed, 9);
     navigator.set_goal(goal);
     navigator.forget_place();
-    Drive run;
+    DriveToGoal run;
     RobotReport report;
     for (int step = 1; step <= 600; ++step) {
       if (step == kidnap_step) robot.teleport_to(kidnap_to);
@@ -121,7 +121,7 @@ struct Outcome {
   int runs = 0;
   int arrived = 0;
 
-  void add(const Drive& run) {
+  void add(const DriveToGoal& run) {
     ++runs;
     arrived += run.has_arrived;
   }
@@ -147,7 +147,7 @@ TEST(Navigator, ArrivesFromAnywhereByPhasesAlone) {
       const ViewId goal = scene.any_view(random);
       const Pose2 start = scene.free_pose(random);
       const auto kind = i % 2 == 0 ? DriveKind::holonomic : DriveKind::differential;
-      const Drive run = scene.drive(goal, start, kind, random.next());
+      const DriveToGoal run = scene.drive(goal, start, kind, random.next());
       outcome.add(run);
       const auto guides = direction_field(by_positions, goal);
       const auto nearest = std::ranges::min_element(
@@ -175,8 +175,8 @@ TEST(Navigator, ArrivesInOtherLight) {
     Random random(seed, 4);
     for (int i = 0; i < 8; ++i) {
       const ViewId goal = scene.any_view(random);
-      const Drive run = scene.drive(goal, scene.free_pose(random), DriveKind::differential,
-                                    random.next(), light_when_driving[i % 2]);
+      const DriveToGoal run = scene.drive(goal, scene.free_pose(random), DriveKind::differential,
+                                          random.next(), light_when_driving[i % 2]);
       outcome.add(run);
     }
   }
@@ -194,7 +194,7 @@ TEST(Navigator, FewComponentsInTheOpenAreEnoughAndCostLess) {
       Random random(seed, 8);
       for (int i = 0; i < 10; ++i) {
         const ViewId goal = scene.any_view(random);
-        const Drive run =
+        const DriveToGoal run =
             scene.drive(goal, scene.free_pose(random), DriveKind::differential, random.next());
         outcome.add(run);
         bytes += static_cast<double>(run.bytes_read);
@@ -252,7 +252,7 @@ TEST(Navigator, AKidnappedRobotStillArrives) {
       const ViewId goal = scene.any_view(random, leftwards ? 0.0 : 4.0, leftwards ? 4.0 : 8.0);
       const Pose2 start = scene.free_pose(random, leftwards ? 5.0 : 0.0, leftwards ? 8.0 : 3.0);
       const Pose2 carried = scene.free_pose(random, leftwards ? 5.0 : 0.0, leftwards ? 8.0 : 3.0);
-      const Drive run =
+      const DriveToGoal run =
           scene.drive(goal, start, DriveKind::holonomic, random.next(), 1.0, 8, carried);
       outcome.add(run);
       noticed += run.had(NavigationDecision::Event::kidnapped);
@@ -277,8 +277,8 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
       Random random(seed, 6);
       for (int i = 0; i < 4; ++i) {
         const ViewId goal = scene.any_view(random, 5.0);
-        const Drive run = scene.drive(goal, scene.free_pose(random, 0.0, 3.0), DriveKind::holonomic,
-                                      random.next());
+        const DriveToGoal run = scene.drive(goal, scene.free_pose(random, 0.0, 3.0),
+                                            DriveKind::holonomic, random.next());
         (second_door ? with_detour : without).add(run);
         if (!second_door) {
           unreachable += run.end.state == NavigationDecision::State::unreachable;
@@ -301,7 +301,7 @@ TEST(Navigator, IsLostInAnotherPlace) {
   Random random(3);
   for (int i = 0; i < 3; ++i) {
     const ViewId goal = scene.any_view(random);
-    const Drive run =
+    const DriveToGoal run =
         scene.drive(goal, scene.free_pose(random), DriveKind::holonomic, random.next());
     EXPECT_EQ(run.end.state, NavigationDecision::State::lost) << describe(run.end);
     EXPECT_TRUE(run.had(NavigationDecision::Event::relocalised));
@@ -378,7 +378,7 @@ TEST(Navigator, IsNotLostBehindAScreen) {
 TEST(Navigator, GoesNowhereWithoutAWay) {
   const ViewId goal{0};
   Scene scene(two_rooms(1, false), 1, {}, {goal});
-  const Drive run = scene.drive(goal, {6.8, 3.4, 0.0}, DriveKind::holonomic, 1);
+  const DriveToGoal run = scene.drive(goal, {6.8, 3.4, 0.0}, DriveKind::holonomic, 1);
   EXPECT_EQ(run.end.state, NavigationDecision::State::unreachable);
   EXPECT_EQ(run.end.step, 1);
   EXPECT_EQ(run.end.advance_m, 0.0);
@@ -395,7 +395,7 @@ TEST(Navigator, ArrivesOverReferencesThatStandCloseTogether) {
   for (int i = 0; i < 10; ++i) {
     const ViewId goal = scene.any_view(random);
     const Pose2 start = free_pose(scene.world, random, {0.3, 0.3}, {2.7, 1.7});
-    const Drive run = scene.drive(goal, start, DriveKind::holonomic, random.next());
+    const DriveToGoal run = scene.drive(goal, start, DriveKind::holonomic, random.next());
     outcome.add(run);
     const double straight_m = distance(start.position(), scene.remembered.pose_of(goal).position());
     if (straight_m > 0.5) ratios.push_back(run.travelled_m / straight_m);

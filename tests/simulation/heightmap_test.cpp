@@ -46,12 +46,13 @@ class Heightmap : public testing::InTemporaryFolder {
   }
 };
 
-struct Found {
+struct FoundFloor {
   Scene scene;
   FreeSpaceOptions options;
   FreeSpace space;
 };
-Found find(Scene scene, const FloorKnowledge& known = {}, FreeSpaceOptions options = {}) {
+FoundFloor find_floor(Scene scene, const FloorKnowledge& known = {},
+                      FreeSpaceOptions options = {}) {
   FreeSpace space = find_free_space(scene, options, known);
   return {std::move(scene), options, std::move(space)};
 }
@@ -181,7 +182,7 @@ TEST_F(Heightmap, RobotsStandOnTheGroundBetweenThings) {
   const std::string box =
       "<model name='box'><pose>0 0 2.3 0 0 0</pose><link name='l'><visual name='v'><geometry><box>"
       "<size>1 1 1</size></box></geometry></visual></link></model>";
-  const Found found = find(load("<uri>h.png</uri><size>20 20 4</size>", box));
+  const FoundFloor found = find_floor(load("<uri>h.png</uri><size>20 20 4</size>", box));
   ASSERT_NE(found.scene.ground, nullptr);
   for (const double x_m : {-9.0, -3.3, 0.0, 4.0, 9.5})
     EXPECT_NEAR(found.scene.ground->height_m({x_m, 5.0}), 2.0 + 0.2 * x_m, 1e-3);
@@ -212,7 +213,7 @@ TEST_F(Heightmap, SteepHillsAndThingsAboveTheRobotAreNoGround) {
   const std::string roof =
       "<model name='roof'><pose>10 10 4 0 0 0</pose><link name='l'><visual name='v'><geometry><box>"
       "<size>6 6 0.2</size></box></geometry></visual></link></model>";
-  const Found found = find(load("<uri>h.png</uri><size>32 32 5</size>", roof));
+  const FoundFloor found = find_floor(load("<uri>h.png</uri><size>32 32 5</size>", roof));
   ASSERT_NE(found.scene.ground, nullptr);
   EXPECT_FALSE(found.space.is_free({1.5, 1.0})) << "the cone";
   EXPECT_TRUE(found.space.is_free({10.0, 10.0})) << "below the roof";
@@ -243,7 +244,7 @@ TEST(SlopingGround, OfPlanesAndMeshesIsFollowed) {
   Affine3 above;
   above.translation = {0.0, 0.0, 0.5};
   place_mesh(scene, make_box_mesh({0.4, 0.4, 1.2}), above, "post", 0);
-  const Found found = find(scene);
+  const FoundFloor found = find_floor(scene);
   ASSERT_NE(found.scene.ground, nullptr);
   EXPECT_TRUE(found.space.is_free({0.0, 2.2}));
   EXPECT_FALSE(found.space.is_free({0.0, 0.3}));
@@ -252,7 +253,7 @@ TEST(SlopingGround, OfPlanesAndMeshesIsFollowed) {
   // A set height is kept, and the notice says so.
   FreeSpaceOptions options;
   options.floor_height_m = 0.0;
-  const Found level = find(scene, {.is_height_known = true}, options);
+  const FoundFloor level = find_floor(scene, {.is_height_known = true}, options);
   EXPECT_EQ(level.scene.ground, nullptr);
   ASSERT_EQ(level.scene.warnings.size(), 1U);
   EXPECT_TRUE(contains(level.scene.warnings[0], "stays at the set floor height 0 m"));
@@ -264,7 +265,7 @@ TEST(SlopingGround, OfPlanesAndMeshesIsFollowed) {
   place_mesh(hall, make_rectangle_mesh(16.0, 16.0), {}, "floor", 0);
   place.translation = {6.0, 6.0, 0.2};
   place_mesh(hall, make_rectangle_mesh(2.0, 4.0), place, "ramp", 0);
-  const Found flat = find(hall);
+  const FoundFloor flat = find_floor(hall);
   EXPECT_EQ(flat.scene.ground, nullptr);
   EXPECT_TRUE(flat.scene.warnings.empty());
 }
@@ -281,7 +282,7 @@ TEST(SlopingGround, CamerasFollowItsHeightAndStayUpright) {
       {-40.0, -40.0, -4.0}, {40.0, -40.0, 4.0}, {40.0, 40.0, 4.0}, {-40.0, 40.0, -4.0}};
   slope.triangles = {{0, 1, 2}, {0, 2, 3}};
   scene.meshes.push_back(slope);
-  Found found = find(scene);
+  FoundFloor found = find_floor(scene);
   ASSERT_NE(found.scene.ground, nullptr);
   raise_scene(found.scene, 7.0);  // as when the floor is moved to z = 0
   const Renderer renderer(found.scene);

@@ -27,7 +27,7 @@ class EveryScene : public ::testing::TestWithParam<std::string_view> {
   [[nodiscard]] static Scene scene(std::uint64_t seed) { return make_scene(GetParam(), {seed}); }
 };
 
-Viewpoint viewpoint_in(const Scene& scene) {
+Viewpoint viewpoint_on_path(const Scene& scene) {
   return viewpoint_on_tour(scene, 0.5, 0.3);
 }
 
@@ -59,7 +59,7 @@ TEST_P(EveryScene, LooksDifferentFromSeedToSeedAndTheSameForASeed) {
   std::vector<Panorama> views;
   for (const std::uint64_t seed : tested_seeds) {
     const Scene world = scene(seed);
-    const Viewpoint viewpoint = viewpoint_in(world);
+    const Viewpoint viewpoint = viewpoint_on_path(world);
     views.push_back(
         Renderer(world, {.shadows = false}, one).render_panorama(viewpoint, small_rendering, one));
     // Something is to be seen, and the light neither drowns nor blinds.
@@ -90,7 +90,7 @@ TEST_P(EveryScene, OtherLightScalesEveryRay) {
   Executor executor;
   const auto look = [&](const Scene& scene) {
     return Renderer(scene, {.shadows = false}, executor)
-        .render_image(viewpoint_in(scene), all_round, 1, executor)
+        .render_image(viewpoint_on_path(scene), all_round, 1, executor)
         .values;
   };
   const auto before = look(usual);
@@ -210,7 +210,7 @@ TEST(Scenes, TheGardenHasASkyAHorizonAndTrees) {
   for (const std::uint64_t seed : tested_seeds) {
     const Scene scene = make_scene("garden", {seed});
     const Renderer renderer(scene, {.shadows = false}, executor);
-    const Viewpoint eye = viewpoint_in(scene);
+    const Viewpoint eye = viewpoint_on_path(scene);
     const Vector3 from{eye.pose.x_m, eye.pose.y_m, eye.height_m};
     int far = 0;
     int trees = 0;

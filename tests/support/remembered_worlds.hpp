@@ -27,6 +27,7 @@ inline FourierSignature striped_signature(const ToyWorld& world, const Pose2& po
   return compute_signature(world.panorama(pose, 1, 256), components);
 }
 
+inline constexpr double round_room_radius_m = 4.0;
 /// A view in `round_room`.
 inline constexpr SignatureShape round_room_shape{12, 15};
 inline FourierSignature round_room_signature(const ToyWorld& world, const Pose2& pose) {
@@ -43,6 +44,10 @@ inline FourierSignature two_rooms_signature(const ToyWorld& world, const Pose2& 
 }
 inline std::vector<float> two_rooms_line(const ToyWorld& world, const Pose2& pose) {
   return world.line(pose, 360, 3, {radians(-1.5), 0.0, radians(1.5)});
+}
+
+inline VisualMemory empty_round_room_memory() {
+  return {round_room_shape, 0.1F, std::nullopt};
 }
 
 /// A memory of the given signatures. Magnitudes up to the largest one are packed without
