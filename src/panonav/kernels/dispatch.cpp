@@ -12,7 +12,7 @@ namespace panonav::kernels {
 namespace {
 
 struct AvailableSets {
-  std::array<Instructions, 4> sets{Instructions::scalar};
+  std::array<Instructions, 5> sets{Instructions::scalar};
   std::size_t count = 1;
 };
 
@@ -31,6 +31,9 @@ AvailableSets detect_instructions() noexcept {
 #endif
 #ifdef PANONAV_HAS_NEON
   available.sets[available.count++] = Instructions::neon;
+#endif
+#ifdef PANONAV_HAS_SIMD128
+  available.sets[available.count++] = Instructions::simd128;
 #endif
   return available;
 }
@@ -51,7 +54,7 @@ Instructions choose_instructions() {
 }  // namespace
 
 std::string_view name(Instructions instructions) noexcept {
-  constexpr std::array<std::string_view, 4> names{"scalar", "avx2", "avx512", "neon"};
+  constexpr std::array<std::string_view, 5> names{"scalar", "avx2", "avx512", "neon", "simd128"};
   return names[static_cast<std::size_t>(instructions)];
 }
 

@@ -7,7 +7,7 @@
 
 namespace panonav::kernels {
 
-/// Returns "scalar", "avx2", "avx512" or "neon".
+/// Returns "scalar", "avx2", "avx512", "neon" or "simd128".
 [[nodiscard]] std::string_view name(Instructions instructions) noexcept;
 
 /// Lists the instruction sets that both this build and this processor support, the widest last;

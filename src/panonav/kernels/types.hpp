@@ -14,7 +14,8 @@ enum class Instructions {
   scalar,  ///< plain C++, for every processor
   avx2,    ///< x86-64 of 2013 and later
   avx512,  ///< x86-64 servers and newer desktops
-  neon     ///< ARM of 64 bit
+  neon,    ///< ARM of 64 bit
+  simd128  ///< WebAssembly with vectors of 128 bits
 };
 
 /// Scale by which sums become bytes, in groups of 8 sums.

@@ -161,6 +161,10 @@ decltype(auto) with_body(Instructions set, Run run) {
     case Instructions::neon:
       return run(Body<Instructions::neon>{});
 #endif
+#ifdef PANONAV_HAS_SIMD128
+    case Instructions::simd128:
+      return run(Body<Instructions::simd128>{});
+#endif
     default:
       return run(Body<Instructions::scalar>{});
   }

@@ -89,6 +89,58 @@ void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* cost
     }
   }
 }
+#elif defined(__wasm_simd128__)
+// Matches columns with the instruction that adds pairs of bytes: two bands lie side by side, so
+// that each pair belongs to one column, and all sums stay in registers.
+void match_by_pairs(const uint8_t* query, const uint8_t* reference, uint16_t* costs) {
+  using Vector = ByteVector<Instructions::simd128>;
+  constexpr int columns = matched_reference_columns;
+  constexpr int step = columns / matched_query_columns;
+  constexpr int pairs = matched_bands / 2;
+  alignas(16) uint8_t paired[pairs][2 * columns];
+  for (int p = 0; p < pairs; ++p) {
+    for (int d = 0; d < columns; d += 16) {
+      const v128_t a = wasm_v128_load(reference + 2 * p * columns + d);
+      const v128_t b = wasm_v128_load(reference + (2 * p + 1) * columns + d);
+      wasm_v128_store(paired[p] + 2 * d, wasm_i8x16_shuffle(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20,
+                                                            5, 21, 6, 22, 7, 23));
+      wasm_v128_store(paired[p] + 2 * d + 16, wasm_i8x16_shuffle(a, b, 8, 24, 9, 25, 10, 26, 11, 27,
+                                                                 12, 28, 13, 29, 14, 30, 15, 31));
+    }
+  }
+  // Adding 1.5 * 2^23 rounds to an integer, which is then in the low bits of the float; a sum of
+  // its other bits is a multiple of 65,536, which the cast to a cost removes.
+  const auto rounded_root = [](v128_t sums) {
+    const v128_t root = wasm_f32x4_sqrt(wasm_f32x4_convert_i32x4(sums));
+    return wasm_f32x4_add(wasm_f32x4_mul(root, wasm_f32x4_splat(16.0F)),
+                          wasm_f32x4_splat(12582912.0F));
+  };
+  alignas(16) uint32_t totals[2 * columns] = {};  // at the rotation s: s + columns
+  for (int c = 0; c < matched_query_columns; ++c) {
+    v128_t values[pairs];
+    for (int p = 0; p < pairs; ++p) {
+      values[p] = wasm_v128_load16_splat(query + c * matched_bands + 2 * p);
+    }
+    uint32_t* const shifted_totals = totals + columns - step * c;
+    const auto add = [&](int d, v128_t roots) {
+      wasm_v128_store(shifted_totals + d,
+                      wasm_i32x4_add(wasm_v128_load(shifted_totals + d), roots));
+    };
+    for (int d = 0; d < columns; d += 8) {
+      v128_t sums = wasm_i16x8_splat(0);
+#pragma GCC unroll 8
+      for (int p = 0; p < pairs; ++p) {
+        sums = wasm_i16x8_add(sums, wasm_u16x8_extadd_pairwise_u8x16(Vector::absolute_differences(
+                                        wasm_v128_load(paired[p] + 2 * d), values[p])));
+      }
+      add(d, rounded_root(wasm_u32x4_extend_low_u16x8(sums)));
+      add(d + 4, rounded_root(wasm_u32x4_extend_high_u16x8(sums)));
+    }
+  }
+  for (int s = 0; s < columns; ++s) {
+    costs[s] = static_cast<uint16_t>(totals[s] + totals[s + columns]);
+  }
+}
 #else
 // Loops without branches, which the compiler vectorises.
 void match_by_loops(const uint8_t* __restrict query, const uint8_t* __restrict reference,
@@ -140,6 +192,8 @@ int ColumnMatchBody<set>::match_columns(const uint8_t* query, const uint8_t* ref
                                         uint16_t* costs) {
 #ifdef __AVX2__
   match_by_sad<set>(query, reference, costs);
+#elif defined(__wasm_simd128__)
+  match_by_pairs(query, reference, costs);
 #else
   match_by_loops(query, reference, costs);
 #endif

@@ -9,6 +9,8 @@
 #include <immintrin.h>
 #elif defined(__ARM_NEON)
 #include <arm_neon.h>
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #endif
 
 namespace panonav::kernels {
@@ -293,6 +295,83 @@ struct ByteVector<Instructions::neon> {
     const uint32x4_t low = vcleq_u32(vld1q_u32(values), vdupq_n_u32(limit));
     const uint32x4_t bit = {1, 2, 4, 8};
     return write_set_bit_positions(vaddvq_u32(vandq_u32(low, bit)), first, to);
+  }
+};
+#endif
+
+#ifdef __wasm_simd128__
+template <>
+struct ByteVector<Instructions::simd128> {
+  typedef uint64_t Register __attribute__((vector_size(16)));
+  static Register to_register(v128_t a) { return reinterpret_cast<Register>(a); }
+  static v128_t bits(Register a) { return reinterpret_cast<v128_t>(a); }
+  static Register load(const void* from) { return to_register(wasm_v128_load(from)); }
+  static Register broadcast(uint64_t number) { return Register{number, number}; }
+  static v128_t absolute_differences(v128_t a, v128_t b) {
+    return wasm_v128_or(wasm_u8x16_sub_sat(a, b), wasm_u8x16_sub_sat(b, a));
+  }
+  static v128_t sums_of_four(Register a, Register b) {
+    return wasm_u32x4_extadd_pairwise_u16x8(
+        wasm_u16x8_extadd_pairwise_u8x16(absolute_differences(bits(a), bits(b))));
+  }
+  static Register sad(Register a, Register b) {
+    const Register sums = to_register(sums_of_four(a, b));
+    return (sums & 0xFFFFFFFFU) + (sums >> 32);
+  }
+  static Register add_sad(Register sums, Register a, Register b) {
+    return to_register(wasm_i32x4_add(bits(sums), sums_of_four(a, b)));
+  }
+  static uint64_t total(Register sums) {
+    const Register halves = (sums & 0xFFFFFFFFU) + (sums >> 32);
+    return halves[0] + halves[1];
+  }
+  static Register product(Register a, Register b) {
+    const auto even = [](Register x) { return wasm_i32x4_shuffle(bits(x), bits(x), 0, 2, 0, 2); };
+    return to_register(wasm_u64x2_extmul_low_u32x4(even(a), even(b)));
+  }
+  static Register smaller(Register a, Register b) {
+    return to_register(wasm_u32x4_min(bits(a), bits(b)));
+  }
+  static void narrow(const Register* sums, EightInts& eight) {
+    const v128_t low = wasm_i32x4_shuffle(bits(sums[0]), bits(sums[1]), 0, 2, 4, 6);
+    const v128_t high = wasm_i32x4_shuffle(bits(sums[2]), bits(sums[3]), 0, 2, 4, 6);
+    __builtin_memcpy(&eight, &low, sizeof low);
+    __builtin_memcpy(reinterpret_cast<uint8_t*>(&eight) + sizeof low, &high, sizeof high);
+  }
+  static Register add_products(Register sums, Register a, Register weights) {
+    // Even and odd bytes as numbers of 16 bits, of which one instruction adds two products.
+    const auto even = [](Register x) { return wasm_v128_and(bits(x), wasm_i16x8_splat(255)); };
+    const auto odd = [](Register x) { return wasm_u16x8_shr(bits(x), 8); };
+    return to_register(
+        wasm_i32x4_add(wasm_i32x4_add(bits(sums), wasm_i32x4_dot_i16x8(even(a), even(weights))),
+                       wasm_i32x4_dot_i16x8(odd(a), odd(weights))));
+  }
+  static Register lookup(const uint8_t* table, Register codes) {
+    return to_register(wasm_i8x16_swizzle(wasm_v128_load(table),
+                                          wasm_v128_and(bits(codes), wasm_i8x16_splat(15))));
+  }
+  static Register lookup_upper(const uint8_t* table, Register codes) {
+    return lookup(table, to_register(wasm_u16x8_shr(bits(codes), 4)));
+  }
+  static Register add_saturated(Register a, Register b) {
+    return to_register(wasm_u8x16_add_sat(bits(a), bits(b)));
+  }
+  static uint64_t at_most(Register a, uint8_t limit) {
+    return wasm_i8x16_bitmask(wasm_u8x16_le(bits(a), wasm_u8x16_splat(limit)));
+  }
+  static constexpr int halved = 8;
+  static void halve(const uint8_t* upper, const uint8_t* lower, uint8_t* to) {
+    const auto pairs = [](const uint8_t* from) {
+      return wasm_u16x8_extadd_pairwise_u8x16(wasm_v128_load(from));
+    };
+    const v128_t sums =
+        wasm_i16x8_add(wasm_i16x8_add(pairs(upper), pairs(lower)), wasm_i16x8_splat(2));
+    const v128_t means = wasm_u16x8_shr(sums, 2);
+    wasm_v128_store64_lane(to, wasm_u8x16_narrow_i16x8(means, means), 0);
+  }
+  static size_t collect(const uint32_t* values, uint32_t limit, uint32_t first, uint32_t* to) {
+    const v128_t low = wasm_u32x4_le(wasm_v128_load(values), wasm_u32x4_splat(limit));
+    return write_set_bit_positions(static_cast<unsigned>(wasm_i32x4_bitmask(low)), first, to);
   }
 };
 #endif
