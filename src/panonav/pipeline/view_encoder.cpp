@@ -253,10 +253,10 @@ float largest_nonconstant_magnitude(const FourierSignature& signature) {
                            : *std::max_element(structure.begin(), structure.end());
 }
 
-std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama) {
-  const Image picture = to_picture(panorama);
+Image make_thumbnail(const Panorama& panorama) {
+  Image picture = to_picture(panorama);
   const int step = compute_thumbnail_step(picture.width());
-  if (step == 1) return encode_png(picture.view());
+  if (step == 1) return picture;
   Image small(picture.width() / step, std::max(1, picture.height() / step));
   const int rows_averaged = std::min(step, picture.height());
   std::vector<int> sums(static_cast<std::size_t>(small.width()));
@@ -273,7 +273,13 @@ std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama) {
           static_cast<std::uint8_t>(sums[static_cast<std::size_t>(u)] / (rows_averaged * step));
     }
   }
-  return encode_jpeg(small.view());
+  return small;
+}
+
+std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama) {
+  const Image thumbnail = make_thumbnail(panorama);
+  const bool is_small = thumbnail.width() < panorama.columns();
+  return is_small ? encode_jpeg(thumbnail.view()) : encode_png(thumbnail.view());
 }
 
 std::optional<Panorama> panorama_from_thumbnail(std::span<const std::uint8_t> thumbnail,

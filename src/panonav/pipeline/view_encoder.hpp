@@ -99,7 +99,9 @@ class ViewEncoder {
 /// place, so it may saturate.
 [[nodiscard]] float largest_nonconstant_magnitude(const FourierSignature& signature);
 
-/// Returns a small image of the view for display: a PNG of panoramas of at most 256 columns, which
+/// Returns a small image of the view for display, at most 256 columns wide.
+[[nodiscard]] Image make_thumbnail(const Panorama& panorama);
+/// Returns the file of `make_thumbnail`: a PNG of panoramas of at most 256 columns, which
 /// is exact; a JPEG of larger ones.
 [[nodiscard]] std::vector<std::uint8_t> encode_thumbnail(const Panorama& panorama);
 
