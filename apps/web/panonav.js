@@ -2,9 +2,9 @@
 //   const panonav = await loadPanonav();
 //   const memory = panonav.open(bytes);                    // of a .panonav file
 //   const answer = memory.localise(imageData, "view.jpg"); // what `panonav localise --json` prints
-//   const maker = panonav.make();                          // of 360 degree pictures, 2 : 1
-//   maker.add(imageData, "one.jpg");
-//   const bytes = maker.finish();                          // a .panonav file
+//   const maker = panonav.make(encode);                    // of 360 degree pictures, 2 : 1
+//   await maker.add(imageData, "one.jpg");
+//   const bytes = await maker.finish();                    // a .panonav file
 // Errors are thrown with the library's message. Pictures are what a canvas's getImageData returns.
 
 import makePanonav from "./panonav_web.mjs";
@@ -55,6 +55,15 @@ export async function loadPanonav(settings = {}) {
       wasm._free(at);
     }
   };
+  /** Calls `work` with the address of `count` words, and returns its result and the words. */
+  const withWords = (count, work) => {
+    const at = wasm._malloc(4 * count);
+    try {
+      return [work(at), ...wasm.HEAPU32.slice(at >> 2, (at >> 2) + count)];
+    } finally {
+      wasm._free(at);
+    }
+  };
   const newPath = () => `/${++files}.panonav`;
 
   return {
@@ -63,25 +72,60 @@ export async function loadPanonav(settings = {}) {
       wasm.FS.writeFile(path, bytes);
       const memory = withText(path, (at) => call((error) => wasm._panonav_open(at, error)));
       return {
-        localise: (picture, name) =>
-          takeText(withPicture(picture, name, (...sent) => wasm._panonav_localise(memory, ...sent))),
+        /** `fieldOfView`: degrees of azimuth that the picture shows; 0: as the memory's pictures do. */
+        localise: (picture, name, fieldOfView = 0) =>
+          takeText(withPicture(picture, name, (...sent) => {
+            const error = sent.pop();
+            return wasm._panonav_localise(memory, ...sent, fieldOfView, error);
+          })),
+        /** JSON: kind of the pictures, unit of positions, views. */
+        describe: () => takeText(call((error) => wasm._panonav_describe(memory, error))),
+        /** The bytes of an image file, or null. */
+        thumbnail(view) {
+          const [at, size] = withWords(1, (word) => call((error) => wasm._panonav_thumbnail(memory, view, word, error)));
+          if (at === 0) return null;
+          const copy = wasm.HEAPU8.slice(at, at + size);
+          wasm._free(at);
+          return copy;
+        },
         close() {
           wasm._panonav_close(memory);
           wasm.FS.unlink(path);
         },
       };
     },
-    make() {
+    /** `encode` gets grey pixels, width and height of a thumbnail, and resolves to the bytes of its image file. */
+    make(encode) {
       const path = newPath();
       const maker = withText(path, (at) => wasm._panonav_make(at));
+      const storeWaiting = async (isLast) => {
+        for (;;) {
+          const [isEncoded, at, width, height] = withWords(3, (words) =>
+            call((error) => wasm._panonav_encode_next(maker, isLast ? 1 : 0, words, error)));
+          if (isEncoded === 0) return;
+          const file = await encode(wasm.HEAPU8.slice(at, at + width * height), width, height);
+          const copy = wasm._malloc(file.length);
+          wasm.HEAPU8.set(file, copy);
+          try {
+            call((error) => wasm._panonav_store(maker, copy, file.length, error));
+          } finally {
+            wasm._free(copy);
+          }
+        }
+      };
       return {
-        add: (picture, name) => withPicture(picture, name, (...sent) => wasm._panonav_add(maker, ...sent)),
-        finish() {
+        async add(picture, name) {
+          withPicture(picture, name, (...sent) => wasm._panonav_add(maker, ...sent));
+          await storeWaiting(false);
+        },
+        async finish() {
+          await storeWaiting(true);
           call((error) => wasm._panonav_finish(maker, error));
           const bytes = wasm.FS.readFile(path);
           wasm.FS.unlink(path);
           return bytes;
         },
+        discard: () => wasm._panonav_discard(maker),
       };
     },
   };

@@ -45,9 +45,9 @@ COLOURS = """name => {
 
 
 class Browser:
-    """Chromium with one page."""
+    """Chromium with one page; `arguments` are further options of Chromium."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, *arguments):
         to_browser, self.out = os.pipe()
         self.into, from_browser = os.pipe()
 
@@ -58,7 +58,8 @@ class Browser:
 
         self.process = subprocess.Popen(
             [PROGRAM, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--mute-audio",
-             "--disable-dev-shm-usage", "--remote-debugging-pipe", f"--user-data-dir={folder}", "about:blank"],
+             "--disable-dev-shm-usage", "--remote-debugging-pipe", f"--user-data-dir={folder}", *arguments,
+             "about:blank"],
             close_fds=False, preexec_fn=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(to_browser)
         os.close(from_browser)

@@ -13,11 +13,12 @@ struct Meaning {
   std::string_view meaning;
 };
 
-constexpr std::array<Meaning, 4> environment{{
+constexpr std::array<Meaning, 5> environment{{
     {"PANONAV_DATA", "Folder with the real recordings that panonav reproduce uses."},
     {"PANONAV_INSTRUCTIONS",
      "Instruction set of the processor: scalar, avx2, avx512 or neon. By default panonav selects "
      "the best one."},
+    {"PANONAV_WEB_PAGE", "Folder with the files of the page that panonav export --web writes."},
     {"GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH", "Folders with the models of Gazebo worlds."},
     {"NO_COLOR", "If this variable is set, output is not coloured."},
 }};

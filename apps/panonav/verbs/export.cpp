@@ -2,6 +2,8 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/memory_export.hpp"
+#include "runs/recording.hpp"
+#include "runs/web_folder.hpp"
 
 namespace panonav::command {
 
@@ -9,7 +11,9 @@ namespace {
 
 struct ExportArguments {
   std::string memory;
-  std::string out;
+  std::optional<std::string> out;
+  std::optional<std::string> web;
+  std::optional<std::string> pictures;  ///< recording of which the page shows pictures
 };
 
 /// Lists the values that the data set does not have, each with the reason.
@@ -71,18 +75,56 @@ void print_export(const MemoryExport& done, const MemoryFile& memory, const std:
                   "To make a memory of this folder:");
 }
 
+/// Writes the page that localises pictures in a browser.
+ExitCode export_web(const ExportArguments& arguments, Session& session) {
+  const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
+  const auto page = find_web_page();
+  std::optional<Dataset> recording;
+  if (arguments.pictures) {
+    recording = open_recording(*arguments.pictures, PictureArguments{}, memory, session);
+  }
+  Progress progress(session, "drawing", recording ? recording->entries.size() : 0);
+  const WebFolder done =
+      write_web_folder(memory, page, recording ? &*recording : nullptr, *arguments.web,
+                       session.executor(), [&] { progress.advance(); });
+  progress.clear();
+  if (session.json()) {
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                         {"folder", *arguments.web},
+                                         {"views", done.views},
+                                         {"pictures", done.pictures},
+                                         {"thumbnails", done.thumbnails},
+                                         {"bytes", done.bytes}}));
+    return ExitCode::done;
+  }
+  session.print(session.bold(*arguments.web) + " is a page for " +
+                format_count(done.views, "view") + " of " + arguments.memory + ", " +
+                format_fixed(static_cast<double>(done.bytes) / 1e6, 1) + " MB");
+  if (done.pictures + done.thumbnails == 0) {
+    session.print(
+        "It shows no pictures, because the memory has no thumbnails. To show those of a "
+        "recording, use --pictures RECORDING.");
+  }
+  session.print(
+      "Put the folder on a web server (https), or try it here: python3 -m http.server -d " +
+      quote_for_shell(*arguments.web) + ", then open http://localhost:8000");
+  return ExitCode::done;
+}
+
 ExitCode export_all(const ExportArguments& arguments, Session& session) {
+  if (arguments.web) return export_web(arguments, session);
+  const std::string& out = *arguments.out;
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   Progress progress(session, "exporting", static_cast<std::size_t>(memory.info().views));
   const MemoryExport done =
-      export_memory(memory, arguments.out, session.executor(), [&] { progress.advance(); });
+      export_memory(memory, out, session.executor(), [&] { progress.advance(); });
   progress.clear();
   if (!session.json()) {
-    print_export(done, memory, arguments.out, session);
+    print_export(done, memory, out, session);
     return ExitCode::done;
   }
   session.print(json_line(ordered_json{{"memory", arguments.memory},
-                                       {"folder", arguments.out},
+                                       {"folder", out},
                                        {"views", done.views},
                                        {"images", done.pictures},
                                        {"renamed", done.renamed},
@@ -96,10 +138,23 @@ ExitCode export_all(const ExportArguments& arguments, Session& session) {
 Run declare_export(Arguments& arguments) {
   auto values = std::make_shared<ExportArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.required_option("-o,--out FOLDER", values->out,
-                            "New or empty folder; another one is refused");
-  arguments.declare_outputs({"--out"});
-  return [values](Session& session) { return export_all(*values, session); };
+  arguments.option("-o,--out FOLDER", values->out,
+                   "Write a data set into this folder, which must be new or empty");
+  arguments.option("--web FOLDER", values->web,
+                   "Instead, write a page that localises pictures in a browser into this folder, "
+                   "which must be new or empty");
+  arguments.option("--pictures RECORDING", values->pictures,
+                   "With --web: show the places by the images of the recording from which the "
+                   "memory was made; default: by the thumbnails of the memory");
+  arguments.declare_outputs({"--out", "--web"});
+  arguments.reject_options_unless(
+      {"--pictures"}, [values] { return values->web.has_value(); }, "without --web");
+  return [values](Session& session) {
+    if (values->out.has_value() == values->web.has_value()) {
+      throw UsageError("export needs one of --out FOLDER and --web FOLDER");
+    }
+    return export_all(*values, session);
+  };
 }
 
 }  // namespace
@@ -107,13 +162,16 @@ Run declare_export(Arguments& arguments) {
 Verb export_verb() {
   return {"export",
           VerbGroup::memory,
-          "Export the views of a memory as a data set",
+          "Export a memory as a data set, or as a page that localises pictures",
           "A memory stores its images only as thumbnails. The verb enlarges these thumbnails to "
           "panoramas that panonav memorise can read. The files views.csv and signatures.npy "
           "contain the poses and signatures of all views without loss. Links, maps and routes are "
-          "not exported. If the export is interrupted, no folder is written.",
+          "not exported. With --web, the folder is a page instead: a browser localises pictures in "
+          "it by itself and sends them nowhere; put it on any web server. If the export is "
+          "interrupted, no folder is written.",
           "  panonav export office.panonav -o office_views\n"
-          "  panonav memorise again.panonav office_views --config office_views/memorise.toml",
+          "  panonav memorise again.panonav office_views --config office_views/memorise.toml\n"
+          "  panonav export office.panonav --web office_page",
           declare_export};
 }
 

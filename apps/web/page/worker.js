@@ -1,0 +1,87 @@
+// The work on pictures, beside the page: messages {id, task, arguments} are answered by {id, result} or {id, error},
+// one after the other; {id, progress} come before.
+
+import { loadPanonav } from "./panonav.js";
+
+const loading = loadPanonav();
+loading.catch(() => {});  // is reported with the first task
+let memory = null;
+let kind = null;  // of the memory's pictures
+let maker = null;
+
+/** Pixels of a file or of a picture of the camera. */
+async function decode(source) {
+  const bitmap = source instanceof ImageBitmap ? source : await createImageBitmap(source, { colorSpaceConversion: "none" });
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d", { willReadFrequently: true });
+  context.drawImage(bitmap, 0, 0);
+  bitmap.close();
+  return context.getImageData(0, 0, context.canvas.width, context.canvas.height);
+}
+
+async function encodeThumbnail(grey, width, height) {
+  const pixels = new ImageData(width, height);
+  for (let i = 0; i < grey.length; ++i) {
+    pixels.data.fill(grey[i], 4 * i, 4 * i + 3);
+    pixels.data[4 * i + 3] = 255;
+  }
+  const canvas = new OffscreenCanvas(width, height);
+  canvas.getContext("2d").putImageData(pixels, 0, 0);
+  const file = await canvas.convertToBlob({ type: "image/jpeg", quality: 0.9 });
+  return new Uint8Array(await file.arrayBuffer());
+}
+
+/** Degrees of azimuth that a picture shows, by its shape; 0: as the pictures of the memory. */
+function guessFieldOfView({ width, height }) {
+  const usual_phone = 65;
+  return kind === "mirror" || width >= 1.9 * height ? 0 : usual_phone;
+}
+
+const tasks = {
+  async open({ bytes }) {
+    const panonav = await loading;
+    const opened = panonav.open(new Uint8Array(await new Response(bytes).arrayBuffer()));
+    memory?.close();
+    memory = opened;
+    const description = JSON.parse(memory.describe());
+    kind = description.kind;
+    return description;
+  },
+  /** `fieldOfView`: degrees of azimuth, where it is known. */
+  async localise({ picture, name, fieldOfView }) {
+    const begin = performance.now();
+    const pixels = await decode(picture);
+    const decoded = performance.now();
+    const answer = JSON.parse(memory.localise(pixels, name, fieldOfView ?? guessFieldOfView(pixels)));
+    return { answer, decode_ms: decoded - begin, localise_ms: performance.now() - decoded };
+  },
+  thumbnail({ view }) {
+    return memory.thumbnail(view);
+  },
+  async begin() {
+    maker?.discard();
+    maker = (await loading).make(encodeThumbnail);
+  },
+  async add({ file, name }) {
+    await maker.add(await decode(file), name);
+  },
+  async finish() {
+    const finished = maker;
+    maker = null;
+    return finished.finish();
+  },
+  discard() {
+    maker?.discard();
+    maker = null;
+  },
+};
+
+let last = Promise.resolve();
+self.onmessage = ({ data: { id, task, values } }) => {
+  last = last.then(async () => {
+    try {
+      self.postMessage({ id, result: await tasks[task](values) });
+    } catch (error) {
+      self.postMessage({ id, error: String(error?.message ?? error) });
+    }
+  });
+};
