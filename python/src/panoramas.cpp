@@ -33,13 +33,14 @@ CameraModel make_camera_model(const std::string& name, const py::dict& parameter
 
 namespace {
 
-constexpr std::array<const char*, 3> kind_names{"panorama", "equirectangular", "mirror"};
+constexpr std::array<const char*, 4> kind_names{"panorama", "equirectangular", "mirror", "pinhole"};
 
 PictureKind parse_kind(const std::string& name) {
   for (std::size_t i = 0; i < kind_names.size(); ++i) {
     if (name == kind_names[i]) return static_cast<PictureKind>(i);
   }
-  throw ContractError("kind", "'" + name + "'", "'panorama', 'equirectangular', 'mirror'");
+  throw ContractError("kind", "'" + name + "'",
+                      "'panorama', 'equirectangular', 'mirror', 'pinhole'");
 }
 
 py::dict to_parameter_dict(const CameraModel& model) {
@@ -243,7 +244,8 @@ void bind_panoramas(py::module_& m) {
       .def(py::init([](const std::string& kind, const std::optional<ElevationBand>& elevations,
                        const std::optional<ElevationBand>& kept_elevations,
                        const std::string& direction, double forward_column,
-                       const std::optional<Camera>& camera, const py::object& mask) {
+                       const std::optional<Camera>& camera, const py::object& mask,
+                       std::optional<double> field_of_view_rad) {
              PictureSource source{.kind = parse_kind(kind),
                                   .layout = {.direction = parse_direction(direction),
                                              .forward_column = forward_column,
@@ -251,21 +253,28 @@ void bind_panoramas(py::module_& m) {
                                              .kept_elevations = kept_elevations},
                                   .camera = camera,
                                   .mask = std::nullopt};
+             if (field_of_view_rad && source.kind != PictureKind::pinhole) {
+               throw ContractError("field_of_view_rad", *field_of_view_rad,
+                                   "None, except with the kind 'pinhole'");
+             }
+             source.field_of_view_rad = field_of_view_rad;
              if (!mask.is_none()) source.mask = PictureArray(mask, "mask").image();
              return source;
            }),
            py::arg("kind") = "panorama", py::kw_only(), py::arg("elevations") = py::none(),
            py::arg("kept_elevations") = py::none(), py::arg("direction") = "clockwise",
            py::arg("forward_column") = 0.5, py::arg("camera") = py::none(),
-           py::arg("mask") = py::none(),
-           "`kind`: 'panorama', 'equirectangular' or 'mirror' (which needs `camera`). Bands are "
+           py::arg("mask") = py::none(), py::arg("field_of_view_rad") = py::none(),
+           "`kind`: 'panorama', 'equirectangular', 'mirror' (which needs `camera`) or 'pinhole' (a "
+           "narrow picture, such as a phone's, to be localised; needs `camera`, "
+           "`field_of_view_rad` from edge to edge, or EXIF data). Bands are "
            "(bottom, top) in radians: of the image's edges, and of the part to keep. `direction`: "
            "how columns run, 'clockwise' or 'counter-clockwise'. `mask`: uint8, 0 where the robot "
            "itself is seen.")
       .def_property_readonly(
           "kind",
           [](const PictureSource& s) { return kind_names[static_cast<std::size_t>(s.kind)]; },
-          "'panorama', 'equirectangular' or 'mirror'.")
+          "'panorama', 'equirectangular', 'mirror' or 'pinhole'.")
       .def_property_readonly(
           "elevations", [](const PictureSource& s) { return s.layout.elevations; },
           "(bottom, top) of the picture's edges in radians; None: unknown.")
@@ -280,7 +289,9 @@ void bind_panoramas(py::module_& m) {
       .def_property_readonly(
           "forward_column", [](const PictureSource& s) { return s.layout.forward_column; },
           "Column of the forward direction, as a fraction of the width.")
-      .def_readonly("camera", &PictureSource::camera, "For 'mirror', otherwise None.")
+      .def_readonly("camera", &PictureSource::camera, "For 'mirror' and 'pinhole', otherwise None.")
+      .def_readonly("field_of_view_rad", &PictureSource::field_of_view_rad,
+                    "Of 'pinhole' images without a camera; None: from their EXIF data.")
       .def("__eq__", [](const PictureSource& a, const PictureSource& b) { return a == b; })
       .def("__repr__",
            [](const PictureSource& s) {

@@ -280,8 +280,9 @@ void bind_memorising(py::module_& m) {
   const std::string option_text =
       append_option_list("", {options_of<SignatureOptions>(), options_of<PreprocessingOptions>()});
   const auto options_from = [](const std::optional<PictureSource>& source, bool thumbnails,
-                               bool features, const py::kwargs& keywords) {
-    MemoriserOptions options{.source = source, .thumbnails = thumbnails, .features = features};
+                               bool features, bool narrow, const py::kwargs& keywords) {
+    MemoriserOptions options{
+        .source = source, .thumbnails = thumbnails, .features = features, .narrow = narrow};
     Keywords(keywords).options(options.signature).options(options.preprocessing).finish();
     return options;
   };
@@ -291,14 +292,14 @@ void bind_memorising(py::module_& m) {
                               "none.")
       .def(py::init([=](const std::filesystem::path& memory,
                         const std::optional<PictureSource>& source, bool thumbnails, bool features,
-                        const py::kwargs& keywords) {
+                        bool narrow, const py::kwargs& keywords) {
              return std::make_unique<SharedMemoriser>(
-                 memory, options_from(source, thumbnails, features, keywords));
+                 memory, options_from(source, thumbnails, features, narrow, keywords));
            }),
            py::arg("memory"), py::arg("source") = py::none(), py::arg("thumbnails") = true,
-           py::arg("features") = true,
-           ("`source` is the image layout; a new file needs it. Options are those of a new "
-            "file." +
+           py::arg("features") = true, py::arg("narrow") = false,
+           ("`source` is the image layout; a new file needs it. Options and `narrow` (also store "
+            "features by which narrow pictures are localised) are those of a new file." +
             option_text)
                .c_str())
       .def(
@@ -321,12 +322,12 @@ void bind_memorising(py::module_& m) {
       "memorise",
       [=](const std::filesystem::path& memory, const py::object& recording,
           const std::optional<PictureSource>& source, bool thumbnails, bool features, int threads,
-          const std::string& floor, const py::kwargs& keywords) {
+          const std::string& floor, bool narrow, const py::kwargs& keywords) {
         Dataset dataset = to_dataset_for_memory(memory, recording, source);
         for (DatasetEntry& entry : dataset.entries) {
           entry.file = make_name_on_floor(floor, entry.file);
         }
-        const auto options = options_from(dataset.source, thumbnails, features, keywords);
+        const auto options = options_from(dataset.source, thumbnails, features, narrow, keywords);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
         Memoriser memoriser(memory, options);
@@ -346,7 +347,7 @@ void bind_memorising(py::module_& m) {
       },
       py::arg("memory"), py::arg("recording"), py::arg("source") = py::none(),
       py::arg("thumbnails") = true, py::arg("features") = true, py::arg("threads") = 0,
-      py::arg("floor") = "",
+      py::arg("floor") = "", py::arg("narrow") = false,
       ("Stores the images of a recording as views in a memory, like `panonav memorise`.\n\n"
        "`memory`: the file, new or existing; `recording`: a Dataset, a path or a list "
        "of images. An "

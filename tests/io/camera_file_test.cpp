@@ -31,6 +31,20 @@ std::string error_of(const fs::path& path) {
 
 using CameraFiles = InTemporaryFolder;
 
+TEST_F(CameraFiles, APinholeLensReadsBackTheSame) {
+  const fs::path path = folder / "camera.toml";
+  Camera camera;
+  camera.model = PinholeModel{500.0, 0.7, -0.1, 0.05};
+  camera.image_size = {640, 480};
+  camera.centre = {322.5, 239.25};
+  write_camera(path, {camera, std::nullopt});
+  EXPECT_EQ(read_camera(path).camera, camera);
+  std::ofstream(path) << "model = \"pinhole\"\nfocal_length_px = -1\nazimuth_rad = 0\n"
+                         "elevation_rad = 0\nroll_rad = 0\nwidth_px = 640\nheight_px = 480\n"
+                         "centre_u_px = 320\ncentre_v_px = 240\n";
+  EXPECT_TRUE(contains(error_of(path), "focal_length_px"));
+}
+
 TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
   const fs::path path = folder / "camera.toml";
   int models = 0;

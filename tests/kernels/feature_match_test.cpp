@@ -59,6 +59,49 @@ TEST(NearestDescriptors, AgreeWithTheirDefinitionOnEveryInstructionSet) {
 }
 
 // A landmark whose bearings were computed from its place is explained by the true direction.
+TEST(NearestHistograms, AgreeWithTheirDefinitionOnEveryInstructionSet) {
+  Random random(2);
+  int checked = 0;
+  for (const auto& [a_count, b_count] :
+       {std::pair<std::size_t, std::size_t>{1, 1}, {7, 60}, {256, 3}, {0, 5}, {5, 0}}) {
+    std::vector<std::uint8_t> a(histogram_dimensions * a_count), b(histogram_dimensions * b_count);
+    for (auto* values : {&a, &b}) {
+      for (auto& value : *values) {
+        value = static_cast<std::uint8_t>(random.index(9) == 0 ? 15 : random.index(3));
+      }
+    }
+    const auto distance = [&](std::size_t i, std::size_t j) {
+      int sum = 0;
+      for (std::size_t k = 0; k < histogram_dimensions; ++k) {
+        const int apart = a[histogram_dimensions * i + k] - b[histogram_dimensions * j + k];
+        sum += apart * apart;
+      }
+      return sum;
+    };
+    for (const Instructions set : available_instructions()) {
+      std::vector<std::uint16_t> of_a(a_count, 9999), of_b(b_count, 9999);
+      std::vector<std::int32_t> distances(a_count);
+      nearest_histograms(a, b, of_a, distances, of_b, set);
+      for (std::size_t i = 0; i < a_count && b_count > 0; ++i) {
+        EXPECT_EQ(distance(i, of_a[i]), distances[i]) << name(set);
+        for (std::size_t j = 0; j < b_count; ++j) EXPECT_GE(distance(i, j), distances[i]);
+      }
+      for (std::size_t j = 0; j < b_count && a_count > 0; ++j) {
+        for (std::size_t i = 0; i < a_count; ++i) {
+          EXPECT_LE(distance(of_b[j], j), distance(i, j)) << name(set);
+        }
+      }
+      ++checked;
+    }
+  }
+  EXPECT_GE(checked, 5);
+  std::vector<std::uint8_t> few(histogram_dimensions);
+  std::vector<std::uint16_t> one(1), two(2);
+  std::vector<std::int32_t> distances(1);
+  EXPECT_THROW(nearest_histograms(few, few, one, distances, two, Instructions::scalar),
+               ContractError);
+}
+
 TEST(CountExplained, CountsLandmarksAndNothingElseAlikeOnEveryInstructionSet) {
   Random random(2);
   constexpr std::size_t axis_count = motion_axes;

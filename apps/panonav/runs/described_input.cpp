@@ -255,9 +255,9 @@ DescribedInput describe_picture(const std::string& file, const std::string& desc
 }
 
 std::string model_name(const CameraModel& model) {
-  constexpr std::array<std::string_view, 7> names{
+  constexpr std::array<std::string_view, 8> names{
       "hyperboloidal",   "polynomial",   "unified", "equiangular",
-      "equirectangular", "dual fisheye", "fisheye"};
+      "equirectangular", "dual fisheye", "fisheye", "pinhole"};
   static_assert(std::variant_size_v<CameraModel> == names.size());
   return std::string(names[model.index()]);
 }

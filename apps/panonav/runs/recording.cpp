@@ -81,11 +81,40 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
   return source;
 }
 
+PictureSource make_pinhole_source(const PictureArguments& pictures) {
+  if (pictures.columns || pictures.forward_column || pictures.elevation_deg) {
+    throw UsageError(
+        "--columns-run, --forward-column and --elevation-deg cannot be used with --kind pinhole");
+  }
+  PictureSource source;
+  source.kind = PictureKind::pinhole;
+  if (pictures.camera) {
+    if (pictures.field_of_view_deg) {
+      throw UsageError("--field-of-view cannot be used with --camera, which contains it");
+    }
+    source.camera = read_camera(*pictures.camera).camera;
+    if (!std::holds_alternative<PinholeModel>(source.camera->model)) {
+      throw UsageError("--camera is " + *pictures.camera + ", a camera file of the model " +
+                       std::string(model_name(source.camera->model)) +
+                       "; allowed with --kind pinhole: pinhole");
+    }
+  }
+  if (const auto width_deg = pictures.field_of_view_deg) {
+    const double width_rad = radians(*width_deg);
+    if (!(width_rad >= min_field_of_view_rad && width_rad <= max_field_of_view_rad)) {
+      throw UsageError("--field-of-view is " + to_text(*width_deg) +
+                       "; allowed: 10 to 150 degrees");
+    }
+    source.field_of_view_rad = width_rad;
+  }
+  return source;
+}
+
 }  // namespace
 
 bool states_layout(const PictureArguments& pictures) {
   return pictures.kind || pictures.camera || pictures.columns || pictures.forward_column ||
-         pictures.elevation_deg;
+         pictures.elevation_deg || pictures.field_of_view_deg;
 }
 
 void declare_gpano(Arguments& arguments, bool& ignore_gpano) {
@@ -96,8 +125,18 @@ void declare_gpano(Arguments& arguments, bool& ignore_gpano) {
 }
 
 void declare_picture_layout(Arguments& arguments, PictureArguments& pictures) {
-  arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
-                   "Type of the images; not needed if a dataset.toml gives it");
+  std::vector<std::string> kinds{"panorama", "equirectangular", "mirror"};
+  std::string help = "Type of the images; not needed if a dataset.toml gives it";
+  if (pictures.takes_narrow) {
+    kinds.emplace_back("pinhole");
+    help += "; pinhole: a phone's or forward camera's";
+  }
+  arguments.choice("--kind", pictures.kind, kinds, help);
+  if (pictures.takes_narrow) {
+    arguments.option("--field-of-view DEG", pictures.field_of_view_deg,
+                     "Angle between the left and the right edge of pinhole images; by default from "
+                     "--camera, or from the focal length in their EXIF data");
+  }
   arguments.option("--camera FILE", pictures.camera,
                    "Calibration file of the camera: made by panonav calibrate, or of a lens that "
                    "looks up by OCamCalib, Kalibr, OpenCV, ROS or stella_vslam");
@@ -198,6 +237,10 @@ std::optional<PictureSource> make_picture_source(const PictureArguments& picture
   const std::string kind = pictures.kind.value_or(pictures.camera ? "mirror" : "");
   if (kind.empty()) throw UsageError("--kind is missing: panorama, equirectangular or mirror");
 
+  if (kind == "pinhole") return make_pinhole_source(pictures);
+  if (pictures.field_of_view_deg) {
+    throw UsageError("--field-of-view can only be used with --kind pinhole");
+  }
   const std::optional<ElevationBand> band = parse_elevation_band(pictures);
   if (kind == "mirror") return make_mirror_source(pictures, band, session);
   if (pictures.camera) throw UsageError("--camera can only be used with --kind mirror");
@@ -297,7 +340,7 @@ void SkippedImages::add(const std::exception_ptr& failure) {
 
 void note_other_camera(const PictureSource& images, const PictureSource& reference,
                        const std::string& input, Session& session) {
-  if (!images.camera) return;
+  if (!images.camera || images.kind == PictureKind::pinhole) return;
   const bool has_reference_camera = reference.camera.has_value();
   if (has_reference_camera && reference.camera->model == images.camera->model) return;
   const auto used = find_used_band(reference);

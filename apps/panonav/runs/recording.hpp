@@ -31,6 +31,9 @@ struct PictureArguments {
   std::optional<std::string> columns;
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
+  /// True for verbs that take narrow pictures (--kind pinhole).
+  bool takes_narrow = false;
+  std::optional<double> field_of_view_deg;
   bool recursive = false;     ///< also reads images in the subfolders of a folder
   bool ignore_gpano = false;  ///< does not level images by their GPano data
   /// How unusable images of a folder are found before the verb begins.
@@ -58,7 +61,8 @@ struct RunArguments {
 
 /// Adds --ignore-gpano.
 void declare_gpano(Arguments& arguments, bool& ignore_gpano);
-/// Adds --kind, --camera, --columns-run, --forward-column, --elevation-deg and --ignore-gpano.
+/// Adds --kind, --camera, --field-of-view (if narrow pictures are taken), --columns-run,
+/// --forward-column, --elevation-deg and --ignore-gpano.
 void declare_picture_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics);

@@ -37,6 +37,8 @@ std::string_view kind_name(PictureKind kind) {
       return "equirectangular";
     case PictureKind::mirror:
       return "mirror";
+    case PictureKind::pinhole:
+      return "pinhole";
   }
   return "panorama";
 }

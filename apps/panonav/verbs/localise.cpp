@@ -124,7 +124,12 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
   require_stored_band(arguments.pictures, file);
   Dataset recording = open_queries(arguments, file.header().source, session);
-  if (arguments.inputs.size() == 1 && recording.entries.size() > 1) {
+  const bool is_narrow = recording.source.kind == PictureKind::pinhole;
+  if (is_narrow) {
+    declared.reject_options({"--turn-randomly", "--areas", "--report"},
+                            "with narrow images (pinhole)");
+  }
+  if (!is_narrow && arguments.inputs.size() == 1 && recording.entries.size() > 1) {
     const OrientationCheck orientation = check_orientation(recording, session.executor());
     if (orientation.fault) {
       session.note("the stated orientation of the images is wrong: " +
@@ -187,6 +192,7 @@ Run declare_localise(Arguments& arguments) {
       "Data set, folder of images, video (several are joined), recording, one or "
       "more images, or a live source: - (JPEG images on standard input), a camera (/dev/video0), "
       "or an address (rtsp://, http://, tcp://)");
+  values->pictures.takes_narrow = true;
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   declare_record(arguments, values->record);

@@ -10,6 +10,7 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "runs/live_run.hpp"
@@ -31,6 +32,7 @@ struct MemoriseArguments {
   PreprocessingOptions preprocessing;
   bool no_thumbnails = false;
   bool no_features = false;
+  bool narrow = false;
   bool strict = false;
   std::string floor;
   LiveArguments live;
@@ -124,6 +126,7 @@ MemoriserOptions make_options(const MemoriseArguments& arguments, const PictureS
                            .preprocessing = arguments.preprocessing,
                            .thumbnails = !arguments.no_thumbnails,
                            .features = !arguments.no_features,
+                           .narrow = arguments.narrow,
                            .left_out = {}};
   if (!arguments.strict) {
     options.left_out = [&](const Observation& observation, const Error& error) {
@@ -251,6 +254,9 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
 ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments, Session& session) {
   require_floor(arguments.floor);
   const bool memory_existed = memory_exists(arguments.memory);
+  if (arguments.narrow && arguments.no_features) {
+    throw UsageError("--narrow cannot be used with --no-features");
+  }
   const bool live = recordings::is_live(arguments.inputs.front());
   if (!live) reject_live_options(declared, arguments.inputs.front(), true);
   std::optional<PictureSource> remembered;
@@ -258,6 +264,7 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
     const auto memory = MemoryFile::open(arguments.memory, Access::read_write);
     require_stored_options(declared, arguments.signature, arguments.preprocessing, memory);
     require_stored_band(arguments.pictures, memory);
+    if (arguments.narrow) require_narrow_features(memory);
     remembered = memory.header().source;
   }
   if (live) return memorise_live(declared, arguments, remembered, session);
@@ -321,6 +328,9 @@ Run declare_memorise(Arguments& arguments) {
   arguments.flag("--no-features", values->no_features,
                  "Do not store local features (4 kB per view); local features help to distinguish "
                  "places that are 1 to 2 m apart");
+  arguments.flag("--narrow", values->narrow,
+                 "In a new memory, also store features by which narrow images, such as those of a "
+                 "phone, are localised (17 kB per view)");
   arguments.flag("--strict", values->strict,
                  "Stop at the first image that cannot be read, or whose size differs from that of "
                  "the other images; by default, such images are reported and skipped");

@@ -54,6 +54,7 @@ std::optional<double> elevation_at(const Camera& camera, double radius_px) {
                  },
                  [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
                  [](const DualFisheyeModel&) -> std::optional<double> { return std::nullopt; },
+                 [](const PinholeModel&) -> std::optional<double> { return std::nullopt; },
                  [&](const auto& model) { return panonav::elevation_at(model, *r); }},
       camera.model);
 }
@@ -69,6 +70,7 @@ std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
                  },
                  [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
                  [](const DualFisheyeModel&) -> std::optional<double> { return std::nullopt; },
+                 [](const PinholeModel&) -> std::optional<double> { return std::nullopt; },
                  [&](const PolynomialModel& model) {
                    return panonav::radius_at(model, elevation_rad,
                                              std::max(0.0, inner_px - slack_px), rim_px + slack_px);
@@ -79,12 +81,16 @@ std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
   return clamp_with_tolerance(*r, inner_px, rim_px, slack_px);
 }
 
-void validate_mirror(const Camera& camera) {
+void validate_centre(const Camera& camera) {
   const auto [width, height] = camera.image_size;
   require(camera.centre.u_px >= 0 && camera.centre.u_px <= width, "centre.u_px", camera.centre.u_px,
           "0 .. " + to_text(width));
   require(camera.centre.v_px >= 0 && camera.centre.v_px <= height, "centre.v_px",
           camera.centre.v_px, "0 .. " + to_text(height));
+}
+
+void validate_mirror(const Camera& camera) {
+  validate_centre(camera);
   require(std::isfinite(camera.inner_radius_px) && camera.inner_radius_px >= 0, "inner_radius_px",
           camera.inner_radius_px, "finite and at least 0");
   require(std::isfinite(camera.rim_radius_px) && camera.rim_radius_px > camera.inner_radius_px,
@@ -183,6 +189,11 @@ void validate(const Camera& camera) {
     validate_equirectangular(camera, *model);
   } else if (const auto* dual = std::get_if<DualFisheyeModel>(&camera.model)) {
     validate_dual(camera, *dual);
+  } else if (const auto* pinhole = std::get_if<PinholeModel>(&camera.model)) {
+    validate(*pinhole);
+    validate_centre(camera);
+    require(camera.direction == ColumnDirection::clockwise, "columns", 1.0,
+            "clockwise: pictures of a pinhole lens are not mirrored");
   } else {
     validate_mirror(camera);
   }
@@ -211,6 +222,12 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
     if (!first && !second) return std::nullopt;
     return second && (!first || second->weight > first->weight) ? second->pixel : first->pixel;
   }
+  if (const auto* model = std::get_if<PinholeModel>(&camera.model)) {
+    const auto point = panonav::project(*model, direction);
+    if (!point) return std::nullopt;
+    return clamp_to_image(
+        camera, {camera.centre.u_px + point->right_px, camera.centre.v_px - point->up_px});
+  }
   const auto radius_px = radius_at(camera, elevation_rad);
   if (!radius_px) return std::nullopt;
   const double angle_rad = camera.forward_angle_rad + azimuth_sign(camera.direction) * azimuth_rad;
@@ -237,6 +254,10 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
                                    lens.centre_v_px - inside->v_px);
     if (!in_lens) return std::nullopt;
     return FisheyeLens::Rotation(lens).robot_from_lens(*in_lens);
+  }
+  if (const auto* model = std::get_if<PinholeModel>(&camera.model)) {
+    return panonav::unproject(*model, inside->u_px - camera.centre.u_px,
+                              camera.centre.v_px - inside->v_px);
   }
   const auto ideal =
       undistort(camera, {inside->u_px - camera.centre.u_px, inside->v_px - camera.centre.v_px});
@@ -270,7 +291,10 @@ std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& ca
 }
 
 ImageCircle image_circle(const Camera& camera, int lens) {
-  if (std::holds_alternative<EquirectangularModel>(camera.model)) return {};
+  if (std::holds_alternative<EquirectangularModel>(camera.model) ||
+      std::holds_alternative<PinholeModel>(camera.model)) {
+    return {};
+  }
   if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
     const FisheyeLens& fisheye = model->lenses[lens];
     return {
@@ -329,6 +353,9 @@ ElevationBand visible_elevations(const Camera& camera) {
     return {model->elevation_bottom_rad, model->elevation_top_rad};
   }
   if (lens_count(camera) == 2) return visible_elevations_of_lenses(camera);
+  if (std::holds_alternative<PinholeModel>(camera.model)) {
+    throw ContractError("model", "pinhole", "one that shows all azimuths");
+  }
   const double outer_px = find_outer_radius(camera);
   require(outer_px > camera.inner_radius_px, "distance from the centre to the frame", outer_px,
           "above inner_radius_px " + to_text(camera.inner_radius_px));

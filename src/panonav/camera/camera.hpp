@@ -9,6 +9,7 @@
 #include "panonav/camera/equiangular_model.hpp"
 #include "panonav/camera/fisheye_model.hpp"
 #include "panonav/camera/hyperboloidal_model.hpp"
+#include "panonav/camera/pinhole_model.hpp"
 #include "panonav/camera/polynomial_model.hpp"
 #include "panonav/camera/unified_model.hpp"
 #include "panonav/core/image.hpp"
@@ -35,7 +36,7 @@ struct EquirectangularModel {
 /// uses this list.
 using CameraModel =
     std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel, EquiangularModel,
-                 EquirectangularModel, DualFisheyeModel, FisheyeModel>;
+                 EquirectangularModel, DualFisheyeModel, FisheyeModel, PinholeModel>;
 
 /// Sense of rotation in which azimuths run in a picture; `Camera::direction` gives its exact
 /// meaning for each model.
@@ -67,9 +68,9 @@ struct Camera {
 
   CameraModel model;     ///< mapping between directions (or elevations) and image positions
   ImageSize image_size;  ///< of every picture of this camera, in pixels
-  // Mirror cameras and lenses with a vertical axis (all models but equirectangular and dual
-  // fisheye). Radii are those of the ideal image, which is symmetric about the centre:
-  PixelPoint centre;             ///< inside the image
+  // Mirror cameras and lenses with a vertical axis (all models but equirectangular, dual fisheye
+  // and pinhole). Radii are those of the ideal image, which is symmetric about the centre:
+  PixelPoint centre;             ///< inside the image; also that of a pinhole lens
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
   double inner_radius_px = 0.0;  ///< nothing is visible within (the camera's own reflection)
   /// Sense of rotation of azimuth in the displayed picture (u right, v down). Equirectangular:
@@ -130,7 +131,7 @@ struct ImageCircle {
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
 };
 /// Returns the circle around the mirror, or of lens `lens` of a dual fisheye camera; all zero for
-/// an equirectangular camera.
+/// an equirectangular or pinhole camera.
 [[nodiscard]] ImageCircle image_circle(const Camera& camera, int lens);
 
 /// A band of elevations, in radians.
@@ -141,8 +142,8 @@ struct ElevationBand {
 };
 /// Finds the band of elevations visible at every azimuth. Where the image frame cuts the mirror,
 /// the band ends at the cut. For a dual fisheye camera: the band around the horizon, in steps of
-/// one degree. Throws ContractError when no elevation is seen at every azimuth (the frame cuts even
-/// the inner radius, or lenses leave a gap at the horizon).
+/// one degree. Throws ContractError when no elevation is seen at every azimuth (a pinhole lens, a
+/// frame that cuts even the inner radius, or a gap between lenses at the horizon).
 [[nodiscard]] ElevationBand visible_elevations(const Camera& camera);
 
 }  // namespace panonav

@@ -16,7 +16,7 @@ namespace panonav {
 /// Names of the models in files, in the order of the alternatives of CameraModel.
 inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> camera_model_names{
     "hyperboloidal",   "polynomial",   "unified", "equiangular",
-    "equirectangular", "dual-fisheye", "fisheye"};
+    "equirectangular", "dual-fisheye", "fisheye", "pinhole"};
 
 /// Returns the axis of a unified or fisheye model; null for others. `Model` is CameraModel, const
 /// or not.
@@ -70,6 +70,11 @@ void visit_parameters(Model& model, Visit&& visit) {
           visit("k3", m.k3);
           visit("k4", m.k4);
           visit("max_angle_rad", m.max_angle_rad);
+        } else if constexpr (std::is_same_v<Kind, PinholeModel>) {
+          visit("focal_length_px", m.focal_length_px);
+          visit("azimuth_rad", m.azimuth_rad);
+          visit("elevation_rad", m.elevation_rad);
+          visit("roll_rad", m.roll_rad);
         } else if constexpr (std::is_same_v<Kind, EquiangularModel>) {
           visit("elevation_at_inner_rad", m.elevation_at_inner_rad);
           visit("elevation_at_rim_rad", m.elevation_at_rim_rad);

@@ -94,6 +94,8 @@ CameraFile read_camera(const std::filesystem::path& path, CameraMount mount) {
                        read_whole_number(fields, "height_px")};
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
     camera.forward_column = fields.number("forward_column").value_or(0.5);
+  } else if (std::holds_alternative<PinholeModel>(camera.model)) {
+    camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
   } else if (lens_count(camera) == 1) {
     camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
     camera.rim_radius_px = fields.required_number("rim_radius_px");
@@ -148,6 +150,9 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
   number("height_px", camera.image_size.height);
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
     number("forward_column", camera.forward_column);
+  } else if (std::holds_alternative<PinholeModel>(camera.model)) {
+    number("centre_u_px", camera.centre.u_px);
+    number("centre_v_px", camera.centre.v_px);
   } else if (lens_count(camera) == 1) {
     number("centre_u_px", camera.centre.u_px);
     number("centre_v_px", camera.centre.v_px);

@@ -25,7 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
+constexpr std::array<std::string_view, 4> kind_names{"panorama", "equirectangular", "mirror",
+                                                     "pinhole"};
 constexpr std::array<std::string_view, 10> column_names{
     "file",     "stamp_s",          "x_m",      "y_m",      "heading_deg", "odom_x_m",
     "odom_y_m", "odom_heading_deg", "roll_deg", "pitch_deg"};
@@ -42,11 +43,35 @@ ElevationBand to_elevation_band(TomlFields& fields, const std::vector<double>& v
   return {radians(values[0]), radians(values[1])};
 }
 
+/// Reads the lens of narrow pictures: a camera file, a field of view, or neither (EXIF data).
+PictureSource read_pinhole_source(TomlFields& images, const fs::path& folder) {
+  PictureSource source;
+  source.kind = PictureKind::pinhole;
+  if (const auto file = images.text("camera")) {
+    source.camera = read_camera(folder / *file).camera;
+    if (!std::holds_alternative<PinholeModel>(source.camera->model)) {
+      images.fail("camera", "\"" + *file + "\"", "a camera file of the model pinhole");
+    }
+    return source;
+  }
+  if (const auto degrees_wide = images.number("field_of_view_deg")) {
+    const double width_rad = radians(*degrees_wide);
+    if (!(width_rad >= min_field_of_view_rad && width_rad <= max_field_of_view_rad)) {
+      images.fail("field_of_view_deg", to_text(*degrees_wide), "10 .. 150");
+    }
+    source.field_of_view_rad = width_rad;
+  }
+  return source;
+}
+
 PictureSource read_source(TomlFields& images, const fs::path& folder) {
   PictureSource source;
   const auto kind = images.choice("kind", kind_names);
-  if (!kind) images.fail("kind", "missing", "\"panorama\", \"equirectangular\", \"mirror\"");
+  if (!kind) {
+    images.fail("kind", "missing", "\"panorama\", \"equirectangular\", \"mirror\", \"pinhole\"");
+  }
   source.kind = static_cast<PictureKind>(*kind);
+  if (source.kind == PictureKind::pinhole) return read_pinhole_source(images, folder);
   std::optional<ElevationBand> band;
   if (const auto values = images.numbers("elevation_deg"))
     band = to_elevation_band(images, *values);
@@ -311,6 +336,15 @@ std::string format_images_section(const Dataset& dataset) {
                      std::string(kind_names[static_cast<std::size_t>(source.kind)]) + "\"\n";
   std::optional<ElevationBand> band = source.layout.kept_elevations;
   if (source.kind == PictureKind::panorama) band = source.layout.elevations;
+  if (source.kind == PictureKind::pinhole) {
+    if (source.camera) {
+      write_camera(dataset.folder / "camera.toml", {*source.camera, {}});
+      text += "camera = \"camera.toml\"\n";
+    } else if (source.field_of_view_rad) {
+      text += "field_of_view_deg = " + to_text(to_exact_degrees(*source.field_of_view_rad)) + "\n";
+    }
+    return text;
+  }
   if (source.kind != PictureKind::mirror) {
     text += "columns = \"" + std::string(to_string(source.layout.direction)) +
             "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";

@@ -289,7 +289,9 @@ Tilt to_tilt(const GpanoData& data, const PictureLayout& layout) {
 }
 
 void apply_gpano(Dataset& dataset) {
-  if (dataset.source.kind == PictureKind::mirror) return;
+  if (dataset.source.kind == PictureKind::mirror || dataset.source.kind == PictureKind::pinhole) {
+    return;
+  }
   std::vector<std::optional<GpanoData>> data;
   for (const DatasetEntry& entry : dataset.entries) {
     data.push_back(entry.store ? std::nullopt : read_gpano(entry.path));

@@ -72,7 +72,7 @@ struct PanoramaReader::Wide {
 
 void require_picture_size(const PictureSource& source, ImageSize size) {
   const std::string own = std::to_string(size.width) + " x " + std::to_string(size.height) + " px";
-  if (source.kind == PictureKind::mirror && source.camera && size != source.camera->image_size) {
+  if (source.camera && size != source.camera->image_size) {
     const ImageSize& camera = source.camera->image_size;
     throw ContractError("image size", own,
                         std::to_string(camera.width) + " x " + std::to_string(camera.height) +
@@ -99,6 +99,11 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
     : source_(std::move(source)), shape_(shape) {
   if (source_.kind == PictureKind::equirectangular) {
     source_.layout = complete_sphere_layout(source_.layout);
+  }
+  if (source_.kind == PictureKind::pinhole) {
+    throw ContractError("kind of the images", "pinhole",
+                        "panorama, equirectangular or mirror, as all azimuths are needed; narrow "
+                        "pictures can only be localised");
   }
   if (source_.kind != PictureKind::mirror) return;
   require(source_.camera.has_value(), "camera of mirror images", 0.0, "one camera");

@@ -22,6 +22,26 @@ void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::
   });
 }
 
+void nearest_histograms(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b,
+                        std::span<std::uint16_t> nearest_of_a,
+                        std::span<std::int32_t> distances_of_a,
+                        std::span<std::uint16_t> nearest_of_b, Instructions instructions) {
+  const auto check = [](std::size_t values, std::size_t histograms) {
+    require(histograms <= max_descriptors, "histograms", static_cast<double>(histograms),
+            "0 .. 256");
+    require(values == histogram_dimensions * histograms, "values of the histograms",
+            static_cast<double>(values), "128 for each");
+  };
+  check(a.size(), nearest_of_a.size());
+  check(b.size(), nearest_of_b.size());
+  require(distances_of_a.size() == nearest_of_a.size(), "distances",
+          static_cast<double>(distances_of_a.size()), "one for each histogram");
+  with_body<FeatureMatchBody>(instructions, [&](auto body) {
+    body.nearest_histograms(a.data(), nearest_of_a.size(), b.data(), nearest_of_b.size(),
+                            nearest_of_a.data(), distances_of_a.data(), nearest_of_b.data());
+  });
+}
+
 void count_explained(const MatchedBearings& matched, const MatchedBearings::Turn& turn,
                      const MotionHypotheses& hypotheses, std::span<std::int32_t> counts,
                      Instructions instructions) {

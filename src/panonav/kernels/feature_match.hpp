@@ -15,6 +15,17 @@ void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::
                          std::span<std::uint16_t> nearest_of_a,
                          std::span<std::uint16_t> nearest_of_b, Instructions instructions);
 
+/// Finds, for each histogram of `a` (`histogram_dimensions` values of 0 .. 15), the index of the
+/// nearest histogram of `b` and the square of their Euclidean distance, and for each of `b` the
+/// index of the nearest of `a`; of equally near ones the first. If `b` is empty, the distances are
+/// the largest number and the indices are not written. All instruction sets give the same numbers.
+/// Throws ContractError on inconsistent sizes and on more than `max_descriptors` histograms. Cost:
+/// about 0.1 ms with AVX2 for 60 and 256.
+void nearest_histograms(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b,
+                        std::span<std::uint16_t> nearest_of_a,
+                        std::span<std::int32_t> distances_of_a,
+                        std::span<std::uint16_t> nearest_of_b, Instructions instructions);
+
 /// Counts, for each direction of motion, the matched bearings that it explains after the reference
 /// has been rotated by `turn` (docs/equations.md, Local features): `counts[d]` for axis d and
 /// `counts[d + motion_axes]` for the opposite direction. Bearings that are a right angle or more

@@ -139,6 +139,9 @@ struct ColumnContrast {
 /// Largest number of descriptors (of 256 bits) per view in `nearest_descriptors`.
 inline constexpr int max_descriptors = 256;
 
+/// Values of a histogram in `nearest_histograms`, each 0 .. 15.
+inline constexpr int histogram_dimensions = 128;
+
 /// Bearings of matched features of two views, as a structure of arrays. Tangents belong to the
 /// elevations; `sine` and `cosine` to the azimuth in the query minus that in the reference.
 struct MatchedBearings {

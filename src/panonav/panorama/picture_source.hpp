@@ -13,7 +13,8 @@ namespace panonav {
 enum class PictureKind {
   panorama,         ///< ready-made panoramic cylinders
   equirectangular,  ///< 360 degree pictures of the whole sphere, twice as wide as high
-  mirror            ///< raw images of a mirror or fisheye camera with a vertical axis
+  mirror,           ///< raw images of a mirror or fisheye camera with a vertical axis
+  pinhole           ///< pictures of a part of the azimuth, such as a phone's; not for memories
 };
 
 /// Band that is cut out of equirectangular pictures if no other band is stated. Floor and ceiling
@@ -29,7 +30,10 @@ struct PictureSource {
   /// `default_equirectangular_band`. Mirror: only `kept_elevations` is used, the band to unwarp;
   /// nullopt: all elevations that the camera sees at every azimuth.
   PictureLayout layout;
-  std::optional<Camera> camera;  ///< mirror, and only there
+  std::optional<Camera> camera;  ///< mirror: always; pinhole: if known; not for other kinds
+  /// Pinhole without a camera: angle between the left and the right edge of each picture, on whose
+  /// middle the optical axis is; nullopt: the focal length in the EXIF data of each picture.
+  std::optional<double> field_of_view_rad = std::nullopt;
   /// Mirror: grey, of the camera's size; pixels of value 0 show the robot itself. Panorama values
   /// that depend on these pixels are interpolated (see `fill_hidden_values`).
   std::optional<Image> mask;

@@ -18,6 +18,7 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
+#include "panonav/signature/gradient_features.hpp"
 #include "panonav/storage/checksum.hpp"
 
 namespace panonav {
@@ -232,7 +233,7 @@ FeatureSource make_feature_source(const MemoryFile& file) {
     const auto bytes = file.features(view);
     if (!bytes) return std::nullopt;
     try {
-      return unpack_features(*bytes, shape, band);
+      return unpack_features(split_feature_bytes(*bytes).local, shape, band);
     } catch (const ContractError& error) {
       throw FileError(file.path().string(), "is damaged: " + std::string(error.what()));
     }

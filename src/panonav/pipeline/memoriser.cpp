@@ -14,6 +14,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_address.hpp"
 
@@ -191,11 +192,13 @@ MemoryHeader Memoriser::make_header_from_waiting(Executor& executor) const {
 
 void Memoriser::make_file(Executor& executor) {
   file_ = MemoryFile::create(path_, make_header_from_waiting(executor));
+  if (options_.narrow) set_narrow_features(*file_);
   encoder_.emplace(file_->header(), *options_.source);
   store(std::exchange(waiting_, {}), executor);
 }
 
 void Memoriser::store(std::span<const Observation> observations, Executor& executor) {
+  const bool is_narrow = has_narrow_features(*file_);
   std::vector<NewView> views(observations.size());
   std::vector<std::exception_ptr> failures(observations.size());
   parallel_for(executor, observations.size(), [&](std::size_t i) {
@@ -207,7 +210,7 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
         const Panorama panorama = encoder_->panorama(observation);
         views[i].signature = encoder_->packed(panorama);
         if (options_.thumbnails) views[i].thumbnail = encode_thumbnail(panorama);
-        if (features) views[i].features = pack(encoder_->features(panorama).value());
+        if (features) views[i].features = pack_features(*encoder_, panorama, is_narrow);
       } else {
         views[i].signature = encoder_->packed(observation);
       }

@@ -12,6 +12,7 @@
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -141,7 +142,9 @@ void MemoryUpdater::observe(const Observation& observation, const Panorama& pano
                 [&](const auto& one) { return !self.update.can_become_view(one.first); });
   if (!self.update.can_become_view(number)) return;
   view.thumbnail = encode_thumbnail(panorama);
-  if (const auto features = self.encoder.features(panorama)) view.features = pack(*features);
+  if (self.file.header().elevations) {
+    view.features = pack_features(self.encoder, panorama, has_narrow_features(self.file));
+  }
   self.candidate_views.emplace(number, std::move(view));
 }
 

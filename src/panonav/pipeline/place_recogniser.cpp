@@ -14,6 +14,7 @@
 #include "panonav/pipeline/internal/feature_cache.hpp"
 #include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
+#include "panonav/pipeline/internal/sector_recogniser.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -52,6 +53,18 @@ class ObservationQuery {
   std::optional<Panorama> panorama_;
 };
 
+/// Returns the layout of the pictures that the encoder takes: that of the memory if the queries are
+/// narrow pictures, which it cannot encode.
+PictureSource choose_encoded_source(const PlaceRecogniserOptions& options,
+                                    const MemoryHeader& header) {
+  const PictureSource source = options.source.value_or(header.source);
+  return source.kind == PictureKind::pinhole ? header.source : source;
+}
+
+bool is_narrow_source(const PlaceRecogniserOptions& options) {
+  return options.source && options.source->kind == PictureKind::pinhole;
+}
+
 void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& header,
                    bool is_memory_held) {
   validate(options.localiser);
@@ -59,6 +72,10 @@ void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& he
   if (options.areas && !is_memory_held) {
     throw ContractError("areas", "asked for",
                         "none in a memory that is not held: they take the positions of all views");
+  }
+  if (is_narrow_source(options) && (options.areas || !is_memory_held)) {
+    throw ContractError("narrow pictures", options.areas ? "with areas" : "in a memory not held",
+                        "without areas, in a memory that is held");
   }
   if (options.localiser.components > max_components) {
     throw ContractError("components", options.localiser.components,
@@ -78,10 +95,11 @@ struct PlaceRecogniser::Implementation {
       : options(options_),
         unit(read_length_unit(file)),
         memory(file.load()),
-        encoder(file.header(), options.source.value_or(file.header().source)) {
+        encoder(file.header(), choose_encoded_source(options, file.header())) {
     check_options(options, file.header(), true);
     if (memory->empty()) throw_empty_memory(file);
     learn_from_held_views(file);
+    if (is_narrow_source(options)) narrow.emplace(file, *memory, *options.source);
     if (options.areas) areas.emplace(*memory);
   }
   /// Searches the memory on its server.
@@ -91,7 +109,7 @@ struct PlaceRecogniser::Implementation {
         unit(read_length_unit(file)),
         path(std::move(path_)),
         indexed(std::move(index_)),
-        encoder(file.header(), options.source.value_or(file.header().source)) {
+        encoder(file.header(), choose_encoded_source(options, file.header())) {
     check_options(options, file.header(), false);
     learn_from_index(file);
   }
@@ -174,6 +192,7 @@ struct PlaceRecogniser::Implementation {
   std::filesystem::path path;              // where not held
   std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
+  std::optional<SectorRecogniser> narrow;  // set if the pictures are narrow
   std::shared_ptr<FeatureCache> features;  // null: the memory has none
   std::optional<LearntModels> models;      // learnt or loaded last
   mutable std::mutex mutex;                // of `current`
@@ -206,14 +225,17 @@ LengthUnit PlaceRecogniser::length_unit() const noexcept {
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
   const Implementation& own = *implementation_;
-  const std::shared_ptr<const Localiser> localiser = own.localiser();
-  ObservationQuery query(own.encoder, observation);
-  const PackedSignature signature = query.signature(localiser->should_rank_by_features());
   const std::unique_ptr<ViewIndex> index = own.index();
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
     if (const auto view = index->find(name)) excluded.push_back(*view);
   }
+  if (own.narrow) {
+    return own.narrow->localise(observation, own.options.localiser.top, excluded);
+  }
+  const std::shared_ptr<const Localiser> localiser = own.localiser();
+  ObservationQuery query(own.encoder, observation);
+  const PackedSignature signature = query.signature(localiser->should_rank_by_features());
   const SearchMask mask{excluded, {}};
   Place place = localiser->localise(*index, signature, mask, query.features());
   if (own.areas) {

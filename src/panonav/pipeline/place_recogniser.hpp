@@ -25,7 +25,8 @@ struct SearchCounters;
 /// Options of a place recogniser.
 struct PlaceRecogniserOptions {
   LocaliserOptions localiser;  ///< number of views compared and listed
-  /// Layout of the pictures; nullopt: that of the memory.
+  /// Layout of the pictures; nullopt: that of the memory. Pictures of the kind `pinhole`, which
+  /// show a part of the azimuth, need a memory with features for them (`MemoriserOptions::narrow`).
   std::optional<PictureSource> source;
   /// Also compute the areas in which the robot may be (`localise_hierarchically`). The memory is
   /// then held in RAM, as areas depend on the positions of all views.

@@ -312,6 +312,10 @@ void validate(const MemoryHeader& header) {
   require_band(header.elevations, "elevations");
   validate(header.preprocessing);
   const PictureSource& source = header.source;
+  if (source.kind == PictureKind::pinhole) {
+    throw ContractError("kind of the images", "pinhole",
+                        "panorama, equirectangular or mirror: a memory has views of all azimuths");
+  }
   require_band(source.layout.elevations, "source elevations");
   require_band(source.layout.kept_elevations, "source kept elevations");
   require(source.layout.forward_column >= 0.0 && source.layout.forward_column <= 1.0,

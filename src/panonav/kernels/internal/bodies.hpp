@@ -60,6 +60,9 @@ template <Instructions set>
 struct FeatureMatchBody {
   static void nearest_descriptors(const uint64_t* a, size_t a_count, const uint64_t* b,
                                   size_t b_count, uint16_t* nearest_of_a, uint16_t* nearest_of_b);
+  static void nearest_histograms(const uint8_t* a, size_t a_count, const uint8_t* b, size_t b_count,
+                                 uint16_t* nearest_of_a, int32_t* distances_of_a,
+                                 uint16_t* nearest_of_b);
   static void count_explained(const MatchedBearings& matched, const MatchedBearings::Turn& turn,
                               const MotionHypotheses& hypotheses, int32_t* counts);
 };

@@ -93,6 +93,48 @@ void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_coun
 
 namespace {
 
+/// Sum of products of two histograms; below 2^15, since each is at most 15 * 15.
+inline int32_t multiply_histograms(const uint8_t* a, const uint8_t* b) {
+  uint16_t sum = 0;
+  for (size_t k = 0; k < histogram_dimensions; ++k) {
+    sum = static_cast<uint16_t>(sum + static_cast<uint16_t>(a[k] * b[k]));
+  }
+  return sum;
+}
+
+}  // namespace
+
+template <Instructions set>
+void FeatureMatchBody<set>::nearest_histograms(const uint8_t* a, size_t a_count, const uint8_t* b,
+                                               size_t b_count, uint16_t* nearest_of_a,
+                                               int32_t* distances_of_a, uint16_t* nearest_of_b) {
+  int32_t squares_of_a[max_descriptors];
+  for (size_t i = 0; i < a_count; ++i) {
+    const uint8_t* const histogram = a + i * histogram_dimensions;
+    squares_of_a[i] = multiply_histograms(histogram, histogram);
+    distances_of_a[i] = 0x7FFFFFFF;
+  }
+  for (size_t j = 0; j < b_count; ++j) {
+    const uint8_t* const histogram = b + j * histogram_dimensions;
+    const int32_t square_of_b = multiply_histograms(histogram, histogram);
+    int32_t smallest = 0x7FFFFFFF;
+    for (size_t i = 0; i < a_count; ++i) {
+      const int32_t product = multiply_histograms(a + i * histogram_dimensions, histogram);
+      const int32_t distance = squares_of_a[i] + square_of_b - 2 * product;
+      if (distance < smallest) {
+        smallest = distance;
+        nearest_of_b[j] = static_cast<uint16_t>(i);
+      }
+      if (distance < distances_of_a[i]) {
+        distances_of_a[i] = distance;
+        nearest_of_a[i] = static_cast<uint16_t>(j);
+      }
+    }
+  }
+}
+
+namespace {
+
 /// Sines and cosines of the azimuths of matches in the frame halfway between both views. If the
 /// query's azimuth is clockwise of the reference's, both vectors are reversed, so that a direction
 /// of motion must have a sine of at least `min_sine` to both bearings; `min_sine` is above 1 if no

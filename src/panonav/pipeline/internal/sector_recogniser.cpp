@@ -1,0 +1,94 @@
+#include "panonav/pipeline/internal/sector_recogniser.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/io/exif.hpp"
+#include "panonav/io/panorama_reader.hpp"
+#include "panonav/panorama/sector_view.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// Checks that the memory can be asked with narrow pictures, and returns its features.
+GradientSource make_gradient_source(const MemoryFile& file) {
+  require_narrow_features(file);
+  return [&file](ViewId view) -> std::optional<GradientFeatures> {
+    const auto bytes = file.features(view);
+    if (!bytes) return std::nullopt;
+    const MemoryHeader& header = file.header();
+    const auto parts = split_feature_bytes(*bytes);
+    if (parts.gradient.empty()) return std::nullopt;
+    try {
+      return unpack_gradient_features(parts.gradient, {header.shape.rows, header.panorama_columns},
+                                      *header.elevations);
+    } catch (const ContractError& error) {
+      throw FileError(file.path().string(), "is damaged: " + std::string(error.what()));
+    }
+  };
+}
+
+Camera make_pinhole_camera(ImageSize size, double focal_length_px) {
+  Camera camera;
+  camera.model = PinholeModel{.focal_length_px = focal_length_px};
+  camera.image_size = size;
+  camera.centre = {0.5 * size.width, 0.5 * size.height};
+  return camera;
+}
+
+}  // namespace
+
+SectorRecogniser::SectorRecogniser(const MemoryFile& file, const VisualMemory& memory,
+                                   PictureSource source)
+    : header_(file.header()),
+      source_(std::move(source)),
+      localiser_(memory, make_gradient_source(file)) {}
+
+Camera SectorRecogniser::choose_camera(const Observation& observation, ImageSize size) const {
+  if (source_.camera) {
+    require_picture_size(source_, size);
+    return *source_.camera;
+  }
+  if (source_.field_of_view_rad) {
+    return make_pinhole_camera(
+        size, focal_length_from_field_of_view(size.width, *source_.field_of_view_rad));
+  }
+  std::optional<double> focal_length_mm;
+  if (!observation.encoded.empty()) {
+    focal_length_mm = find_focal_length_35mm(observation.encoded);
+  } else if (!observation.file.empty()) {
+    focal_length_mm = read_focal_length_35mm(observation.file);
+  }
+  if (!focal_length_mm) {
+    throw ContractError("field of view", "unknown",
+                        "stated (the angle between the left and the right edge), a camera file, or "
+                        "EXIF data with FocalLengthIn35mmFilm");
+  }
+  return make_pinhole_camera(size, focal_length_from_35mm(size, *focal_length_mm));
+}
+
+Place SectorRecogniser::localise(const Observation& observation, int top,
+                                 std::span<const ViewId> excluded) const {
+  return rethrow_with_file_name(observation, [&] {
+    const auto* const image = std::get_if<Image>(&observation.picture);
+    if (image == nullptr) throw ContractError("picture", "a panorama", "an image");
+    const Camera camera = choose_camera(observation, image->size());
+    const SectorView sector =
+        unwarp_sector(image->view(), camera, {header_.shape.rows, header_.panorama_columns},
+                      *header_.elevations, observation.tilt.value_or(Tilt{}));
+    SectorQuery query{.features = extract_gradient_features(sector, header_.preprocessing),
+                      .azimuth_rad = std::get<PinholeModel>(camera.model).azimuth_rad,
+                      .width_rad = std::max(sector.width_rad(), min_field_of_view_rad),
+                      .has_known_tilt = observation.tilt.has_value()};
+    for (auto& corner : query.features.corners) {
+      corner.azimuth_rad -= static_cast<float>(query.azimuth_rad);
+    }
+    return localiser_.localise(query, top, excluded);
+  });
+}
+
+}  // namespace panonav

@@ -1,0 +1,107 @@
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/signature/gradient_features.hpp"
+#include "support/patch_views.hpp"
+#include "support/temporary_folder.hpp"
+#include "support/text.hpp"
+
+namespace panonav::testing {
+namespace {
+
+class NarrowPictures : public InTemporaryFolder {
+ protected:
+  /// Memorises nine rooms of one view each.
+  std::filesystem::path memorise(bool narrow) {
+    const auto path = folder / (narrow ? "narrow.panonav" : "plain.panonav");
+    MemoriserOptions options{
+        .source = PictureSource{}, .narrow = narrow, .map = false, .left_out = {}};
+    options.source->layout.elevations = patch_band;
+    Memoriser memoriser(path, options);
+    for (int i = 0; i < 9; ++i) {
+      Observation view(make_patch_view(static_cast<std::uint64_t>(i)));
+      view.name = "room " + std::to_string(i);
+      view.pose = ReferencePose{10.0 * i, 0.0, 0.2 * i};
+      memoriser.add(std::move(view));
+    }
+    (void)memoriser.finish();
+    return path;
+  }
+  static PlaceRecogniserOptions narrow_options() {
+    PlaceRecogniserOptions options;
+    options.source.emplace();
+    options.source->kind = PictureKind::pinhole;
+    options.source->field_of_view_rad = radians(70.0);
+    return options;
+  }
+};
+
+TEST_F(NarrowPictures, AreLocalisedInAMemoryOfPanoramas) {
+  const auto path = memorise(true);
+  const PlaceRecogniser recogniser(path, narrow_options());
+  Observation photo(take_narrow_picture(make_patch_view(5), 1.5, radians(70.0)));
+  const Place place = recogniser.localise(photo);
+  ASSERT_TRUE(place.known);
+  EXPECT_EQ(place.matches.front().name, "room 5");
+  EXPECT_NEAR(place.position->x_m, 50.0, 1e-9);
+  EXPECT_NEAR(angle_difference(*place.heading_rad, 1.0 + 1.5), 0.0, radians(1.0));
+  const std::vector<std::string> own{"room 5"};
+  EXPECT_FALSE(recogniser.localise(photo, own).known);
+  EXPECT_FALSE(
+      recogniser.localise(take_narrow_picture(make_patch_view(77), 1.5, radians(70.0))).known);
+}
+
+TEST_F(NarrowPictures, ChangeNothingForWholePanoramas) {
+  const auto narrow_path = memorise(true);
+  const auto plain_path = memorise(false);
+  const MemoryFile narrow = MemoryFile::open(narrow_path, Access::read_only);
+  const MemoryFile plain = MemoryFile::open(plain_path, Access::read_only);
+  int views = 0;
+  for (const ViewId view : narrow.views()) {
+    const auto both = narrow.features(view).value();
+    const auto parts = split_feature_bytes(both);
+    EXPECT_FALSE(parts.gradient.empty());
+    EXPECT_TRUE(std::ranges::equal(parts.local, plain.features(view).value()));
+    ++views;
+  }
+  EXPECT_EQ(views, 9);
+  const PlaceRecogniser with(narrow_path);
+  const PlaceRecogniser without(plain_path);
+  const Observation query(rotate_columns(make_patch_view(3), 40));
+  const Place a = with.localise(query);
+  const Place b = without.localise(query);
+  EXPECT_EQ(a.known_probability, b.known_probability);
+  EXPECT_EQ(a.heading_rad, b.heading_rad);
+  EXPECT_EQ(a.matches.front().name, b.matches.front().name);
+}
+
+TEST_F(NarrowPictures, FaultsAreNamed) {
+  const auto plain = memorise(false);
+  EXPECT_TRUE(
+      contains(message_of<FileError>([&] { PlaceRecogniser(plain, narrow_options()); }), "narrow"));
+  const auto path = memorise(true);
+  auto unknown_lens = narrow_options();
+  unknown_lens.source->field_of_view_rad.reset();
+  const PlaceRecogniser recogniser(path, unknown_lens);
+  const Observation photo(take_narrow_picture(make_patch_view(5), 1.5, radians(70.0)));
+  EXPECT_TRUE(contains(message_of<ContractError>([&] { (void)recogniser.localise(photo); }),
+                       "field of view"));
+  // A memory needs views of all azimuths.
+  MemoriserOptions options{.source = narrow_options().source, .left_out = {}};
+  Memoriser memoriser(folder / "phone.panonav", options);
+  EXPECT_THROW(
+      {
+        memoriser.add(photo);
+        (void)memoriser.finish();
+      },
+      ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::testing
