@@ -101,7 +101,7 @@ TEST_F(CameraFiles, FaultsNameFieldValueAndRange) {
     std::ofstream(path) << text;
     return error_of(path);
   };
-  EXPECT_TRUE(contains(with("model", "model = \"pinhole\""), "pinhole"));
+  EXPECT_TRUE(contains(with("model", "model = \"periscope\""), "periscope"));
   EXPECT_TRUE(contains(with("rim_radius_px", "rim_radius_px = nan"), "rim_radius_px"));
   EXPECT_TRUE(contains(with("width_px", "width_px = 0.5"), "width_px is 0.5"));
   EXPECT_TRUE(contains(with("centre_u_px", ""), "centre_u_px is missing"));

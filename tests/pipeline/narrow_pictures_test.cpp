@@ -50,7 +50,7 @@ TEST_F(NarrowPictures, AreLocalisedInAMemoryOfPanoramas) {
   ASSERT_TRUE(place.known);
   EXPECT_EQ(place.matches.front().name, "room 5");
   EXPECT_NEAR(place.position->x_m, 50.0, 1e-9);
-  EXPECT_NEAR(angle_difference(*place.heading_rad, 1.0 + 1.5), 0.0, radians(1.0));
+  EXPECT_NEAR(angle_difference(*place.heading_rad, 1.0 + 1.5), 0.0, radians(2.0));
   const std::vector<std::string> own{"room 5"};
   EXPECT_FALSE(recogniser.localise(photo, own).known);
   EXPECT_FALSE(

@@ -48,15 +48,23 @@ bool has_position(const ReferenceInfo& info) {
 
 }  // namespace
 
-double sector_place_probability(double score, double width_rad) noexcept {
+double sector_place_probability(double score, double width_rad, std::size_t views) noexcept {
   if (!(score > 0.0)) return 0.0;
-  // Learnt on `ciirc_b670` and `lab` (docs/decisions.md).
+  // Learnt on `ciirc_b670`, `indoor_walk_360`, `lab` and `corridor` (docs/decisions.md), with 31 to
+  // 265 views.
   constexpr double offset = -17.7;
-  constexpr double per_log_score = 11.1;
-  constexpr double per_log_width = -7.1;  // wider pictures reach larger scores by chance
+  constexpr double per_log_score = 14.0;
+  constexpr double per_log_width = -8.28;  // wider pictures reach larger scores by chance
+  constexpr double per_log_views = 2.37;   // features of many views lie nearer to any
   constexpr double middle_width_rad = radians(70.0);
-  const double log_odds = offset + per_log_score * std::log1p(score) +
-                          per_log_width * std::log(width_rad / middle_width_rad);
+  constexpr double middle_views = 100.0;
+  constexpr double min_views = 8.0;
+  constexpr double max_views = 1000.0;
+  const double log_odds =
+      offset + per_log_score * std::log1p(score) +
+      per_log_width * std::log(width_rad / middle_width_rad) +
+      per_log_views *
+          std::log(std::clamp(static_cast<double>(views), min_views, max_views) / middle_views);
   return 1.0 / (1.0 + std::exp(-log_odds));
 }
 
@@ -272,7 +280,8 @@ Place SectorLocaliser::localise(const SectorQuery& query, int top,
                               .chance = 0,
                               .neighbour = 0,
                               .seen = static_cast<int>(query.features.corners.size())};
-  place.known_probability = sector_place_probability(best.match.score, query.width_rad);
+  place.known_probability =
+      sector_place_probability(best.match.score, query.width_rad, compared.size());
   place.known = place.known_probability >= 0.5;
   place.probability = place.known_probability;
   for (const Candidate& candidate : candidates) {

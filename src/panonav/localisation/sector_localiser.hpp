@@ -24,11 +24,12 @@ struct SectorQuery {
   bool has_known_tilt = false;  ///< false: the tilt is estimated from the memory
 };
 
-/// Returns the probability that a narrow picture of this width, whose best match has this score,
-/// was taken at a place of the memory, by logistic regression; 0 without a score. Scores of
-/// pictures of other buildings hardly depend on the building (docs/decisions.md). The prior
-/// probability is one third.
-[[nodiscard]] double sector_place_probability(double score, double width_rad) noexcept;
+/// Returns the probability that a narrow picture of this width, whose best match among `views`
+/// views has this score, was taken at a place of the memory, by logistic regression; 0 without a
+/// score. Scores of pictures of other buildings hardly depend on the building (docs/decisions.md).
+/// The prior probability is one third.
+[[nodiscard]] double sector_place_probability(double score, double width_rad,
+                                              std::size_t views) noexcept;
 
 /// Distributions that a memory's own views have when a part of them is cut out and compared with
 /// the other views; learnt for three widths of the part.

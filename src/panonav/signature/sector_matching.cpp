@@ -17,6 +17,9 @@ namespace {
 /// Difference of distances that is evidence of 1, in levels of a histogram (developed on
 /// `ciirc_b670`, docs/decisions.md).
 constexpr float weight_unit = 2.5F;
+/// Largest weight of a pair: a window that shows the same town from all rooms is no more evidence
+/// than the furniture in front of it.
+constexpr float max_weight = 1.0F;
 constexpr int sector_rotation_steps = 128;
 constexpr int sector_motion_axes = 16;
 constexpr double sector_tolerance_rad = radians(2.0);
@@ -217,7 +220,7 @@ std::vector<std::vector<SectorPair>> NearestFeatures::weigh_pairs() const {
   std::vector<std::vector<SectorPair>> pairs(mutual_.size());
   for (std::size_t v = 0; v < mutual_.size(); ++v) {
     for (const auto& [query, reference, distance] : mutual_[v]) {
-      const float weight = (limits[query] - distance) / weight_unit;
+      const float weight = std::min((limits[query] - distance) / weight_unit, max_weight);
       if (weight > 0.0F) pairs[v].push_back({query, reference, weight});
     }
   }

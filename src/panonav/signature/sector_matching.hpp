@@ -42,7 +42,7 @@ class NearestFeatures {
   /// Returns the pairs of each reference, with weights [McCann, Lowe 2012, local naive Bayes
   /// nearest neighbour]: by how much the pair's distance is below that of the query's feature to
   /// its `background`-th nearest reference (the farthest, if there are fewer), in units of 2.5
-  /// levels. A feature that many places have, such as a ceiling lamp, is no evidence.
+  /// levels, at most 1. A feature that many places have, such as a ceiling lamp, is no evidence.
   [[nodiscard]] std::vector<std::vector<SectorPair>> weigh_pairs() const;
 
   /// Number of nearest references that may show the same feature: views around one place.
