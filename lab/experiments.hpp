@@ -24,6 +24,10 @@ struct Experiments {
   /// as of `make_mirror_rendering`.
   [[nodiscard]] simulation::PanoramaRendering make_rendering(int rows, int columns,
                                                              int pixel_size = 1) const;
+  /// Returns the rendering of mirror images with only the elevations that panoramas have, too;
+  /// nullopt if the optics are not a mirror.
+  [[nodiscard]] std::optional<simulation::PanoramaRendering> make_common_rendering(
+      int rows, int columns) const;
 };
 
 /// One step of the reproduction of a paper.

@@ -264,6 +264,17 @@ simulation::PanoramaRendering Experiments::make_rendering(int rows, int columns,
   return {.rows = rows, .columns = columns, .rays_per_axis = 1};
 }
 
+std::optional<simulation::PanoramaRendering> Experiments::make_common_rendering(int rows,
+                                                                                int columns) const {
+  if (options.optics != Optics::mirror) return std::nullopt;
+  const ElevationBand mirror = simulation::make_mirror_rendering(rows, columns).elevations;
+  const ElevationBand panorama = simulation::PanoramaRendering{}.elevations;
+  return simulation::make_mirror_rendering(
+      rows, columns,
+      ElevationBand{std::max(mirror.bottom_rad, panorama.bottom_rad),
+                    std::min(mirror.top_rad, panorama.top_rad)});
+}
+
 void require_minima(std::initializer_list<OptionMinimum> options) {
   for (const auto& [name, value, min] : options) {
     require(value >= min, name, value, ">= " + std::to_string(min));

@@ -32,7 +32,7 @@ class ChainMethod final : public RouteMethod {
     const SnapshotChain chain = recorder.finish();
     // Scales that the published layout does not have are not counted.
     const double snapshot_bytes =
-        is_horizon_ ? static_cast<double>(shape_.coefficients()) : shape_.bytes();
+        static_cast<double>(is_horizon_ ? shape_.coefficients() : shape_.bytes());
     bytes_ = static_cast<double>(chain.pack().size()) -
              static_cast<double>(chain.snapshots()) *
                  (static_cast<double>(shape_.bytes()) - snapshot_bytes);

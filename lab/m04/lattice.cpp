@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "lab/m04/experiment.hpp"
@@ -80,7 +81,8 @@ class LatticeExperiment {
       : options_(context.options),
         executor_(context.executor),
         result_(context.result),
-        rendering_(context.make_rendering(options_.rows, 256)) {}
+        rendering_(context.make_rendering(options_.rows, 256)),
+        common_rendering_(context.make_common_rendering(options_.rows, 256)) {}
 
   void run_scene(int scene) {
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(scene);
@@ -88,8 +90,10 @@ class LatticeExperiment {
     arrange_hall(seed, first);
     arrange_small_room(seed);
     arrange_with_motion(seed, 10, 0.6, coarse_, coarse_without_phases_, first);
+    arrange_common_rows(seed, 10, 0.6, coarse_common_);
     if (options_.fine_lattice_every > 0 && scene % options_.fine_lattice_every == 0) {
       arrange_with_motion(seed, 19, 0.3, fine_, fine_without_phases_, first);
+      arrange_common_rows(seed, 19, 0.3, fine_common_);
     }
   }
 
@@ -117,6 +121,7 @@ class LatticeExperiment {
         "m04.fig17",
         "figure 17: 540 x 540 cm zigzag at 60 cm in the periodic hall, coarse motion and phases",
         coarse_, true, result_);
+    explain_by_common_rows(coarse_common_);
     add_rows("m04.fig17.without_phases", "figure 17: the same without phases",
              coarse_without_phases_, false, result_);
     add_rows("m04.fig17.plain", "figure 17: the same by dissimilarity alone: it folds",
@@ -124,6 +129,7 @@ class LatticeExperiment {
     if (options_.fine_lattice_every > 0) {
       add_rows("m04.fig17.fine", "figure 17 at 30 cm, coarse motion and phases", fine_, true,
                result_);
+      explain_by_common_rows(fine_common_);
       add_rows("m04.fig17.fine.without_phases", "figure 17 at 30 cm, without phases",
                fine_without_phases_, false, result_);
     }
@@ -135,6 +141,38 @@ class LatticeExperiment {
   [[nodiscard]] simulation::PlaceRecording make_place(simulation::Scene scene,
                                                       std::uint64_t seed) const {
     return simulation::make_empty_place(std::move(scene), seed, rendering_, executor_);
+  }
+
+  void arrange_common_rows(std::uint64_t seed, int side, double spacing_m,
+                           ArrangementQuality& quality) {
+    if (!common_rendering_) return;
+    const auto place =
+        simulation::make_empty_place(simulation::make_scene("hall_periodic", {.seed = seed}), seed,
+                                     *common_rendering_, executor_);
+    const ViewGrid grid =
+        record_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
+    const auto motion =
+        simulate_coarse_motion(grid, distance_error_share, direction_error_share, seed);
+    quality.add(compare_with_grid(grid, arrange(grid.memory, {}, motion, executor_)), false);
+  }
+
+  // Adds the same measures of images without the other rows, and gives them as the reason of the
+  // last rows of `add_rows`.
+  void explain_by_common_rows(const ArrangementQuality& common) const {
+    if (!common_rendering_) return;
+    constexpr std::size_t judged_rows = 2;
+    constexpr std::size_t rows = 3;
+    const std::size_t first = result_.rows.size() - rows;
+    const ElevationBand& band = common_rendering_->elevations;
+    const std::string what = "with rows from " + format_fixed(degrees(band.bottom_rad), 0) +
+                             " to " + format_fixed(degrees(band.top_rad), 0) + " degrees alone";
+    const std::string id = result_.rows[first].id;
+    add_rows(id.substr(0, id.rfind('.')) + ".common_rows", result_.rows[first].what + ", " + what,
+             common, false, result_);
+    for (std::size_t i = first; i < first + judged_rows; ++i) {
+      result_.rows[i].reason =
+          what + ", those that panoramas have, it is " + to_text(result_.rows[i + rows].ours);
+    }
   }
 
   void arrange_hall(std::uint64_t seed, bool drawn) {
@@ -272,6 +310,8 @@ class LatticeExperiment {
   Executor& executor_;
   Reproduction& result_;
   simulation::PanoramaRendering rendering_;
+  std::optional<simulation::PanoramaRendering> common_rendering_;
+  ArrangementQuality coarse_common_, fine_common_;
   ArrangementQuality hall_with_phases_, hall_plain_, small_room_, coarse_, coarse_without_phases_,
       coarse_plain_, fine_, fine_without_phases_;
   std::vector<double> turn_error_deg_, correlation_range_, time_ms_;

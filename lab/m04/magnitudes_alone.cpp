@@ -8,6 +8,8 @@
 #include "lab/m04/experiment.hpp"
 #include "lab/m04/lattice_support.hpp"
 #include "lab/m04/magnitude_layout.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/scenes.hpp"
@@ -65,15 +67,23 @@ double measure_all_pairs(const ViewGrid& grid, std::span<const FourierSignature>
 /// Shape differences of the four methods, one value per variant of a scene.
 struct RoomFigures {
   std::vector<double> all_pairs, springs, magnitudes, phases;
+  std::vector<double> common_rows;  // magnitudes of the elevations that panoramas have, too
 };
 
 void measure_room(const std::string& scene, std::uint64_t seed, const Experiments& context,
                   RoomFigures& figures) {
-  const auto place = simulation::make_empty_place(
-      simulation::make_scene(scene, {.seed = seed}), seed,
-      context.make_rendering(context.options.rows, 256), context.executor);
-  const ViewGrid grid = record_grid(place, grid_columns, grid_rows, grid_spacing_m,
-                                    GridHeadings::random, context.executor);
+  const auto record = [&](const simulation::PanoramaRendering& rendering) {
+    const auto place = simulation::make_empty_place(simulation::make_scene(scene, {.seed = seed}),
+                                                    seed, rendering, context.executor);
+    return record_grid(place, grid_columns, grid_rows, grid_spacing_m, GridHeadings::random,
+                       context.executor);
+  };
+  if (const auto common = context.make_common_rendering(context.options.rows, 256)) {
+    const ViewGrid grid = record(*common);
+    figures.common_rows.push_back(
+        compare_layout(grid, arrange_by_magnitudes(signatures_of(grid.memory), context.executor)));
+  }
+  const ViewGrid grid = record(context.make_rendering(context.options.rows, 256));
   const auto signatures = signatures_of(grid.memory);
   figures.all_pairs.push_back(measure_all_pairs(grid, signatures));
   const LatticeOptions few{.neighbours = few_springs, .phases = false};
@@ -102,8 +112,18 @@ void reproduce_magnitudes_alone(const Experiments& context) {
                figures.all_pairs);
     add_median(context.result, id + ".few_springs", what + "springs to 4 neighbours", "",
                figures.springs);
+    if (!figures.common_rows.empty()) {
+      add_median(context.result, id + ".common_rows",
+                 what + "magnitudes alone, of the elevations that panoramas have, too", "",
+                 figures.common_rows);
+    }
     add_median(context.result, id + ".ours", what + "magnitudes alone", "", figures.magnitudes,
                at_most(0.02));
+    if (!figures.common_rows.empty()) {
+      context.result.rows.back().reason =
+          "with the rows alone whose elevations panoramas have, too, it is " +
+          to_text(median(figures.common_rows));
+    }
     add_median(context.result, id + ".phases", what + "phases", "", figures.phases);
   }
 }
