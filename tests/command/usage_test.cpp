@@ -299,7 +299,7 @@ TEST(Usage, CompletionOfBashKnowsVerbsOptionsAndChoices) {
   EXPECT_EQ(completed("panonav loc"), (std::set<std::string>{"localise", "localize"}));
   EXPECT_EQ(completed("panonav route \"\""), (std::set<std::string>{"record", "follow"}));
   EXPECT_EQ(completed("panonav localise m.panonav --kind \"\""),
-            (std::set<std::string>{"panorama", "equirectangular", "mirror"}));
+            (std::set<std::string>{"panorama", "equirectangular", "mirror", "pinhole"}));
   EXPECT_EQ(completed("panonav localise m.panonav --top \"\""), (std::set<std::string>{}));
   EXPECT_EQ(completed("panonav completion \"\""), (std::set<std::string>{"bash", "zsh", "fish"}));
   std::string all;

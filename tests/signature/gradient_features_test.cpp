@@ -46,7 +46,7 @@ TEST(GradientFeatures, ATurnedViewHasTheTurnedFeatures) {
       if (std::abs(turned_rad - 50 * 2.0 * std::numbers::pi / 360) < 1e-5) ++found;
     }
   }
-  // Of the weakest corners that are kept, equally strong ones are chosen by their columns.
+  // The choice among equally strong weakest corners depends on their columns.
   EXPECT_GE(found, here.corners.size() - here.corners.size() / 32);
 }
 

@@ -234,7 +234,9 @@ Dataset::Selection to_selection(const PartArguments& part) {
 std::optional<PictureSource> make_picture_source(const PictureArguments& pictures,
                                                  Session& session) {
   if (!states_layout(pictures)) return std::nullopt;
-  const std::string kind = pictures.kind.value_or(pictures.camera ? "mirror" : "");
+  const std::string kind = pictures.kind.value_or(pictures.camera              ? "mirror"
+                                                  : pictures.field_of_view_deg ? "pinhole"
+                                                                               : "");
   if (kind.empty()) throw UsageError("--kind is missing: panorama, equirectangular or mirror");
 
   if (kind == "pinhole") return make_pinhole_source(pictures);

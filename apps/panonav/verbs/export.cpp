@@ -162,7 +162,7 @@ Run declare_export(Arguments& arguments) {
 Verb export_verb() {
   return {"export",
           VerbGroup::memory,
-          "Export a memory as a data set, or as a page that localises pictures",
+          "Export a memory as a data set, or as a page to localise with",
           "A memory stores its images only as thumbnails. The verb enlarges these thumbnails to "
           "panoramas that panonav memorise can read. The files views.csv and signatures.npy "
           "contain the poses and signatures of all views without loss. Links, maps and routes are "

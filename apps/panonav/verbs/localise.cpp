@@ -115,6 +115,11 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   const bool live = arguments.inputs.size() == 1 && recordings::is_live(arguments.inputs.front());
   if (live || arguments.add || arguments.update || arguments.route || arguments.record.file ||
       arguments.record.view) {
+    if (arguments.pictures.kind == "pinhole") {
+      throw UsageError(
+          "--kind pinhole cannot be used with live images, --add, --update, --route, --record or "
+          "--view; allowed: image files");
+    }
     return localise_in_order(declared, arguments, session);
   }
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
@@ -211,6 +216,7 @@ Run declare_localise(Arguments& arguments) {
   arguments.flag("--areas", values->areas,
                  "Also print the areas in which the robot may be; each area is computed from more "
                  "Fourier components than the area before");
+  arguments.hide_from_help({"--areas"});
   arguments.options("localiser", values->localiser);
   arguments.options("accuracy", values->accuracy, "area");
   declare_changes(arguments, values);
