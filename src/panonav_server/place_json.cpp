@@ -21,10 +21,13 @@ ordered_json floor_json(std::string_view floor) {
 }
 
 ordered_json match_json(const PlaceMatch& match) {
-  ordered_json json{{"file", match.name},
-                    {"dissimilarity", match.dissimilarity},
-                    {"column_difference", match.column_difference},
-                    {"heading_rad", to_json_or_null(match.heading_rad)}};
+  // Narrow images are compared by local features alone; a number that is not finite becomes null.
+  const bool has_rows = !std::isnan(match.column_difference);
+  ordered_json json{
+      {"file", match.name},
+      {"dissimilarity", has_rows ? ordered_json(match.dissimilarity) : ordered_json()},
+      {"column_difference", match.column_difference},
+      {"heading_rad", to_json_or_null(match.heading_rad)}};
   if (match.verified_features) json["verified_features"] = *match.verified_features;
   return json;
 }

@@ -1,6 +1,7 @@
 #include "runs/localised_query.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
@@ -61,8 +62,9 @@ std::string csv_row(const LocalisedQuery& answer) {
   for (std::size_t i = 0; i < 2; ++i) {
     const PlaceMatch* const match = i < place.matches.size() ? &place.matches[i] : nullptr;
     add(match ? to_sheet_field(match->name) : "");
-    add(match ? std::to_string(match->dissimilarity) : "");
-    add(match ? to_text(match->column_difference) : "");
+    const bool has_rows = match && !std::isnan(match->column_difference);  // not a narrow image
+    add(has_rows ? std::to_string(match->dissimilarity) : "");
+    add(has_rows ? to_text(match->column_difference) : "");
     if (i == 0) add_degrees(match ? match->heading_rad : std::nullopt);
   }
   const AlternativePlace* const other =

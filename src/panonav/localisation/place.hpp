@@ -57,7 +57,7 @@ struct PlaceMatch {
   std::string name;                 ///< of the view
   ViewId view;                      ///< its id in the memory
   std::uint32_t dissimilarity = 0;  ///< L1 distance of the packed magnitudes, from the search
-  double column_difference = 0.0;   ///< `ColumnMatch::difference` at the best rotation
+  double column_difference = 0.0;   ///< `ColumnMatch::difference` at the best rotation; NaN: narrow
   /// Number of local features that agree with one rotation and one direction of motion; nullopt if
   /// none were compared.
   std::optional<int> verified_features;

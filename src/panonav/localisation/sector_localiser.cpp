@@ -250,7 +250,7 @@ PlaceMatch SectorLocaliser::describe(const Candidate& candidate, double azimuth_
   PlaceMatch match;
   match.view = references_[candidate.reference].view;
   match.name = memory_->info(match.view).name;
-  match.column_difference = 1.0;
+  match.column_difference = std::numeric_limits<double>::quiet_NaN();  // of whole rows only
   match.verified_features = candidate.match.verified;
   if (candidate.match.score > 0.0) {
     match.heading_rad = wrap_angle(candidate.match.heading_rad - azimuth_rad);
