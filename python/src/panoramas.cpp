@@ -33,11 +33,9 @@ CameraModel make_camera_model(const std::string& name, const py::dict& parameter
 
 namespace {
 
-constexpr std::array<const char*, 4> kind_names{"panorama", "equirectangular", "mirror", "pinhole"};
-
 PictureKind parse_kind(const std::string& name) {
-  for (std::size_t i = 0; i < kind_names.size(); ++i) {
-    if (name == kind_names[i]) return static_cast<PictureKind>(i);
+  for (std::size_t i = 0; i < picture_kind_names.size(); ++i) {
+    if (name == picture_kind_names[i]) return static_cast<PictureKind>(i);
   }
   throw ContractError("kind", "'" + name + "'",
                       "'panorama', 'equirectangular', 'mirror', 'pinhole'");
@@ -272,8 +270,7 @@ void bind_panoramas(py::module_& m) {
            "how columns run, 'clockwise' or 'counter-clockwise'. `mask`: uint8, 0 where the robot "
            "itself is seen.")
       .def_property_readonly(
-          "kind",
-          [](const PictureSource& s) { return kind_names[static_cast<std::size_t>(s.kind)]; },
+          "kind", [](const PictureSource& s) { return to_string(s.kind); },
           "'panorama', 'equirectangular', 'mirror' or 'pinhole'.")
       .def_property_readonly(
           "elevations", [](const PictureSource& s) { return s.layout.elevations; },
@@ -295,8 +292,7 @@ void bind_panoramas(py::module_& m) {
       .def("__eq__", [](const PictureSource& a, const PictureSource& b) { return a == b; })
       .def("__repr__",
            [](const PictureSource& s) {
-             return "PictureSource('" + std::string(kind_names[static_cast<std::size_t>(s.kind)]) +
-                    "')";
+             return "PictureSource('" + std::string(to_string(s.kind)) + "')";
            })
       .attr("__hash__") = py::none();
   py::class_<PanoramaReader>(m, "PanoramaReader",

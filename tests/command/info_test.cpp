@@ -105,6 +105,21 @@ TEST_F(Info, DataSetsMemoriesTrajectoriesAndOptions) {
   expect_refusal({"info", folder.write("p.toml", "[server]\nport = 3\n")}, "no verb takes");
 }
 
+TEST_F(Info, DataSetsOfNarrowPicturesSayWhatTheyAreFor) {
+  const fs::path photos = folder / "photos";
+  fs::create_directory(photos);
+  write_picture(photos / "a.png", landmark_world(3), {}, 96, 48);
+  std::ofstream(photos / "dataset.toml")
+      << "[images]\nkind = \"pinhole\"\nfield_of_view_deg = 70\n[list]\nfile = \"images.csv\"\n";
+  std::ofstream(photos / "images.csv") << "file\na.png\n";
+  const json said = describe(photos, "data set");
+  EXPECT_EQ(said["summary"], "1 image of 96 x 48 px, pinhole, 70 degrees wide");
+  EXPECT_EQ(said["verbs"], json({"localise", "convert"})) << "others need all azimuths";
+  const json converted = answer_of({"convert", photos, folder / "photos.mcap", "--json"}, 0);
+  EXPECT_EQ(converted["layout_flags"], json({"--kind", "pinhole", "--field-of-view", "70"}));
+  EXPECT_EQ(last_line(photos), "Next: panonav localise MEMORY " + photos.string());
+}
+
 // The verb evaluate needs a map whose views have stamps.
 TEST_F(Info, MemoriesWithAMapAreEvaluatedIfTheirViewsHaveStamps) {
   const fs::path run = folder / "run";

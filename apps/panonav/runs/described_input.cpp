@@ -77,14 +77,16 @@ std::uint64_t sum_file_bytes(const Dataset& dataset) {
 }
 
 std::string format_kind_and_band(const PictureSource& source) {
-  constexpr std::array<std::string_view, 3> kinds{"panorama", "equirectangular", "mirror"};
-  std::string text(kinds[static_cast<std::size_t>(source.kind)]);
+  std::string text(to_string(source.kind));
   auto band = source.layout.kept_elevations;
   if (source.kind == PictureKind::panorama) band = source.layout.elevations;
   if (source.kind == PictureKind::equirectangular && !band) band = default_equirectangular_band;
   if (band) {
     text += ", elevations " + format_number(degrees(band->bottom_rad)) + " to " +
             format_number(degrees(band->top_rad)) + " degrees";
+  }
+  if (source.field_of_view_rad) {
+    text += ", " + format_number(degrees(*source.field_of_view_rad)) + " degrees wide";
   }
   return text;
 }
@@ -128,6 +130,9 @@ DescribedInput describe_dataset(const std::string& folder) {
     return (verb == "route record" && !fields.positions && !fields.odometry) ||
            (verb == "catchment" && !fields.headings);
   });
+  if (dataset.source.kind == PictureKind::pinhole) {
+    described.use = {{"localise", "convert"}, {"panonav", "localise", "MEMORY", folder}};
+  }
   return described;
 }
 

@@ -41,8 +41,17 @@ std::vector<std::string> list_layout_flags(const PictureSource& source,
         arguments.pictures.camera.value_or((fs::path(arguments.input) / "camera.toml").string());
     return {"--kind", "mirror", "--camera", fs::exists(file) ? file : "CAMERA_FILE"};
   }
+  std::vector<std::string> flags{"--kind", std::string(to_string(source.kind))};
+  if (source.kind == PictureKind::pinhole) {
+    if (source.field_of_view_rad) {
+      flags.insert(flags.end(),
+                   {"--field-of-view", to_text(to_exact_degrees(*source.field_of_view_rad))});
+    } else if (source.camera) {
+      flags.insert(flags.end(), {"--camera", (fs::path(arguments.input) / "camera.toml").string()});
+    }
+    return flags;
+  }
   const bool is_sphere = source.kind == PictureKind::equirectangular;
-  std::vector<std::string> flags{"--kind", is_sphere ? "equirectangular" : "panorama"};
   if (source.layout.direction == ColumnDirection::counter_clockwise) {
     flags.insert(flags.end(), {"--columns-run", "counter-clockwise"});
   }

@@ -29,20 +29,6 @@ namespace panonav::command {
 
 namespace {
 
-std::string_view kind_name(PictureKind kind) {
-  switch (kind) {
-    case PictureKind::panorama:
-      return "panorama";
-    case PictureKind::equirectangular:
-      return "equirectangular";
-    case PictureKind::mirror:
-      return "mirror";
-    case PictureKind::pinhole:
-      return "pinhole";
-  }
-  return "panorama";
-}
-
 /// Prints the verbs that take an input, and the next command.
 void print_use(const InputUse& use, Session& session) {
   if (session.json()) return;
@@ -141,7 +127,7 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info,
                     {"panorama_columns", header.panorama_columns},
                     {"full_scale", header.full_scale},
                     {"elevations_rad", nullptr},
-                    {"kind", kind_name(header.source.kind)},
+                    {"kind", to_string(header.source.kind)},
                     {"preprocessing",
                      {{"masked_rows_top", steps.masked_rows_top},
                       {"masked_rows_bottom", steps.masked_rows_bottom},
@@ -230,7 +216,7 @@ ExitCode print_memory(const std::string& path, Session& session) {
                   std::to_string(info.feature_bytes / info.views_with_features) +
                   " bytes per view");
   }
-  session.print("  images      " + std::string(kind_name(header.source.kind)) + ", " +
+  session.print("  images      " + std::string(to_string(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
                 (header.elevations
                      ? format_number(degrees(header.elevations->bottom_rad)) + " to " +

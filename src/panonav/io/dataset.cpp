@@ -25,8 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 4> kind_names{"panorama", "equirectangular", "mirror",
-                                                     "pinhole"};
 constexpr std::array<std::string_view, 10> column_names{
     "file",     "stamp_s",          "x_m",      "y_m",      "heading_deg", "odom_x_m",
     "odom_y_m", "odom_heading_deg", "roll_deg", "pitch_deg"};
@@ -66,7 +64,7 @@ PictureSource read_pinhole_source(TomlFields& images, const fs::path& folder) {
 
 PictureSource read_source(TomlFields& images, const fs::path& folder) {
   PictureSource source;
-  const auto kind = images.choice("kind", kind_names);
+  const auto kind = images.choice("kind", picture_kind_names);
   if (!kind) {
     images.fail("kind", "missing", "\"panorama\", \"equirectangular\", \"mirror\", \"pinhole\"");
   }
@@ -332,8 +330,7 @@ std::string format_table(const std::vector<DatasetEntry>& entries, const Dataset
 /// Returns the section [images]; writes the camera of mirror pictures to camera.toml.
 std::string format_images_section(const Dataset& dataset) {
   const PictureSource& source = dataset.source;
-  std::string text = "[images]\nkind = \"" +
-                     std::string(kind_names[static_cast<std::size_t>(source.kind)]) + "\"\n";
+  std::string text = "[images]\nkind = \"" + std::string(to_string(source.kind)) + "\"\n";
   std::optional<ElevationBand> band = source.layout.kept_elevations;
   if (source.kind == PictureKind::panorama) band = source.layout.elevations;
   if (source.kind == PictureKind::pinhole) {

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
+#include <string_view>
 
 #include "panonav/camera/camera.hpp"
 #include "panonav/core/image.hpp"
@@ -16,6 +19,15 @@ enum class PictureKind {
   mirror,           ///< raw images of a mirror or fisheye camera with a vertical axis
   pinhole           ///< pictures of a part of the azimuth, such as a phone's; not for memories
 };
+
+/// Names of the kinds in files and options, in the order of `PictureKind`.
+inline constexpr std::array<std::string_view, 4> picture_kind_names{"panorama", "equirectangular",
+                                                                    "mirror", "pinhole"};
+
+/// Returns the name of a kind.
+[[nodiscard]] constexpr std::string_view to_string(PictureKind kind) noexcept {
+  return picture_kind_names[static_cast<std::size_t>(kind)];
+}
 
 /// Band that is cut out of equirectangular pictures if no other band is stated. Floor and ceiling
 /// look similar at many places: on the walk indoor_walk_360, 37 of 117 images are most similar to

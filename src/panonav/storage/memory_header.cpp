@@ -18,7 +18,9 @@ namespace panonav {
 
 namespace {
 
-constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
+/// Narrow pictures are in no memory.
+constexpr std::span memory_kind_names = std::span(picture_kind_names).first<3>();
+static_assert(memory_kind_names.size() == static_cast<std::size_t>(PictureKind::pinhole));
 constexpr std::array<std::string_view, 2> elevation_origins{"known", "assumed"};
 
 void require_band(const std::optional<ElevationBand>& band, std::string_view field) {
@@ -288,7 +290,7 @@ void visit_header(Fields& fields, Header& header) {
   fields.field("created_s", header.created_s);
   fields.options(header.preprocessing);
   auto& source = header.source;
-  fields.choice("source.kind", kind_names, source.kind);
+  fields.choice("source.kind", memory_kind_names, source.kind);
   fields.choice("source.direction", column_direction_names, source.layout.direction);
   fields.field("source.forward_column", source.layout.forward_column);
   fields.band("source.elevation_", source.layout.elevations);
