@@ -143,14 +143,18 @@ class LatticeExperiment {
     return simulation::make_empty_place(std::move(scene), seed, rendering_, executor_);
   }
 
+  // Records a square lattice of the hall of [M04] fig. 16, row by row.
+  [[nodiscard]] ViewGrid record_path(std::uint64_t seed, int side, double spacing_m,
+                                     const simulation::PanoramaRendering& rendering) const {
+    const auto place = simulation::make_empty_place(
+        simulation::make_scene("hall_periodic", {.seed = seed}), seed, rendering, executor_);
+    return record_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
+  }
+
   void arrange_common_rows(std::uint64_t seed, int side, double spacing_m,
                            ArrangementQuality& quality) {
     if (!common_rendering_) return;
-    const auto place =
-        simulation::make_empty_place(simulation::make_scene("hall_periodic", {.seed = seed}), seed,
-                                     *common_rendering_, executor_);
-    const ViewGrid grid =
-        record_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
+    const ViewGrid grid = record_path(seed, side, spacing_m, *common_rendering_);
     const auto motion =
         simulate_coarse_motion(grid, distance_error_share, direction_error_share, seed);
     quality.add(compare_with_grid(grid, arrange(grid.memory, {}, motion, executor_)), false);
@@ -213,9 +217,7 @@ class LatticeExperiment {
 
   void arrange_with_motion(std::uint64_t seed, int side, double spacing_m, ArrangementQuality& with,
                            ArrangementQuality& without, bool drawn) {
-    const auto place = make_place(simulation::make_scene("hall_periodic", {.seed = seed}), seed);
-    const ViewGrid grid =
-        record_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
+    const ViewGrid grid = record_path(seed, side, spacing_m, rendering_);
     const auto motion =
         simulate_coarse_motion(grid, distance_error_share, direction_error_share, seed);
     const auto ours = compare_with_grid(grid, arrange(grid.memory, {}, motion, executor_));

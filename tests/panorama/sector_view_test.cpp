@@ -21,7 +21,7 @@ double grey_at(const Direction3& direction) {
 
 /// Direction in the level frame of a direction that the tilted robot sees: rotated about x, then
 /// about the level y axis.
-Direction3 level_direction(const Direction3& d, const Tilt& tilt) {
+Direction3 rotate_to_level(const Direction3& d, const Tilt& tilt) {
   const double y = std::cos(tilt.roll_rad) * d.y - std::sin(tilt.roll_rad) * d.z;
   const double z = std::sin(tilt.roll_rad) * d.y + std::cos(tilt.roll_rad) * d.z;
   return {std::cos(tilt.pitch_rad) * d.x + std::sin(tilt.pitch_rad) * z, y,
@@ -42,7 +42,7 @@ Image take_picture(const Camera& camera, const Tilt& tilt) {
     for (int u = 0; u < image.width(); ++u) {
       const auto seen = unproject(camera, {u + 0.5, v + 0.5});
       image.at(u, v) =
-          static_cast<std::uint8_t>(std::lround(255.0 * grey_at(level_direction(*seen, tilt))));
+          static_cast<std::uint8_t>(std::lround(255.0 * grey_at(rotate_to_level(*seen, tilt))));
     }
   }
   return image;

@@ -8,23 +8,12 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/kernels/remap.hpp"
 
 namespace panonav {
 
 namespace {
-
-/// Averages blocks of 2 x 2 pixels; a last odd row or column is left out.
-Image halve_image(const Image& image) {
-  Image half(image.width() / 2, image.height() / 2);
-  for (int v = 0; v < half.height(); ++v) {
-    for (int u = 0; u < half.width(); ++u) {
-      const int sum = image.at(2 * u, 2 * v) + image.at(2 * u + 1, 2 * v) +
-                      image.at(2 * u, 2 * v + 1) + image.at(2 * u + 1, 2 * v + 1);
-      half.at(u, v) = static_cast<std::uint8_t>((sum + 2) / 4);
-    }
-  }
-  return half;
-}
 
 double sample_bilinearly(const Image& image, double u_px, double v_px) {
   const double u = std::clamp(u_px - 0.5, 0.0, image.width() - 1.0);
@@ -39,18 +28,6 @@ double sample_bilinearly(const Image& image, double u_px, double v_px) {
          b * ((1.0 - a) * image.at(x, below) + a * image.at(right, below));
 }
 
-/// Direction of the tilted robot frame that is seen at a direction of the level one.
-Direction3 tilt_direction(const Direction3& level, const Tilt& tilt) {
-  // The robot is rotated about its x axis, then about the level y axis; inverted here.
-  const double cp = std::cos(tilt.pitch_rad);
-  const double sp = std::sin(tilt.pitch_rad);
-  const double cr = std::cos(tilt.roll_rad);
-  const double sr = std::sin(tilt.roll_rad);
-  const double x = cp * level.x - sp * level.z;
-  const double z = sp * level.x + cp * level.z;
-  return {x, cr * level.y + sr * z, -sr * level.y + cr * z};
-}
-
 /// Returns the azimuth by which the picture may reach from the middle column: the largest of its
 /// border and corners, or all around if it shows a pole.
 double find_half_width(const Camera& camera, double middle_rad, const Tilt& tilt) {
@@ -60,10 +37,8 @@ double find_half_width(const Camera& camera, double middle_rad, const Tilt& tilt
   const auto visit = [&](double u_px, double v_px) {
     const auto seen = unproject(camera, {u_px, v_px});
     if (!seen) return;
-    const Direction3 level = tilt_direction(*seen, {-tilt.roll_rad, 0.0});
-    const Direction3 upright = tilt_direction(level, {0.0, -tilt.pitch_rad});
-    half_rad = std::max(half_rad, std::abs(std::remainder(upright.azimuth_rad() - middle_rad,
-                                                          2.0 * std::numbers::pi)));
+    half_rad = std::max(half_rad, std::abs(angle_difference(
+                                      level_direction(*seen, tilt).azimuth_rad(), middle_rad)));
   };
   for (int i = 0; i <= steps; ++i) {
     const double share = static_cast<double>(i) / steps;
@@ -115,7 +90,9 @@ SectorView unwarp_sector(ImageView picture, const Camera& camera, PanoramaShape 
   double scale = 1.0;  // of pixel coordinates in `image`
   while (image.width() >= 4 && image.height() >= 4 &&
          lens->focal_length_px * scale * std::min(step_rad, sector.row_rad()) >= 2.0) {
-    image = halve_image(image);
+    Image half(image.width() / 2, image.height() / 2);
+    kernels::halve(image.view(), half.pixels().data(), kernels::chosen_instructions());
+    image = std::move(half);
     scale *= 0.5;
   }
   const double half_rad = find_half_width(camera, lens->azimuth_rad, tilt);

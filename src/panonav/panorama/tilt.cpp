@@ -121,6 +121,24 @@ void validate(const Tilt& tilt, const std::optional<ElevationBand>& seen) {
   }
 }
 
+Direction3 level_direction(const Direction3& seen, const Tilt& tilt) noexcept {
+  const double cp = std::cos(tilt.pitch_rad);
+  const double sp = std::sin(tilt.pitch_rad);
+  const double cr = std::cos(tilt.roll_rad);
+  const double sr = std::sin(tilt.roll_rad);
+  const double z = sr * seen.y + cr * seen.z;
+  return {cp * seen.x + sp * z, cr * seen.y - sr * seen.z, -sp * seen.x + cp * z};
+}
+
+Direction3 tilt_direction(const Direction3& level, const Tilt& tilt) noexcept {
+  const double cp = std::cos(tilt.pitch_rad);
+  const double sp = std::sin(tilt.pitch_rad);
+  const double cr = std::cos(tilt.roll_rad);
+  const double sr = std::sin(tilt.roll_rad);
+  const double z = sp * level.x + cp * level.z;
+  return {cp * level.x - sp * level.z, cr * level.y + sr * z, -sr * level.y + cr * z};
+}
+
 Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
                         const ElevationBand& band) {
   validate(tilt, seen.elevations());

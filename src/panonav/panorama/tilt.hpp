@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/panorama/panorama.hpp"
 
 namespace panonav {
@@ -24,6 +25,12 @@ inline constexpr double max_tilt_rad = 0.5235987755982988;  // 30 degrees
 /// Throws ContractError unless both angles are at most `max_tilt_rad`, or 180 degrees in images
 /// with the elevations `seen` of the whole sphere.
 void validate(const Tilt& tilt, const std::optional<ElevationBand>& seen = std::nullopt);
+
+/// Returns the direction in the level frame of what a tilted robot sees in direction `seen`.
+[[nodiscard]] Direction3 level_direction(const Direction3& seen, const Tilt& tilt) noexcept;
+/// Returns the direction in which a tilted robot sees what is in direction `level` of the level
+/// frame: the inverse of `level_direction`.
+[[nodiscard]] Direction3 tilt_direction(const Direction3& level, const Tilt& tilt) noexcept;
 
 /// Levels a panorama: computes the view of the robot with its axis vertical, at the same heading
 /// and place. `seen` is rotated by the inverse of the tilt into a panorama of `rows` rows in

@@ -183,19 +183,13 @@ LocalFeatures level_features(LocalFeatures features, const Tilt& tilt) {
       (features.elevations.top_rad - features.elevations.bottom_rad) / features.shape.rows;
   std::vector<LocalFeatures::Feature> level;
   for (LocalFeatures::Feature feature : features.features) {
-    const double elevation = features.elevations.top_rad - (feature.row + 0.5) * row_rad;
-    const double azimuth = feature.column * column_rad;
-    const double x_robot = std::cos(elevation) * std::cos(azimuth);
-    const double y_robot = std::cos(elevation) * std::sin(azimuth);
-    const double z_robot = std::sin(elevation);
-    const double y = std::cos(tilt.roll_rad) * y_robot - std::sin(tilt.roll_rad) * z_robot;
-    const double z_rolled = std::sin(tilt.roll_rad) * y_robot + std::cos(tilt.roll_rad) * z_robot;
-    const double x = std::cos(tilt.pitch_rad) * x_robot + std::sin(tilt.pitch_rad) * z_rolled;
-    const double z = std::cos(tilt.pitch_rad) * z_rolled - std::sin(tilt.pitch_rad) * x_robot;
+    const auto seen = Direction3::from_angles(
+        feature.column * column_rad, features.elevations.top_rad - (feature.row + 0.5) * row_rad);
+    const Direction3 level_seen = level_direction(seen, tilt);
     const auto row = static_cast<int>(
-        std::floor((features.elevations.top_rad - std::asin(std::clamp(z, -1.0, 1.0))) / row_rad));
+        std::floor((features.elevations.top_rad - level_seen.elevation_rad()) / row_rad));
     if (row < 0 || row >= features.shape.rows) continue;
-    const auto column = static_cast<int>(std::lround(std::atan2(y, x) / column_rad));
+    const auto column = static_cast<int>(std::lround(level_seen.azimuth_rad() / column_rad));
     feature.row = static_cast<std::uint16_t>(row);
     feature.column =
         static_cast<std::uint16_t>((column + features.shape.columns) % features.shape.columns);

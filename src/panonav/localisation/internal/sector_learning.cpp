@@ -37,16 +37,9 @@ double share_of_score(double score, double largest, double exponent) noexcept {
 }
 
 GradientFeatures level_corners(GradientFeatures features, const Tilt& tilt) {
-  const double cp = std::cos(tilt.pitch_rad);
-  const double sp = std::sin(tilt.pitch_rad);
-  const double cr = std::cos(tilt.roll_rad);
-  const double sr = std::sin(tilt.roll_rad);
   for (auto& corner : features.corners) {
     const auto seen = Direction3::from_angles(corner.azimuth_rad, corner.elevation_rad);
-    // Rotated about x, then about the level y axis, as the robot.
-    const double y = cr * seen.y - sr * seen.z;
-    const double z = sr * seen.y + cr * seen.z;
-    const Direction3 level{cp * seen.x + sp * z, y, -sp * seen.x + cp * z};
+    const Direction3 level = level_direction(seen, tilt);
     corner.azimuth_rad = static_cast<float>(level.azimuth_rad());
     corner.elevation_rad = static_cast<float>(level.elevation_rad());
   }
