@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +15,8 @@ namespace panonav::server {
 struct HttpRequest {
   std::string method;         ///< "GET", "POST", ...
   std::string path;           ///< as sent, up to a '?'; still percent-encoded
+  /// What follows the '?', by name; still percent-encoded. Of equal names the last one counts.
+  std::map<std::string, std::string, std::less<>> arguments;
   std::string host;           ///< host and port, as the client named them
   std::string origin;         ///< empty: none was sent
   std::string authorization;  ///< the field of that name; empty: none was sent

@@ -18,10 +18,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_server/access.hpp"
 #include "panonav_server/http_server.hpp"
+#include "panonav_server/internal/picture_request.hpp"
 #include "panonav_server/json_answer.hpp"
 #include "panonav_server/loaded_memory.hpp"
 #include "panonav_server/metrics.hpp"
@@ -42,8 +42,6 @@ constexpr std::size_t max_waiting_bytes = std::size_t{128} << 20U;
 /// than a memory's server may be silent and than a full queue takes.
 constexpr std::chrono::seconds request_deadline(30);
 constexpr std::chrono::seconds time_for_last_answers(5);
-constexpr ImageLimits picture_limits{
-    .side_px = 16384, .area_px = 33'554'432, .scanned_px = std::int64_t{16} * 33'554'432};
 
 bool is_valid_memory_name(std::string_view name) {
   return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, [](char c) {
@@ -60,6 +58,7 @@ struct LocalisationServer::Implementation {
     std::string memory;
     std::string picture;  ///< to localise; empty: return thumbnail of `view`
     std::string view;
+    std::optional<PictureSource> narrow_source;  ///< layout of a narrow picture
     Clock::time_point came = Clock::now();
     std::atomic<bool> answered = false;  ///< true once `answer` is set
     HttpAnswer answer;
@@ -193,7 +192,11 @@ struct LocalisationServer::Implementation {
     if (below == "/localise") {
       if (request.method != "POST") return make_error(405, "allowed: POST, with a PNG or JPEG");
       if (request.body.empty()) return make_error(422, "the body is empty; allowed: a PNG or JPEG");
-      return enqueue(name, std::move(request.body), "");
+      try {
+        return enqueue(name, std::move(request.body), "", read_narrow_source(request.arguments));
+      } catch (const ContractError& error) {
+        return make_error(400, error.what());
+      }
     }
     if (request.method != "GET") return make_error(405, "allowed: GET");
     if (below.empty()) return make_json_answer(describe(name));
@@ -208,12 +211,14 @@ struct LocalisationServer::Implementation {
     return make_error(404, "no such path; allowed: localise and views/NAME/picture");
   }
 
-  HttpAnswer enqueue(const std::string& name, std::string picture, std::string view) {
+  HttpAnswer enqueue(const std::string& name, std::string picture, std::string view,
+                     std::optional<PictureSource> narrow_source = std::nullopt) {
     auto job = std::make_shared<Job>();
     job->memory = name;
     const std::size_t bytes = picture.size();
     job->picture = std::move(picture);
     job->view = std::move(view);
+    job->narrow_source = std::move(narrow_source);
     Lane& lane = *lane_by_memory.at(name);
     {
       const std::lock_guard lock(mutex);
@@ -357,9 +362,7 @@ struct LocalisationServer::Implementation {
   HttpAnswer localise(const Job& job, const LoadedMemory& memory, bool& known) {
     std::optional<Observation> observation;
     try {
-      const auto* const bytes = reinterpret_cast<const std::uint8_t*>(job.picture.data());
-      observation.emplace(
-          decode_image(std::span(bytes, job.picture.size()), "the image", picture_limits));
+      observation = decode_observation(job.picture, job.narrow_source);
     } catch (const Error& error) {
       return make_error(422, error.what());
     } catch (const std::exception&) {

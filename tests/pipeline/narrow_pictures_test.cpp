@@ -4,6 +4,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
@@ -55,6 +56,32 @@ TEST_F(NarrowPictures, AreLocalisedInAMemoryOfPanoramas) {
   EXPECT_FALSE(recogniser.localise(photo, own).known);
   EXPECT_FALSE(
       recogniser.localise(take_narrow_picture(make_patch_view(77), 1.5, radians(70.0))).known);
+}
+
+TEST_F(NarrowPictures, AreLocalisedAmongPanoramas) {
+  const auto path = memorise(true);
+  const PlaceRecogniser narrow(path, narrow_options());
+  const PlaceRecogniser recogniser(path);
+  Observation photo(take_narrow_picture(make_patch_view(5), 1.5, radians(70.0)));
+  const Place expected = narrow.localise(photo);
+  photo.narrow_source = narrow_options().source;
+  const Place place = recogniser.localise(photo);
+  EXPECT_EQ(place.known_probability, expected.known_probability);
+  EXPECT_EQ(place.position->x_m, expected.position->x_m);
+  EXPECT_EQ(place.heading_rad, expected.heading_rad);
+  EXPECT_EQ(recogniser.localise(Observation(make_patch_view(3))).matches.front().name, "room 3");
+  EXPECT_THROW((void)recogniser.encoder().packed(photo), ContractError);
+  const PlaceRecogniser plain(memorise(false));
+  EXPECT_TRUE(
+      contains(message_of<ContractError>([&] { (void)plain.localise(photo); }), "option narrow"));
+}
+
+TEST_F(NarrowPictures, UseTheModelThatIsStored) {
+  const MemoryFile file = MemoryFile::open(memorise(true), Access::read_only);
+  const VisualMemory memory = file.load();
+  const auto stored = load_stored_models(file, memory);
+  ASSERT_TRUE(stored && stored->sector && stored->sector->learnt);
+  EXPECT_EQ(*stored->sector, SectorLocaliser(memory, make_gradient_source(file)).model());
 }
 
 TEST_F(NarrowPictures, ChangeNothingForWholePanoramas) {

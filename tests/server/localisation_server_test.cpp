@@ -9,12 +9,14 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav_server/place_json.hpp"
 #include "panonav_server/upload_page.hpp"
 #include "support/landmark_pictures.hpp"
+#include "support/patch_views.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/viewer_peer.hpp"
 
@@ -86,6 +88,37 @@ TEST_F(LocalisationServerTest, AnswersAsThePlaceRecogniserDoes) {
     const std::string answer = localise(server, picture);
     EXPECT_EQ(status_of(answer), 200);
     EXPECT_EQ(answer.substr(answer.find("\r\n\r\n") + 4), expected.dump() + "\n");
+  }
+}
+
+TEST_F(LocalisationServerTest, AnswersNarrowPictures) {
+  const auto path = folder_ / "rooms.panonav";
+  Memoriser memoriser(
+      path, {.source = PictureSource{.layout = {.elevations = patch_band}}, .narrow = true});
+  for (std::uint64_t i = 0; i < 9; ++i) {
+    Observation seen(make_patch_view(i));
+    seen.name = "room " + std::to_string(i);
+    seen.pose = ReferencePose{10.0 * static_cast<double>(i), 0.0, 0.0};
+    memoriser.add(std::move(seen));
+  }
+  memoriser.finish();
+  std::vector<ServedMemory> memories = hall();
+  memories.push_back({"rooms", path});
+  const LocalisationServer server(memories, {});
+  const std::string photo = png_of(take_narrow_picture(make_patch_view(5), 1.5, radians(70.0)));
+  const auto ask = [&](const std::string& memory_and_arguments) {
+    return get(server, "/v1/memories/" + memory_and_arguments, "", "POST", photo);
+  };
+  const json answer = body_of(ask("rooms/localise?field_of_view_deg=70"));
+  EXPECT_EQ(answer["matches"][0]["file"], "room 5");
+  EXPECT_EQ(answer["matches"][0]["dissimilarity"], nullptr);
+  EXPECT_NEAR(answer["heading_rad"].get<double>(), 1.5, radians(2.0));
+  for (const auto& [refused, status] : {std::pair("rooms/localise?field_of_view_deg=exif", 422),
+                                        std::pair("hall/localise?field_of_view_deg=70", 422),
+                                        std::pair("rooms/localise?field_of_view_deg=170", 400),
+                                        std::pair("rooms/localise?field_of_view_deg=", 400),
+                                        std::pair("rooms/localise?width=70", 400)}) {
+    EXPECT_EQ(status_of(ask(refused)), status) << refused;
   }
 }
 

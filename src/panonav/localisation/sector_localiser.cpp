@@ -11,6 +11,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/nearest_points.hpp"
 #include "panonav/localisation/alternative_places.hpp"
 #include "panonav/localisation/internal/sector_learning.hpp"
 #include "panonav/localisation/sample.hpp"
@@ -42,10 +43,6 @@ constexpr int learnt_views = 24;
 constexpr std::size_t nearest_compared = 50;
 constexpr std::size_t sampled_compared = 100;
 
-bool has_position(const ReferenceInfo& info) {
-  return info.pose.has_value();
-}
-
 }  // namespace
 
 double sector_place_probability(double score, double width_rad, std::size_t views) noexcept {
@@ -68,12 +65,8 @@ double sector_place_probability(double score, double width_rad, std::size_t view
   return 1.0 / (1.0 + std::exp(-log_odds));
 }
 
-/// A view of which a part was cut, compared with the others.
-struct SectorLocaliser::LearningCase {
-  std::vector<Group> groups;  ///< places that the part resembles, best first
-};
-
-SectorLocaliser::SectorLocaliser(const VisualMemory& memory, const GradientSource& features)
+SectorLocaliser::SectorLocaliser(const VisualMemory& memory, const GradientSource& features,
+                                 const std::optional<SectorModel>& model)
     : memory_(&memory) {
   for (const ViewId view : memory.views()) {
     auto found = features(view);
@@ -82,21 +75,23 @@ SectorLocaliser::SectorLocaliser(const VisualMemory& memory, const GradientSourc
   if (references_.empty()) {
     throw ContractError("features for narrow pictures", "missing", "in the memory");
   }
-  std::vector<double> nearest;
-  for (const Reference& a : references_) {
-    const auto here = find_position(memory.info(a.view));
-    if (!here) continue;
-    double smallest = std::numeric_limits<double>::infinity();
-    for (const Reference& b : references_) {
-      const auto there = find_position(memory.info(b.view));
-      if (!there) continue;
-      const double apart_m = distance(*here, *there);
-      if (apart_m > 0.0) smallest = std::min(smallest, apart_m);
-    }
-    if (std::isfinite(smallest)) nearest.push_back(smallest);
+  const std::vector<std::string> floor_names = list_floors(memory);
+  std::vector<Point2> points;
+  std::vector<std::size_t> floors;
+  for (const Reference& reference : references_) {
+    const auto placed = find_position(memory.info(reference.view));
+    if (!placed) continue;
+    points.push_back(placed->point);
+    floors.push_back(static_cast<std::size_t>(std::ranges::lower_bound(floor_names, placed->floor) -
+                                              floor_names.begin()));
   }
-  if (!nearest.empty()) spacing_m_ = median(nearest);
-  learn();
+  const std::vector<double> nearest_m = distances_between_nearest_positions(points, floors);
+  if (!nearest_m.empty()) spacing_m_ = median(nearest_m);
+  if (model) {
+    model_ = *model;
+  } else {
+    learn();
+  }
 }
 
 std::vector<SectorLocaliser::Candidate> SectorLocaliser::find_candidates(
@@ -201,7 +196,7 @@ std::vector<SectorLocaliser::Group> SectorLocaliser::group_by_place(
 
 std::optional<PositionEstimate> SectorLocaliser::average_position(const Group& group) const {
   const Candidate& best = group.candidates.front();
-  if (!has_position(memory_->info(references_[best.reference].view))) return std::nullopt;
+  if (!memory_->info(references_[best.reference].view).pose) return std::nullopt;
   PositionEstimate estimate;
   double total = 0.0;
   for (const Candidate& candidate : group.candidates) {
@@ -324,8 +319,9 @@ Place SectorLocaliser::localise(const SectorQuery& query, int top,
   return place;
 }
 
-SectorLocaliser::LearningCase SectorLocaliser::cut_case(std::size_t reference, std::size_t width,
-                                                        std::uint64_t seed) const {
+std::vector<SectorLocaliser::Group> SectorLocaliser::find_places_of_cut(std::size_t reference,
+                                                                        std::size_t width,
+                                                                        std::uint64_t seed) const {
   Random random(seed, references_[reference].view.value);
   const double middle_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
   const double width_rad = SectorModel::widths_rad[width];
@@ -356,25 +352,24 @@ SectorLocaliser::LearningCase SectorLocaliser::cut_case(std::size_t reference, s
     compared.push_back(near[k].second);
   }
   if (compared.empty() || cut.corners.size() < 2) return {};
-  return {group_by_place(find_candidates(cut, sector_candidates, compared, true))};
+  return group_by_place(find_candidates(cut, sector_candidates, compared, true));
 }
 
 void SectorLocaliser::learn() {
   if (references_.size() < static_cast<std::size_t>(SectorModel::min_views)) return;
+  if (spacing_m_ == 0.0) return;
   std::vector<ViewId> views;
   for (const Reference& reference : references_) views.push_back(reference.view);
   std::vector<ShareCase> shares;
-  if (spacing_m_ == 0.0) return;
   for (std::size_t width = 0; width < SectorModel::width_count; ++width) {
     std::vector<double> errors_m;
     for (const ViewId view : sample_views(views, learnt_views, 1)) {
       const auto reference =
           static_cast<std::size_t>(std::ranges::lower_bound(views, view) - views.begin());
-      const LearningCase cut = cut_case(reference, width, width + 1);
       const auto truth = find_position(memory_->info(view));
       if (!truth) continue;
       ShareCase share;
-      for (const Group& group : cut.groups) {
+      for (const Group& group : find_places_of_cut(reference, width, width + 1)) {
         const auto found = average_position(group);
         const auto there =
             find_position(memory_->info(references_[group.candidates.front().reference].view));

@@ -59,12 +59,14 @@ using GradientSource = std::function<std::optional<GradientFeatures>(ViewId)>;
 /// features alone.
 class SectorLocaliser {
  public:
-  /// Loads the features of all views and learns the model. `memory` must outlive *this. Throws
-  /// ContractError if no view has gradient features. Cost: the model takes about 0.3 ms for each
-  /// pair of a cut view and one of up to 150 others, 1 s in all; 35 kB of RAM for each view.
-  SectorLocaliser(const VisualMemory& memory, const GradientSource& features);
+  /// Loads the features of all views. `model`: one learnt from this memory before; nullopt: it is
+  /// learnt now. `memory` must outlive *this. Throws ContractError if no view has gradient
+  /// features. Cost: learning takes about 0.3 ms for each pair of a cut view and one of up to 150
+  /// others, 1 s in all; 35 kB of RAM for each view.
+  SectorLocaliser(const VisualMemory& memory, const GradientSource& features,
+                  const std::optional<SectorModel>& model = std::nullopt);
 
-  /// Learnt at construction.
+  /// Given or learnt at construction.
   [[nodiscard]] const SectorModel& model() const noexcept { return model_; }
 
   /// Localises one query; lists up to `top` matches:
@@ -94,7 +96,6 @@ class SectorLocaliser {
     std::vector<Candidate> candidates;
     double share = 0.0;
   };
-  struct LearningCase;
 
   [[nodiscard]] std::vector<Candidate> find_candidates(const GradientFeatures& query, int top,
                                                        std::span<const std::size_t> compared,
@@ -105,8 +106,9 @@ class SectorLocaliser {
   [[nodiscard]] bool are_near(std::size_t a, std::size_t b, double spacings) const;
   [[nodiscard]] std::optional<double> radius_at(double width_rad) const;
   [[nodiscard]] PlaceMatch describe(const Candidate& candidate, double azimuth_rad) const;
-  [[nodiscard]] LearningCase cut_case(std::size_t reference, std::size_t width,
-                                      std::uint64_t seed) const;
+  /// Cuts a part of this width out of a view; returns the places of the others that it resembles.
+  [[nodiscard]] std::vector<Group> find_places_of_cut(std::size_t reference, std::size_t width,
+                                                      std::uint64_t seed) const;
   void learn();
 
   const VisualMemory* memory_;

@@ -18,6 +18,7 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/signature/gradient_features.hpp"
 #include "panonav/storage/checksum.hpp"
 
@@ -28,7 +29,7 @@ namespace {
 constexpr const char* parameter_name = "learnt models";
 /// Version of the learning method; raised when its results change, so that older models are
 /// ignored.
-constexpr std::string_view learning_version = "7";
+constexpr std::string_view learning_version = "8";
 
 // Visits the members of each model in the order in which they are stored.
 template <class Model, class Visit>
@@ -55,6 +56,13 @@ void visit_members(Model& m, const Visit& visit) {
   visit(m.spacing_m), visit(m.far_difference), visit(m.range_m), visit(m.sharpness);
   visit(m.heading_width_rad), visit(m.explained_difference), visit(m.neighbouring_difference);
   visit(m.sampled_views);
+}
+
+template <class Model, class Visit>
+requires std::same_as<std::remove_const_t<Model>, SectorModel>
+void visit_members(Model& m, const Visit& visit) {
+  visit(m.learnt), visit(m.share_exponent);
+  for (auto& radius_m : m.radius_m) visit(radius_m);
 }
 
 /// Writes words separated by blanks, doubles with all their bits.
@@ -170,6 +178,9 @@ std::optional<LearntModels> read_models(const MemoryFile& file,
   bool has_observation = false;
   reader(has_observation);
   if (has_observation) visit_members(models.observation.emplace(), reader);
+  bool has_sector = false;
+  reader(has_sector);
+  if (has_sector) visit_members(models.sector.emplace(), reader);
   if (!reader.ok()) return std::nullopt;
   return models;
 }
@@ -177,9 +188,11 @@ std::optional<LearntModels> read_models(const MemoryFile& file,
 /// Learns all models but the observation model from the views of the ranking.
 LearntModels learn_from(const ColumnRanking& ranking, const FeatureSource& features) {
   const NeighbourSupport support(ranking);
-  return {learn_place_model(ranking), learn_position_model(ranking), support.spacing_m(),
-          std::nullopt,
-          features && evaluate_features(ranking, support, features).is_significantly_better()};
+  return {.place = learn_place_model(ranking),
+          .position = learn_position_model(ranking),
+          .spacing_m = support.spacing_m(),
+          .by_features =
+              features && evaluate_features(ranking, support, features).is_significantly_better()};
 }
 
 /// Returns a source that keeps the features of up to 250 views, about 4 MB, so that few are read
@@ -197,7 +210,7 @@ FeatureSource keep_read_features(const FeatureSource& source) {
 }
 
 LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& features,
-                            Executor& executor) {
+                            const GradientSource& narrow_features, Executor& executor) {
   constexpr std::size_t max_cached_profiles = 4000;  // 11 MB
   const ColumnRanking ranking(memory, 0, max_cached_profiles);
   LearntModels models;
@@ -216,6 +229,7 @@ LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& fea
     models.by_features =
         features &&
         evaluate_features(ranking, support, keep_read_features(features)).is_significantly_better();
+    if (narrow_features) models.sector = SectorLocaliser(memory, narrow_features).model();
   };
   const std::array<std::function<void()>, 3> parts{learn_places, learn_positions, learn_support};
   executor.for_each_chunk(parts.size(), 1,
@@ -251,10 +265,11 @@ ObservationModel learn_tracking_model(const VisualMemory& memory, const Learning
   return learn_observation_model(ColumnRanking(learnt.memory()), options);
 }
 
-LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features) {
+LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features,
+                          const GradientSource& narrow_features) {
   const LearntViews learnt(memory);
   Executor alone;
-  return learn_all_from(learnt.memory(), features, alone);
+  return learn_all_from(learnt.memory(), features, narrow_features, alone);
 }
 
 void learn_and_store_models(MemoryFile& file) {
@@ -267,8 +282,10 @@ void learn_and_store_models(MemoryFile& file, Executor& executor) {
   if (places.empty()) return;
   const std::string fingerprint = compute_fingerprint(file.header().shape, places);
   if (read_models(file, fingerprint)) return;
-  const LearntModels models =
-      learn_all_from(load_learnt_views(file, places), make_feature_source(file), executor);
+  const GradientSource narrow_features =
+      has_narrow_features(file) ? make_gradient_source(file) : GradientSource{};
+  const LearntModels models = learn_all_from(load_learnt_views(file, places),
+                                             make_feature_source(file), narrow_features, executor);
   Writer writer;
   writer.word(learning_version);
   writer.word(fingerprint);
@@ -278,6 +295,8 @@ void learn_and_store_models(MemoryFile& file, Executor& executor) {
   writer(models.by_features);
   writer(models.observation.has_value());
   if (models.observation) visit_members(*models.observation, writer);
+  writer(models.sector.has_value());
+  if (models.sector) visit_members(*models.sector, writer);
   file.set_parameter(parameter_name, writer.text());
 }
 

@@ -1,5 +1,7 @@
 #include "panonav/pipeline/narrow_features.hpp"
 
+#include <optional>
+#include <string>
 #include <string_view>
 
 #include "panonav/core/error.hpp"
@@ -29,6 +31,23 @@ void require_narrow_features(const MemoryFile& file) {
       file.path().string(),
       "stores no features for narrow pictures; memorise its views again with the option "
       "narrow");
+}
+
+GradientSource make_gradient_source(const MemoryFile& file) {
+  require_narrow_features(file);
+  return [&file](ViewId view) -> std::optional<GradientFeatures> {
+    const auto bytes = file.features(view);
+    if (!bytes) return std::nullopt;
+    const MemoryHeader& header = file.header();
+    const auto parts = split_feature_bytes(*bytes);
+    if (parts.gradient.empty()) return std::nullopt;
+    try {
+      return unpack_gradient_features(parts.gradient, {header.shape.rows, header.panorama_columns},
+                                      *header.elevations);
+    } catch (const ContractError& error) {
+      throw FileError(file.path().string(), "is damaged: " + std::string(error.what()));
+    }
+  };
 }
 
 std::vector<std::uint8_t> pack_features(const ViewEncoder& encoder, const Panorama& panorama,

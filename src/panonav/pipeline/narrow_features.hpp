@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "panonav/localisation/sector_localiser.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -15,6 +16,10 @@ namespace panonav {
 void set_narrow_features(MemoryFile& file);
 /// Throws FileError unless the memory stores these features.
 void require_narrow_features(const MemoryFile& file);
+
+/// Returns a function that reads the features of a view from the file at each call. The file must
+/// outlive the function. Throws as `require_narrow_features`.
+[[nodiscard]] GradientSource make_gradient_source(const MemoryFile& file);
 
 /// Returns the packed features of a view for the memory: local features, and gradient features if
 /// `narrow`. Throws ContractError if elevations are unknown.

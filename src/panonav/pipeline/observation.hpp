@@ -13,6 +13,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/panorama.hpp"
+#include "panonav/panorama/picture_source.hpp"
 #include "panonav/panorama/tilt.hpp"
 
 namespace panonav {
@@ -44,6 +45,9 @@ struct Observation {
   /// Tilt measured by an inertial sensor, which unwrapping compensates. Encoding throws
   /// ContractError if the tilt exceeds half a degree and the elevations of the image are unknown.
   std::optional<Tilt> tilt;
+  /// Layout of this picture, if it is a narrow one (`PictureKind::pinhole`) among panoramic ones:
+  /// a question with a phone to the memory of a panoramic camera. Only `PlaceRecogniser` takes it.
+  std::optional<PictureSource> narrow_source;
 };
 
 /// Returns `make()`. If the image was read from a file, converts a ContractError into a FileError

@@ -15,6 +15,7 @@
 #include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/internal/sector_recogniser.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -99,7 +100,11 @@ struct PlaceRecogniser::Implementation {
     check_options(options, file.header(), true);
     if (memory->empty()) throw_empty_memory(file);
     learn_from_held_views(file);
-    if (is_narrow_source(options)) narrow.emplace(file, *memory, *options.source);
+    if (is_narrow_source(options)) {
+      narrow.emplace(file, *memory, *options.source, models->sector);
+    } else if (has_narrow_features(file)) {
+      narrow_file.emplace(file.reopen(Access::read_only));
+    }
     if (options.areas) areas.emplace(*memory);
   }
   /// Searches the memory on its server.
@@ -176,6 +181,22 @@ struct PlaceRecogniser::Implementation {
     return current;
   }
 
+  /// Returns the localiser of narrow pictures, made for the first one if all are not narrow.
+  const SectorRecogniser& get_or_create_narrow() {
+    const std::lock_guard lock(narrow_mutex);
+    if (!narrow) {
+      require_held();
+      if (!narrow_file) {
+        throw ContractError("memory", "without features for narrow pictures",
+                            "one that was memorised with them (option narrow)");
+      }
+      const PictureSource pinhole{.kind = PictureKind::pinhole};
+      narrow.emplace(*narrow_file, *memory, pinhole, models->sector);
+      narrow_file.reset();
+    }
+    return *narrow;
+  }
+
   [[nodiscard]] std::unique_ptr<ViewIndex> index() const {
     if (indexed) return indexed->index();
     return std::make_unique<HeldViewIndex>(*memory);
@@ -192,7 +213,9 @@ struct PlaceRecogniser::Implementation {
   std::filesystem::path path;              // where not held
   std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
-  std::optional<SectorRecogniser> narrow;  // set if the pictures are narrow
+  std::mutex narrow_mutex;                 // of the next two
+  std::optional<SectorRecogniser> narrow;  // set if pictures are narrow, or from the first such one
+  std::optional<MemoryFile> narrow_file;   // until `narrow` is made from it
   std::shared_ptr<FeatureCache> features;  // null: the memory has none
   std::optional<LearntModels> models;      // learnt or loaded last
   mutable std::mutex mutex;                // of `current`
@@ -224,14 +247,14 @@ LengthUnit PlaceRecogniser::length_unit() const noexcept {
 
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
-  const Implementation& own = *implementation_;
+  Implementation& own = *implementation_;
   const std::unique_ptr<ViewIndex> index = own.index();
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
     if (const auto view = index->find(name)) excluded.push_back(*view);
   }
-  if (own.narrow) {
-    return own.narrow->localise(observation, own.options.localiser.top, excluded);
+  if (is_narrow_source(own.options) || observation.narrow_source) {
+    return own.get_or_create_narrow().localise(observation, own.options.localiser.top, excluded);
   }
   const std::shared_ptr<const Localiser> localiser = own.localiser();
   ObservationQuery query(own.encoder, observation);

@@ -66,6 +66,11 @@ void require_same_size(const PanoramaShape& shape, const PanoramaShape& remember
                           "; store images of another size in a memory of their own");
 }
 
+void require_panoramic(const Observation& observation) {
+  if (!observation.narrow_source) return;
+  throw ContractError("image", "a narrow one", "one that shows all azimuths");
+}
+
 }  // namespace
 
 /// Pool of the encoding buffers, one for each thread that encodes at the moment.
@@ -162,6 +167,7 @@ void ViewEncoder::check_band(const std::optional<ElevationBand>& band) const {
 
 Panorama ViewEncoder::panorama(const Observation& observation) const {
   return rethrow_with_file_name(observation, [&] {
+    require_panoramic(observation);
     const Tilt tilt = observation.tilt.value_or(Tilt{});
     if (const auto* image = std::get_if<Image>(&observation.picture))
       return panorama(image->view(), tilt);
@@ -172,6 +178,7 @@ Panorama ViewEncoder::panorama(const Observation& observation) const {
 FourierSignature ViewEncoder::signature(const Observation& observation) const {
   if (observation.tilt.value_or(Tilt{}) != Tilt{}) return signature(panorama(observation));
   return rethrow_with_file_name(observation, [&] {
+    require_panoramic(observation);
     return std::visit(
         [this](const auto& picture) {
           if constexpr (std::is_same_v<std::decay_t<decltype(picture)>, Image>) {

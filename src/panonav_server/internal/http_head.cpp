@@ -104,6 +104,11 @@ HttpHead read_http_head(MHD_Connection* handle, const char* method, const char* 
                         std::size_t max_body, HttpRequest& request) {
   HeadReader reader(version, max_body, request);
   MHD_get_connection_values(handle, MHD_HEADER_KIND, &HeadReader::read, &reader);
+  const auto add_argument = [](void* read, MHD_ValueKind, const char* name, const char* value) {
+    static_cast<HttpRequest*>(read)->arguments[name] = value == nullptr ? "" : value;
+    return MHD_YES;
+  };
+  MHD_get_connection_values(handle, MHD_GET_ARGUMENT_KIND, add_argument, &request);
   const auto* const size = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
   return reader.finish(method, size->header_size);
 }

@@ -6,6 +6,7 @@
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/localisation/position_model.hpp"
+#include "panonav/localisation/sector_localiser.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -21,15 +22,18 @@ struct LearntModels {
   std::optional<ObservationModel> observation;
   /// True if local features sort the best matches (`FeatureTrial::is_significantly_better`).
   bool by_features = false;
+  /// Set if the views have features for narrow pictures.
+  std::optional<SectorModel> sector;
   friend bool operator==(const LearntModels&, const LearntModels&) = default;
 };
-/// Learns the models of a memory from the views of `LearntViews`. `features`: empty if the memory
-/// has none.
+/// Learns the models of a memory from the views of `LearntViews`. `features`, `narrow_features`:
+/// empty if the memory has none.
 [[nodiscard]] LearntModels learn_models(const VisualMemory& memory,
-                                        const FeatureSource& features = {});
+                                        const FeatureSource& features = {},
+                                        const GradientSource& narrow_features = {});
 
-/// Learns all models except the observation model, with `components` Fourier components (0: all).
-/// Throws ContractError if the memory has fewer components.
+/// Learns all models except those of observations and of narrow pictures, with `components` Fourier
+/// components (0: all). Throws ContractError if the memory has fewer components.
 [[nodiscard]] LearntModels learn_place_models(const VisualMemory& memory,
                                               const FeatureSource& features, int components);
 

@@ -14,24 +14,6 @@ namespace panonav {
 
 namespace {
 
-/// Checks that the memory can be asked with narrow pictures, and returns its features.
-GradientSource make_gradient_source(const MemoryFile& file) {
-  require_narrow_features(file);
-  return [&file](ViewId view) -> std::optional<GradientFeatures> {
-    const auto bytes = file.features(view);
-    if (!bytes) return std::nullopt;
-    const MemoryHeader& header = file.header();
-    const auto parts = split_feature_bytes(*bytes);
-    if (parts.gradient.empty()) return std::nullopt;
-    try {
-      return unpack_gradient_features(parts.gradient, {header.shape.rows, header.panorama_columns},
-                                      *header.elevations);
-    } catch (const ContractError& error) {
-      throw FileError(file.path().string(), "is damaged: " + std::string(error.what()));
-    }
-  };
-}
-
 Camera make_pinhole_camera(ImageSize size, double focal_length_px) {
   Camera camera;
   camera.model = PinholeModel{.focal_length_px = focal_length_px};
@@ -40,22 +22,16 @@ Camera make_pinhole_camera(ImageSize size, double focal_length_px) {
   return camera;
 }
 
-}  // namespace
-
-SectorRecogniser::SectorRecogniser(const MemoryFile& file, const VisualMemory& memory,
-                                   PictureSource source)
-    : header_(file.header()),
-      source_(std::move(source)),
-      localiser_(memory, make_gradient_source(file)) {}
-
-Camera SectorRecogniser::choose_camera(const Observation& observation, ImageSize size) const {
-  if (source_.camera) {
-    require_picture_size(source_, size);
-    return *source_.camera;
+/// Returns the camera of a picture with this layout. Throws ContractError if the size of the
+/// picture is not that of the camera, or if its field of view is unknown.
+Camera choose_camera(const Observation& observation, const PictureSource& source, ImageSize size) {
+  if (source.camera) {
+    require_picture_size(source, size);
+    return *source.camera;
   }
-  if (source_.field_of_view_rad) {
+  if (source.field_of_view_rad) {
     return make_pinhole_camera(
-        size, focal_length_from_field_of_view(size.width, *source_.field_of_view_rad));
+        size, focal_length_from_field_of_view(size.width, *source.field_of_view_rad));
   }
   std::optional<double> focal_length_mm;
   if (!observation.encoded.empty()) {
@@ -71,12 +47,21 @@ Camera SectorRecogniser::choose_camera(const Observation& observation, ImageSize
   return make_pinhole_camera(size, focal_length_from_35mm(size, *focal_length_mm));
 }
 
+}  // namespace
+
+SectorRecogniser::SectorRecogniser(const MemoryFile& file, const VisualMemory& memory,
+                                   PictureSource source, const std::optional<SectorModel>& model)
+    : header_(file.header()),
+      source_(std::move(source)),
+      localiser_(memory, make_gradient_source(file), model) {}
+
 Place SectorRecogniser::localise(const Observation& observation, int top,
                                  std::span<const ViewId> excluded) const {
   return rethrow_with_file_name(observation, [&] {
     const auto* const image = std::get_if<Image>(&observation.picture);
     if (image == nullptr) throw ContractError("picture", "a panorama", "an image");
-    const Camera camera = choose_camera(observation, image->size());
+    const Camera camera =
+        choose_camera(observation, observation.narrow_source.value_or(source_), image->size());
     const SectorView sector =
         unwarp_sector(image->view(), camera, {header_.shape.rows, header_.panorama_columns},
                       *header_.elevations, observation.tilt.value_or(Tilt{}));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include "panonav/localisation/sector_localiser.hpp"
@@ -12,19 +13,20 @@ namespace panonav {
 /// Localises narrow pictures in a memory of panoramas, as `PlaceRecogniser` does.
 class SectorRecogniser {
  public:
-  /// Loads the features of all views and learns from them. `memory` must outlive *this. Throws
-  /// FileError if the memory has no features for narrow pictures or unknown elevations.
-  SectorRecogniser(const MemoryFile& file, const VisualMemory& memory, PictureSource source);
+  /// Loads the features of all views. `memory` must outlive *this. `model`: learnt from the memory
+  /// before; nullopt: it is learnt now. Throws FileError if the memory has no features for narrow
+  /// pictures or unknown elevations.
+  SectorRecogniser(const MemoryFile& file, const VisualMemory& memory, PictureSource source,
+                   const std::optional<SectorModel>& model);
 
-  /// Localises an observation; lists up to `top` matches. Throws ContractError (FileError if the
+  /// Localises an observation, whose own layout comes before that of the constructor; lists up to
+  /// `top` matches. Throws ContractError (FileError if the
   /// observation has a file) if the picture is no image, its size is not that of the camera, or its
   /// field of view is unknown.
   [[nodiscard]] Place localise(const Observation& observation, int top,
                                std::span<const ViewId> excluded) const;
 
  private:
-  [[nodiscard]] Camera choose_camera(const Observation& observation, ImageSize size) const;
-
   MemoryHeader header_;
   PictureSource source_;
   SectorLocaliser localiser_;
