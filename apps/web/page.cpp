@@ -4,6 +4,7 @@
 
 #include <emscripten.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
@@ -15,9 +16,12 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/exif.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav_server/place_json.hpp"
 
@@ -44,15 +48,10 @@ std::string to_text(const nlohmann::ordered_json& json) {
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-/// Makes an observation of the pixels that a browser decoded. `field_of_view_deg`: azimuths that
-/// the picture shows; 0: those of the memory's pictures. Throws FileError for a narrow view.
+/// Makes an observation of the pixels that a browser decoded. `field_of_view_deg`: angle between
+/// the left and the right edge of a narrow picture; 0: it shows all azimuths.
 Observation to_observation(const std::uint8_t* rgba, int width, int height, const char* name,
                            double field_of_view_deg) {
-  if (field_of_view_deg != 0.0 && field_of_view_deg < 360.0) {
-    throw FileError(name,
-                    "does not show all directions; this page compares 360 degree pictures, which "
-                    "are twice as wide as high");
-  }
   Image image(width, height, 3);
   std::uint8_t* to = image.pixels().data();
   for (std::size_t i = 0; i < image.pixels().size() / 3; ++i) {
@@ -60,13 +59,11 @@ Observation to_observation(const std::uint8_t* rgba, int width, int height, cons
   }
   Observation observation(std::move(image));
   observation.name = name;
+  if (field_of_view_deg != 0.0) {
+    observation.narrow_source = PictureSource{.kind = PictureKind::pinhole,
+                                              .field_of_view_rad = radians(field_of_view_deg)};
+  }
   return observation;
-}
-
-const char* to_string(PictureKind kind) {
-  return kind == PictureKind::panorama          ? "panorama"
-         : kind == PictureKind::equirectangular ? "equirectangular"
-                                                : "mirror";
 }
 
 /// A memory with the recogniser of its places.
@@ -82,10 +79,11 @@ class OpenMemory {
     auto views = nlohmann::ordered_json::array();
     for (const PlacedView& view : list_placed_views()) views.push_back(view);
     const PictureSource& source = file_.header().source;
-    return {{"kind", to_string(source.kind)},
+    return {{"kind", panonav::to_string(source.kind)},
             {"unit", panonav::to_string(recogniser_.length_unit())},
             {"is_from_map", has_positions_from_map(file_)},
             {"thumbnails", file_.views_with_thumbnail().size()},
+            {"takes_narrow_pictures", has_narrow_features(file_)},
             {"views", std::move(views)}};
   }
 
@@ -109,7 +107,8 @@ class OpenMemory {
   PlaceRecogniser recogniser_;
 };
 
-/// A memory of 360 degree pictures that is being made. The first pictures wait for its full scale.
+/// A memory of 360 degree pictures that is being made, which narrow pictures can be compared with.
+/// The first pictures wait for its full scale.
 /// The page encodes the thumbnails, for which a browser has the codecs.
 class MemoryMaker {
  public:
@@ -130,10 +129,9 @@ class MemoryMaker {
     const Observation observation = std::move(waiting_.front());
     waiting_.pop_front();
     const Panorama panorama = encoder_->panorama(observation);
-    const auto features = encoder_->features(panorama);
     encoded_ = NewView{.info = {observation.name, {}, {}},
                        .signature = encoder_->packed(panorama),
-                       .features = features ? pack(*features) : std::vector<std::uint8_t>{}};
+                       .features = pack_features(*encoder_, panorama, true)};
     thumbnail_ = make_thumbnail(panorama);
     return &thumbnail_;
   }
@@ -155,6 +153,7 @@ class MemoryMaker {
     const std::vector<Observation> first(waiting_.begin(), waiting_.end());
     const MemoryHeader header = make_memory_header(first, source, {}, {}, executor);
     file_.emplace(MemoryFile::create(path_, header));
+    set_narrow_features(*file_);
     encoder_.emplace(header, source);
   }
 
@@ -209,13 +208,23 @@ EMSCRIPTEN_KEEPALIVE char* panonav_localise(const OpenMemory* memory, const std:
   });
 }
 
+/// Returns the angle between the left and the right edge, in degrees, that the EXIF data of a JPEG
+/// file state for its picture of this size; 0 if there are none.
+EMSCRIPTEN_KEEPALIVE double panonav_field_of_view(const std::uint8_t* jpeg, std::size_t size,
+                                                  int width, int height) {
+  const auto focal_length_mm = find_focal_length_35mm({jpeg, size});
+  if (!focal_length_mm) return 0.0;
+  const double focal_length_px = focal_length_from_35mm({width, height}, *focal_length_mm);
+  return degrees(2.0 * std::atan(0.5 * width / focal_length_px));
+}
+
 EMSCRIPTEN_KEEPALIVE MemoryMaker* panonav_make(const char* memory) {
   return new MemoryMaker(memory);
 }
 EMSCRIPTEN_KEEPALIVE int panonav_add(MemoryMaker* maker, const std::uint8_t* rgba, int width,
                                      int height, const char* name, char** error) {
   return answer(error, [&] {
-    maker->add(to_observation(rgba, width, height, name, 360.0));
+    maker->add(to_observation(rgba, width, height, name, 0.0));
     return 1;
   });
 }

@@ -2,6 +2,7 @@
 //   const panonav = await loadPanonav();
 //   const memory = panonav.open(bytes);                    // of a .panonav file
 //   const answer = memory.localise(imageData, "view.jpg"); // what `panonav localise --json` prints
+//   const other = memory.localise(photo, "photo.jpg", 67); // of a phone, whose camera sees 67 degrees
 //   const maker = panonav.make(encode);                    // of 360 degree pictures, 2 : 1
 //   await maker.add(imageData, "one.jpg");
 //   const bytes = await maker.finish();                    // a .panonav file
@@ -72,7 +73,7 @@ export async function loadPanonav(settings = {}) {
       wasm.FS.writeFile(path, bytes);
       const memory = withText(path, (at) => call((error) => wasm._panonav_open(at, error)));
       return {
-        /** `fieldOfView`: degrees of azimuth that the picture shows; 0: as the memory's pictures do. */
+        /** `fieldOfView`: degrees between the left and the right edge of a narrow picture; 0: it shows all azimuths. */
         localise: (picture, name, fieldOfView = 0) =>
           takeText(withPicture(picture, name, (...sent) => {
             const error = sent.pop();
@@ -93,6 +94,16 @@ export async function loadPanonav(settings = {}) {
           wasm.FS.unlink(path);
         },
       };
+    },
+    /** Degrees between the edges of a picture of this size, from the first bytes of its JPEG file; 0: not stated. */
+    findFieldOfView(bytes, width, height) {
+      const at = wasm._malloc(bytes.length);
+      wasm.HEAPU8.set(bytes, at);
+      try {
+        return wasm._panonav_field_of_view(at, bytes.length, width, height);
+      } finally {
+        wasm._free(at);
+      }
     },
     /** `encode` gets grey pixels, width and height of a thumbnail, and resolves to the bytes of its image file. */
     make(encode) {

@@ -1,6 +1,6 @@
-// node localise.mjs MODULE MEMORY PICTURE ...: prints the answers as lines of JSON, and on standard error the median
-// processor time of a picture in ms, of ten answers each. MODULE is the folder of panonav.js; pictures are grey or RGB
-// PNG files without interlacing.
+// node localise.mjs MODULE MEMORY DEGREES PICTURE ...: prints the answers as lines of JSON, and on standard error the
+// median processor time of a picture in ms, of ten answers each. MODULE is the folder of panonav.js; pictures are grey
+// or RGB PNG files without interlacing, whose edges are DEGREES apart (0: they show all azimuths).
 import { readFileSync, writeFileSync } from "node:fs";
 import { basename } from "node:path";
 import { inflateSync } from "node:zlib";
@@ -46,17 +46,17 @@ function readPng(path) {
   return { width, height, data };
 }
 
-const [folder, memoryFile, ...pictures] = process.argv.slice(2);
+const [folder, memoryFile, degrees, ...pictures] = process.argv.slice(2);
 const { loadPanonav } = await import(`${folder}/panonav.js`);
 const panonav = await loadPanonav({ wasmBinary: readFileSync(`${folder}/panonav_web.wasm`) });
 const memory = panonav.open(readFileSync(memoryFile));
 const times = [];
 for (const path of pictures) {
   const picture = readPng(path);
-  console.log(memory.localise(picture, basename(path)));
+  console.log(memory.localise(picture, basename(path), Number(degrees)));
   for (let i = 1; i < 10; ++i) {
     const before = process.cpuUsage();
-    memory.localise(picture, basename(path));
+    memory.localise(picture, basename(path), Number(degrees));
     times.push(process.cpuUsage(before).user / 1000);
   }
 }

@@ -22,6 +22,7 @@ from browser import CONTRAST, PATIENCE_S, PROGRAM, Browser  # noqa: E402
 SCREENS = {"desk": {"width": 1400, "height": 900, "deviceScaleFactor": 1, "mobile": False},
            "phone": {"width": 420, "height": 860, "deviceScaleFactor": 1, "mobile": True},
            "narrow": {"width": 360, "height": 740, "deviceScaleFactor": 1, "mobile": True}}
+USUAL_PHONE_DEG = 65  # worker.js
 MIN_CONTRAST = 4.5  # WCAG 2, level AA
 
 
@@ -108,12 +109,24 @@ def ask_unknown(page: Page, picture: pathlib.Path) -> None:
     assert page.text("#answer-title") == "I do not know this place"
 
 
-def ask_wrong(page: Page, picture: pathlib.Path) -> None:
-    """A picture of a narrow view is refused with a reason."""
+def ask_wrong(page: Page, picture: pathlib.Path, reason: str) -> None:
+    """A picture that cannot be compared is refused with a reason."""
     page.choose("query", picture)
     page.wait("document.querySelector('#answer').className === 'error'")
     page.wait_until_idle()
-    assert "360" in page.text("#answer-body"), page.text("#answer")
+    assert reason in page.text("#answer-body"), page.text("#answer")
+
+
+def ask_with_photo(page: Page, photo: pathlib.Path, expected: dict) -> None:
+    """A picture such as a phone's gets the command's answer, and the page says how wide it takes it to be."""
+    ask_known(page, photo, expected)
+    assert f"shows {USUAL_PHONE_DEG}°, as most phones do" in page.text("#answer"), page.text("#answer")
+    page.check("photo")
+    page.ask("document.querySelector('#angle').value = 30")
+    page.choose("query", photo)
+    page.wait("document.querySelector('#answer').innerText.includes('shows 30°, as you say')")
+    page.wait_until_idle()
+    page.ask("document.querySelector('#angle').value = ''")
 
 
 def follow_camera(page: Page) -> None:
@@ -160,7 +173,7 @@ def make_memory(page: Page, views: pathlib.Path, downloads: pathlib.Path) -> pat
 
 
 def make_inputs(panonav: pathlib.Path, folder: pathlib.Path) -> list[dict]:
-    """Recordings, a memory, its page, and the command's answers to the queries."""
+    """Recordings, memories, the page of one, and the command's answers to two queries and a photo."""
     def run(*arguments: object) -> str:
         return subprocess.run([panonav, *arguments, "-q"], check=True, capture_output=True, text=True).stdout
 
@@ -169,12 +182,18 @@ def make_inputs(panonav: pathlib.Path, folder: pathlib.Path) -> list[dict]:
     run("simulate", "lab", folder / "elsewhere", "--kind", "panorama", "--random", "1", "--seed", "1")
     run("simulate", "office", folder / "walk", "--kind", "equirectangular", "--path", "walk", "--poses", "12",
         "--spacing-m", "0.3", "--columns", "512", "--seed", "5")
-    run("simulate", "office", folder / "mirror", "--random", "1", "--rays-per-axis", "1")
-    run("memorise", folder / "office.panonav", folder / "views")
+    (folder / "photos").mkdir()
+    subprocess.run(["ffmpeg", "-v", "error", "-i", folder / "walk/view_00006.jpg", "-vf",
+                    f"v360=e:flat:h_fov={USUAL_PHONE_DEG}:v_fov=51:w=640:h=480", folder / "photos/photo.png"], check=True)
+    (folder / "broken.png").write_bytes(b"no picture")
+    run("memorise", folder / "office.panonav", folder / "views", "--narrow")
+    run("memorise", folder / "plain.panonav", folder / "views")
     run("export", folder / "office.panonav", "--web", folder / "page", "--pictures", folder / "views")
     subprocess.run(["ffmpeg", "-v", "error", "-framerate", "10", "-i", folder / "views/view_%05d.png", "-frames:v", "60", "-vf",
                     "format=yuv420p", folder / "camera.y4m"], check=True)
-    return [json.loads(line) for line in run("localise", folder / "office.panonav", folder / "queries", "--json").splitlines()]
+    photos = run("localise", folder / "office.panonav", folder / "photos", "--json", "--field-of-view", str(USUAL_PHONE_DEG))
+    queries = run("localise", folder / "office.panonav", folder / "queries", "--json")
+    return [json.loads(line) for line in (queries + photos).splitlines()]
 
 
 def use_exported_page(page: Page, folder: pathlib.Path, address: str, expected: list[dict]) -> None:
@@ -184,10 +203,15 @@ def use_exported_page(page: Page, folder: pathlib.Path, address: str, expected: 
     page.check("known")
     ask_unknown(page, next((folder / "elsewhere").glob("*.png")))
     page.check("unknown")
-    ask_wrong(page, next((folder / "mirror").glob("*.png")))
+    ask_with_photo(page, folder / "photos/photo.png", expected[-1])
+    ask_wrong(page, folder / "broken.png", "decoded")
     page.check("wrong")
     use_keyboard(page)
     follow_camera(page)
+    page.choose("memory", folder / "plain.panonav")
+    page.wait("document.querySelector('#subtitle').innerText.startsWith('plain')")
+    page.wait_until_idle()
+    ask_wrong(page, folder / "photos/photo.png", "360")
 
 
 def use_empty_page(page: Page, folder: pathlib.Path, address: str, panonav: pathlib.Path) -> None:
@@ -232,7 +256,9 @@ def main() -> int:
         server.server_close()
         page.open(address)  # without the server
         ask_known(page, folder / "queries" / expected[1]["file"], expected[1])
-        errors = [error for error in page.errors if "ERR_CONNECTION_REFUSED" not in error]
+        shown = "document.querySelector('#answer img')"
+        page.wait(f"{shown} && {shown}.complete && {shown}.naturalWidth > 0")  # kept with the page or in the memory
+        errors = [error for error in page.errors if "ERR_CONNECTION_REFUSED" not in error and "/pictures/" not in error]
         assert not errors, errors
         assert all(url.startswith((address, "blob:")) for url in page.requests), page.requests
     finally:

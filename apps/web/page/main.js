@@ -37,12 +37,12 @@ const addresses = new Map();  // of thumbnails, by the id of their view
 /** Names of views on floors begin with the floor: "second/view_3.png". */
 const floorOf = (place) => (place.name.includes("/") ? place.name.slice(0, place.name.indexOf("/")) : "");
 
+/** Address of the picture that came with the page; of the memory's small one where there is none, or no network. */
 async function pictureOf(place) {
-  if (shown.pictures?.includes(place.id)) return `pictures/${place.id}.jpg`;
-  if (!addresses.has(place.id)) {
-    const bytes = await engine.thumbnail({ view: place.id });
-    addresses.set(place.id, bytes && URL.createObjectURL(new Blob([bytes])));
-  }
+  if (addresses.has(place.id)) return addresses.get(place.id);
+  const file = shown.pictures?.includes(place.id) ? await fetch(`pictures/${place.id}.jpg`).catch(() => null) : null;
+  const bytes = file?.ok ? await file.blob() : await engine.thumbnail({ view: place.id });
+  if (!addresses.has(place.id)) addresses.set(place.id, bytes && URL.createObjectURL(new Blob([bytes])));
   return addresses.get(place.id);
 }
 
@@ -54,6 +54,8 @@ async function openMemory(memory) {
   shown = { ...memory, description, views: description.views.length };
   find("subtitle").textContent = `${shown.name}: ${shown.views} places`;
   find("ask").hidden = false;
+  find("angle-label").hidden = !description.takes_narrow_pictures;
+  find("source-picture").textContent = description.takes_narrow_pictures ? "a photo or 360° picture" : "a 360° picture";
   find("answer").hidden = true;
   showPlaces();
   await listKept();
@@ -179,14 +181,24 @@ function compass(heading) {
 /** On a map 0 points right; relative to a picture, straight on is up. */
 const toArrow = (explained, heading) => (explained.mark ? heading : heading + Math.PI / 2);
 
-async function showAnswer(answer, picture, isLiveAnswer = false) {
+/** The angle of view in words; nothing of pictures that show all directions. */
+function describeView({ degrees, origin }) {
+  if (degrees === 0) return [];
+  const reason = { stated: "as you say", file: "as its file says", guess: "as most phones do; set the angle of view if it is another" }[origin];
+  return [["Your picture", `shows ${Math.round(degrees)}°, ${reason}`]];
+}
+
+/** Angle of view that the visitor states; undefined: it is found. */
+const statedView = () => find("angle").valueAsNumber || undefined;
+
+async function showAnswer({ answer, shown: seen }, picture, isLiveAnswer = false) {
   const explained = explain(answer, shown.description.unit, shown.views);
   const section = find("answer");
   section.className = explained.state;
   section.hidden = false;
   find("answer-title").textContent = explained.title;
   const facts = make("dl", { className: "facts" });
-  for (const [name, text, share, heading] of explained.facts) {
+  for (const [name, text, share, heading] of [...explained.facts, ...describeView(seen)]) {
     const value = make("dd", {}, text);
     if (share !== undefined) value.append(make("meter", { min: 0, max: 1, value: share, ariaHidden: "true" }));
     if (heading !== undefined) value.prepend(compass(toArrow(explained, heading)));
@@ -212,7 +224,7 @@ async function showAnswer(answer, picture, isLiveAnswer = false) {
 
 let queryAddress = null;
 async function askWithFile(file) {
-  const { answer } = await engine.localise({ picture: file, name: file.name });
+  const answer = await engine.localise({ picture: file, name: file.name, fieldOfView: statedView() });
   if (queryAddress) URL.revokeObjectURL(queryAddress);
   queryAddress = URL.createObjectURL(file);
   const explained = await showAnswer(answer, queryAddress);
@@ -222,7 +234,7 @@ async function askWithFile(file) {
 
 async function askWithCamera(isLiveAnswer) {
   const picture = await camera.takePicture();
-  const { answer } = await engine.localise({ picture, name: "camera" }, [picture]);
+  const answer = await engine.localise({ picture, name: "camera", fieldOfView: statedView() }, [picture]);
   return showAnswer(answer, null, isLiveAnswer);
 }
 
@@ -292,8 +304,9 @@ const usesCamera = () => document.querySelector("input[name=source]:checked").va
 function showButton() {
   find("where").textContent = isLive ? "Stop" : "Where am I?";
   if (!isLive) {
-    find("ask-hint").textContent = usesCamera() ? "The camera must see all directions (a 360° camera)."
-      : "Or drop a picture anywhere on this page.";
+    find("ask-hint").textContent = !usesCamera() ? "Or drop a picture anywhere on this page."
+      : shown?.description.takes_narrow_pictures ? "Hold it upright, with the horizon level."
+        : "The camera must see all directions (a 360° camera).";
   }
 }
 

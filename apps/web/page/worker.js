@@ -6,7 +6,7 @@ import { loadPanonav } from "./panonav.js";
 const loading = loadPanonav();
 loading.catch(() => {});  // is reported with the first task
 let memory = null;
-let kind = null;  // of the memory's pictures
+let description = null;  // of the memory
 let maker = null;
 
 /** Pixels of a file or of a picture of the camera. */
@@ -30,10 +30,15 @@ async function encodeThumbnail(grey, width, height) {
   return new Uint8Array(await file.arrayBuffer());
 }
 
-/** Degrees of azimuth that a picture shows, by its shape; 0: as the pictures of the memory. */
-function guessFieldOfView({ width, height }) {
-  const usual_phone = 65;
-  return kind === "mirror" || width >= 1.9 * height ? 0 : usual_phone;
+/** Degrees between the edges of a narrow picture, and how they are known; 0: it shows all azimuths. */
+async function findFieldOfView(picture, { width, height }, stated) {
+  if (stated) return { degrees: stated, origin: "stated" };
+  if (description.kind === "mirror" || width >= 1.9 * height) return { degrees: 0, origin: "shape" };
+  const head = 131072;  // bytes; the data stand before the picture
+  const degrees = picture instanceof Blob
+    ? (await loading).findFieldOfView(new Uint8Array(await picture.slice(0, head).arrayBuffer()), width, height) : 0;
+  const usualPhone = 65;
+  return degrees > 0 ? { degrees, origin: "file" } : { degrees: usualPhone, origin: "guess" };
 }
 
 const tasks = {
@@ -42,17 +47,20 @@ const tasks = {
     const opened = panonav.open(new Uint8Array(await new Response(bytes).arrayBuffer()));
     memory?.close();
     memory = opened;
-    const description = JSON.parse(memory.describe());
-    kind = description.kind;
+    description = JSON.parse(memory.describe());
     return description;
   },
-  /** `fieldOfView`: degrees of azimuth, where it is known. */
+  /** `fieldOfView`: degrees between the edges of a narrow picture, where they are known. */
   async localise({ picture, name, fieldOfView }) {
     const begin = performance.now();
     const pixels = await decode(picture);
     const decoded = performance.now();
-    const answer = JSON.parse(memory.localise(pixels, name, fieldOfView ?? guessFieldOfView(pixels)));
-    return { answer, decode_ms: decoded - begin, localise_ms: performance.now() - decoded };
+    const shown = await findFieldOfView(picture, pixels, fieldOfView);
+    if (shown.degrees > 0 && !description.takes_narrow_pictures) {
+      throw new Error(`${name} does not show all directions. This memory takes 360° pictures alone, which are twice as wide as high`);
+    }
+    const answer = JSON.parse(memory.localise(pixels, name, shown.degrees));
+    return { answer, shown, decode_ms: decoded - begin, localise_ms: performance.now() - decoded };
   },
   thumbnail({ view }) {
     return memory.thumbnail(view);
