@@ -87,7 +87,7 @@ def main() -> int:
             print("the command answers", here, "the page answers", page.stdout, sep="\n")
             return 1
         print(f"{pictures.name}: {float(page.stderr):.1f} ms each; {sum(answer['known'] for answer in answers[0])} of {len(files)} known; "
-              f"{len(differences)} numbers differ, by at max_difference {max(differences, default=0.0):.1e}")
+              f"{len(differences)} numbers differ, by at most {max(differences, default=0.0):.1e}")
     return 0 if sum(sizes.values()) <= MAX_BYTES else 1
 
 
