@@ -13,8 +13,8 @@ namespace panonav::server {
 
 /// A complete request.
 struct HttpRequest {
-  std::string method;         ///< "GET", "POST", ...
-  std::string path;           ///< as sent, up to a '?'; still percent-encoded
+  std::string method;  ///< "GET", "POST", ...
+  std::string path;    ///< as sent, up to a '?'; still percent-encoded
   /// What follows the '?', by name; still percent-encoded. Of equal names the last one counts.
   std::map<std::string, std::string, std::less<>> arguments;
   std::string host;           ///< host and port, as the client named them

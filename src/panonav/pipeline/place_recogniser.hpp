@@ -69,8 +69,9 @@ class PlaceRecogniser {
 
   /// Finds the place of an observation. One with `Observation::narrow_source` is compared as a
   /// narrow picture; the first such one takes time to load their features. Ignores views with names
-  /// in `excluded_names`. Throws like `ViewEncoder::panorama`; if the memory is not held, FileError if its server cannot be reached.
-  /// Cost: that of `Localiser::localise`, and 0.1 ms if a mirror image is needed.
+  /// in `excluded_names`. Throws like `ViewEncoder::panorama`; if the memory is not held, FileError
+  /// if its server cannot be reached. Cost: that of `Localiser::localise`, and 0.1 ms if a mirror
+  /// image is needed.
   [[nodiscard]] Place localise(const Observation& observation,
                                std::span<const std::string> excluded_names = {}) const;
 
