@@ -141,22 +141,30 @@ void bind_observations(py::module_& m) {
                           "it. An image alone is accepted, too.")
       .def(py::init([](const py::object& picture, const std::string& name,
                        std::optional<double> stamp_s, const std::optional<Pose2>& odometry,
-                       const std::optional<ReferencePose>& pose, const std::optional<Tilt>& tilt) {
+                       const std::optional<ReferencePose>& pose, const std::optional<Tilt>& tilt,
+                       const std::optional<PictureSource>& narrow_source) {
+             if (narrow_source && narrow_source->kind != PictureKind::pinhole) {
+               throw ContractError("narrow_source", to_string(narrow_source->kind), "'pinhole'");
+             }
              Observation observation = to_observation(picture);
              if (!name.empty()) observation.name = name;
              observation.stamp_s = stamp_s;
              observation.odometry = odometry;
              observation.pose = pose;
              observation.tilt = tilt;
+             observation.narrow_source = narrow_source;
              return observation;
            }),
            py::arg("picture"), py::kw_only(), py::arg("name") = "", py::arg("stamp_s") = py::none(),
            py::arg("odometry") = py::none(), py::arg("pose") = py::none(),
-           py::arg("tilt") = py::none(),
+           py::arg("tilt") = py::none(), py::arg("narrow_source") = py::none(),
            "`picture`: a Panorama, or an image as the camera delivers it: an array of uint8 or "
            "uint16, a PIL image, or the path of a file. `odometry`: absolute, in a frame that "
            "drifts. `pose`: in the world "
-           "frame, if it is known. `tilt`: (roll, pitch) in radians.")
+           "frame, if it is known. `tilt`: (roll, pitch) in radians. `narrow_source`: layout of "
+           "kind "
+           "'pinhole' of a picture that shows a part of the azimuth, for PlaceRecogniser.localise "
+           "with a memory that stores features for it (narrow=True).")
       .def_property_readonly("picture", &get_picture, "A Panorama, or an array of pixels.")
       .def_readonly("name", &Observation::name, "Name of the image, and of its view in a memory.")
       .def_readonly("stamp_s", &Observation::stamp_s, "Seconds at which it was taken, or None.")
@@ -167,6 +175,8 @@ void bind_observations(py::module_& m) {
       .def_property_readonly(
           "tilt", [](const Observation& o) { return o.tilt; },
           "(roll, pitch) in radians as an inertial sensor measured it, or None.")
+      .def_readonly("narrow_source", &Observation::narrow_source,
+                    "Layout of a picture that shows a part of the azimuth, or None.")
       .def("__repr__", [](const Observation& o) { return "Observation('" + o.name + "')"; });
 }
 

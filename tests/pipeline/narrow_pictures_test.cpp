@@ -6,6 +6,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/memory_merge.hpp"
 #include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/signature/gradient_features.hpp"
@@ -106,6 +107,23 @@ TEST_F(NarrowPictures, ChangeNothingForWholePanoramas) {
   EXPECT_EQ(a.known_probability, b.known_probability);
   EXPECT_EQ(a.heading_rad, b.heading_rad);
   EXPECT_EQ(a.matches.front().name, b.matches.front().name);
+}
+
+TEST_F(NarrowPictures, AreLocalisedInAMergedMemory) {
+  const auto path = memorise(true);
+  const auto other = folder / "other.panonav";
+  std::filesystem::copy_file(path, other);
+  const auto merged = folder / "merged.panonav";
+  (void)merge_memories(path, other, merged);
+  const PlaceRecogniser recogniser(merged, narrow_options());
+  const Place place =
+      recogniser.localise(take_narrow_picture(make_patch_view(5), 1.5, radians(70.0)));
+  ASSERT_TRUE(place.known);
+  EXPECT_TRUE(contains(place.matches.front().name, "room 5"));
+  EXPECT_TRUE(contains(message_of<ContractError>([&] {
+                         (void)merge_memories(path, memorise(false), folder / "mixed.panonav");
+                       }),
+                       "narrow"));
 }
 
 TEST_F(NarrowPictures, FaultsAreNamed) {

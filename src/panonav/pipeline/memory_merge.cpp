@@ -24,6 +24,7 @@
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/route/snapshot_chain.hpp"
 #include "panonav/storage/memory_address.hpp"
@@ -156,6 +157,8 @@ void require_same_settings(const MemoryFile& first, const MemoryFile& second) {
   require_same("elevations of the rows", a.elevations == b.elevations);
   require_same("number of columns", a.panorama_columns == b.panorama_columns);
   require_same("preprocessing", a.preprocessing == b.preprocessing);
+  require_same("features for narrow pictures (option narrow)",
+               has_narrow_features(first) == has_narrow_features(second));
 }
 
 /// Returns `name` if it is free, else the name prefixed by that of its file, on the same floor.
@@ -461,6 +464,7 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
   const UnfinishedMemory unfinished(memory);
   MergedMemory result;
   MemoryFile file = MemoryFile::create(unfinished.path(), a.header());
+  if (has_narrow_features(a)) set_narrow_features(file);
   Merge merge(a, b, alignment, graph);
   file.change([&] { result = merge.write(file, advance); });
   learn_and_store_models(file);
