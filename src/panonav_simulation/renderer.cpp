@@ -74,12 +74,6 @@ void require_rays(int rays_per_axis) {
           "1 .. 8");
 }
 
-double light_spacing_m(const Scene& scene) {
-  const double diagonal_m = distance(scene.floor_low, scene.floor_high);
-  // A street of hundreds of metres would take minutes at the spacing of a hall.
-  return std::max(std::clamp(diagonal_m / 25.0, 0.03, 1.0), diagonal_m / 200.0);
-}
-
 LitTriangles validate_and_subdivide(const Scene& scene) {
   validate(scene);
   return subdivide(scene, light_spacing_m(scene));

@@ -1,4 +1,5 @@
 #include "runs/live_run.hpp"
+#include "runs/picture_layout.hpp"
 
 #include <atomic>
 #include <chrono>

@@ -56,14 +56,6 @@ struct RunArguments {
   std::vector<std::string> further_videos;  ///< as in `PictureArguments`
 };
 
-/// True if a flag says anything about the layout of the images.
-[[nodiscard]] bool states_layout(const PictureArguments& pictures);
-
-/// Adds --ignore-gpano.
-void declare_gpano(Arguments& arguments, bool& ignore_gpano);
-/// Adds --kind, --camera, --field-of-view (if narrow pictures are taken), --columns-run,
-/// --forward-column, --elevation-deg and --ignore-gpano.
-void declare_picture_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics);
 /// Adds --from and --to, with `every` also --every.
@@ -75,12 +67,6 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 [[nodiscard]] std::vector<std::string> recording_flags();
 /// True if the input is not a folder, recording, video or live source.
 [[nodiscard]] bool is_one_picture(const std::string& input);
-
-/// Returns the image layout that the flags describe; nullopt if none of them is set. Prints a note
-/// on a calibration of another program. Throws UsageError on flags that exclude each other,
-/// FileError on an invalid camera file.
-[[nodiscard]] std::optional<PictureSource> make_picture_source(const PictureArguments& pictures,
-                                                               Session& session);
 
 /// Prints how many images of a recording are skipped, and why the first ones are; nothing if none
 /// is.

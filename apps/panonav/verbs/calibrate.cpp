@@ -13,6 +13,7 @@
 #include "runs/file_content.hpp"
 #include "runs/mirror_options.hpp"
 #include "runs/orientation_note.hpp"
+#include "runs/picture_layout.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {

@@ -6,6 +6,7 @@
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/recording.hpp"
 #include "panonav_recordings/recording_conversion.hpp"
+#include "runs/picture_layout.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {

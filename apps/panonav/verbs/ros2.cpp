@@ -7,6 +7,7 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav_ros2/localisation_node.hpp"
 #include "panonav_ros2/ros_arguments.hpp"
+#include "runs/picture_layout.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {

@@ -11,6 +11,7 @@
 #include "reports/route_report.hpp"
 #include "runs/chain_run.hpp"
 #include "runs/followed_run.hpp"
+#include "runs/picture_layout.hpp"
 #include "runs/recording.hpp"
 #include "runs/run_record.hpp"
 

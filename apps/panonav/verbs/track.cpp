@@ -15,6 +15,7 @@
 #include "reports/report_page.hpp"
 #include "reports/track_report.hpp"
 #include "runs/live_run.hpp"
+#include "runs/picture_layout.hpp"
 #include "runs/recording.hpp"
 #include "runs/run_record.hpp"
 #include "runs/tracked_run.hpp"

@@ -8,6 +8,7 @@
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/io/unfinished_folder.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "runs/picture_layout.hpp"
 #include "runs/recording.hpp"
 
 namespace panonav::command {

@@ -233,6 +233,12 @@ class LightProbe {
 
 }  // namespace
 
+double light_spacing_m(const Scene& scene) {
+  const double diagonal_m = distance(scene.floor_low, scene.floor_high);
+  // A street of hundreds of metres would take minutes at the spacing of a hall.
+  return std::max(std::clamp(diagonal_m / 25.0, 0.03, 1.0), diagonal_m / 200.0);
+}
+
 LitTriangles subdivide(const Scene& scene, double spacing_m) {
   LitTriangles lit;
   const LightSpacing spacing(scene, spacing_m);

@@ -25,6 +25,10 @@ struct LitTriangles {
   std::vector<Triangle> triangles;  ///< in the order of `indices`; light is 0 before `bake_light`
 };
 
+/// Returns the spacing at which light is computed for a scene: a 25th of the diagonal of its floor,
+/// 3 cm to 1 m, or more in a large scene.
+[[nodiscard]] double light_spacing_m(const Scene& scene);
+
 /// Subdivides every triangle whose material is lit until no side is longer than `spacing_m` or, if
 /// that is larger, an eighth of the distance from the floor. Omits triangles without area.
 [[nodiscard]] LitTriangles subdivide(const Scene& scene, double spacing_m);
