@@ -204,7 +204,7 @@ def use_exported_page(page: Page, folder: pathlib.Path, address: str, expected: 
     ask_unknown(page, next((folder / "elsewhere").glob("*.png")))
     page.check("unknown")
     ask_with_photo(page, folder / "photos/photo.png", expected[-1])
-    ask_wrong(page, folder / "broken.png", "decoded")
+    ask_wrong(page, folder / "broken.png", "broken.png is not a picture")
     page.check("wrong")
     use_keyboard(page)
     follow_camera(page)

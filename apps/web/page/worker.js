@@ -10,8 +10,9 @@ let description = null;  // of the memory
 let maker = null;
 
 /** Pixels of a file or of a picture of the camera. */
-async function decode(source) {
-  const bitmap = source instanceof ImageBitmap ? source : await createImageBitmap(source, { colorSpaceConversion: "none" });
+async function decode(source, name) {
+  const bitmap = source instanceof ImageBitmap ? source : await createImageBitmap(source, { colorSpaceConversion: "none" })
+    .catch(() => { throw new Error(`${name} is not a picture that this browser reads. Choose a JPEG or PNG`); });
   const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d", { willReadFrequently: true });
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
@@ -53,7 +54,7 @@ const tasks = {
   /** `fieldOfView`: degrees between the edges of a narrow picture, where they are known. */
   async localise({ picture, name, fieldOfView }) {
     const begin = performance.now();
-    const pixels = await decode(picture);
+    const pixels = await decode(picture, name);
     const decoded = performance.now();
     const shown = await findFieldOfView(picture, pixels, fieldOfView);
     if (shown.degrees > 0 && !description.takes_narrow_pictures) {
@@ -70,7 +71,7 @@ const tasks = {
     maker = (await loading).make(encodeThumbnail);
   },
   async add({ file, name }) {
-    await maker.add(await decode(file), name);
+    await maker.add(await decode(file, name), name);
   },
   async finish() {
     const finished = maker;
