@@ -87,6 +87,7 @@ TEST_F(RealData, PanoramasFarApartAreFoundByLocalFeatures) {
   run_well({"memorise", memory, *data});
   const json info = answer_of({"info", memory, "--json"});
   EXPECT_EQ(info["views_with_features"], 31);
+  EXPECT_EQ(info["narrow_features"], false);
   EXPECT_LT(info["feature_bytes"].get<int>() / 31, 10'000);
   int found = 0;
   for (const std::string seed : {"1", "2", "3"}) {

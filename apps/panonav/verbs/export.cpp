@@ -2,6 +2,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/memory_export.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "runs/recording.hpp"
 #include "runs/web_folder.hpp"
 
@@ -104,6 +105,11 @@ ExitCode export_web(const ExportArguments& arguments, Session& session) {
     session.print(
         "It shows no pictures, because the memory has no thumbnails. To show those of a "
         "recording, use --pictures RECORDING.");
+  }
+  if (!has_narrow_features(memory)) {
+    session.print(
+        "It takes 360 degree images alone. For photos of phones, memorise the recording with "
+        "--narrow.");
   }
   session.print(
       "Put the folder on a web server (https), or try it here: python3 -m http.server -d " +

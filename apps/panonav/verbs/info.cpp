@@ -12,6 +12,7 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/open_input.hpp"
 #include "panonav/pipeline/orientation_check.hpp"
 #include "panonav/route/route_panorama.hpp"
@@ -118,6 +119,7 @@ ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info,
                     {"links", info.links},
                     {"thumbnails", info.thumbnails},
                     {"views_with_features", info.views_with_features},
+                    {"narrow_features", has_narrow_features(memory)},
                     {"floors", count_views_by_floor(memory)},
                     {"feature_bytes", info.feature_bytes},
                     {"file_bytes", info.file_bytes},
@@ -214,7 +216,8 @@ ExitCode print_memory(const std::string& path, Session& session) {
     session.print("  features    " + format_count(info.views_with_features, "view") +
                   " with local features, " +
                   std::to_string(info.feature_bytes / info.views_with_features) +
-                  " bytes per view");
+                  " bytes per view" +
+                  (has_narrow_features(memory) ? ", also for narrow images" : ""));
   }
   session.print("  images      " + std::string(to_string(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
