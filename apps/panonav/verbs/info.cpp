@@ -213,11 +213,10 @@ ExitCode print_memory(const std::string& path, Session& session) {
     session.print("  floor       " + to_readable_line(floor) + ", " + format_count(views, "view"));
   }
   if (info.views_with_features > 0) {
-    session.print("  features    " + format_count(info.views_with_features, "view") +
-                  " with local features, " +
-                  std::to_string(info.feature_bytes / info.views_with_features) +
-                  " bytes per view" +
-                  (has_narrow_features(memory) ? ", also for narrow images" : ""));
+    session.print(
+        "  features    " + format_count(info.views_with_features, "view") +
+        " with local features, " + std::to_string(info.feature_bytes / info.views_with_features) +
+        " bytes per view" + (has_narrow_features(memory) ? ", also for narrow images" : ""));
   }
   session.print("  images      " + std::string(to_string(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
