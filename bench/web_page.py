@@ -70,7 +70,7 @@ def measure_native(memory: pathlib.Path, pictures: list[pathlib.Path]) -> float:
 
 
 def measure_web(module: pathlib.Path, memory: pathlib.Path, pictures: list[pathlib.Path]) -> float:
-    done = subprocess.run(["node", ROOT / "tests/web/localise.mjs", module, memory, *pictures], check=True,
+    done = subprocess.run(["node", ROOT / "tests/web/localise.mjs", module, memory, "0", *pictures], check=True,
                           stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     return float(done.stderr)
 

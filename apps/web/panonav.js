@@ -2,7 +2,7 @@
 //   const panonav = await loadPanonav();
 //   const memory = panonav.open(bytes);                    // of a .panonav file
 //   const answer = memory.localise(imageData, "view.jpg"); // what `panonav localise --json` prints
-//   const other = memory.localise(photo, "photo.jpg", 67); // of a phone, whose camera sees 67 degrees
+//   const other = memory.localise(photo, "photo.jpg", 67); // a phone's camera sees 67 degrees
 //   const maker = panonav.make(encode);                    // of 360 degree pictures, 2 : 1
 //   await maker.add(imageData, "one.jpg");
 //   const bytes = await maker.finish();                    // a .panonav file

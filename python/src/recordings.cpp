@@ -162,8 +162,8 @@ void bind_observations(py::module_& m) {
            "uint16, a PIL image, or the path of a file. `odometry`: absolute, in a frame that "
            "drifts. `pose`: in the world "
            "frame, if it is known. `tilt`: (roll, pitch) in radians. `narrow_source`: layout of "
-           "kind "
-           "'pinhole' of a picture that shows a part of the azimuth, for PlaceRecogniser.localise "
+           "kind 'pinhole' of a picture that shows a part of the azimuth, for "
+           "PlaceRecogniser.localise "
            "with a memory that stores features for it (narrow=True).")
       .def_property_readonly("picture", &get_picture, "A Panorama, or an array of pixels.")
       .def_readonly("name", &Observation::name, "Name of the image, and of its view in a memory.")

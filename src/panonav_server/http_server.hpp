@@ -11,12 +11,15 @@
 
 namespace panonav::server {
 
+/// Arguments after the '?' of a path, by name; still percent-encoded. Of equal names the last one
+/// counts.
+using HttpArguments = std::map<std::string, std::string, std::less<>>;
+
 /// A complete request.
 struct HttpRequest {
   std::string method;  ///< "GET", "POST", ...
   std::string path;    ///< as sent, up to a '?'; still percent-encoded
-  /// What follows the '?', by name; still percent-encoded. Of equal names the last one counts.
-  std::map<std::string, std::string, std::less<>> arguments;
+  HttpArguments arguments;
   std::string host;           ///< host and port, as the client named them
   std::string origin;         ///< empty: none was sent
   std::string authorization;  ///< the field of that name; empty: none was sent

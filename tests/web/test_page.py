@@ -252,6 +252,7 @@ def main() -> int:
         use_exported_page(page, folder, address, expected)
         use_empty_page(page, folder, address, panonav)
         page.wait("!!navigator.serviceWorker.controller")
+        assert not page.errors, page.errors
         server.shutdown()
         server.server_close()
         page.open(address)  # without the server

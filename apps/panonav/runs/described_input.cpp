@@ -37,13 +37,14 @@ struct Takers {
   std::string_view verbs;
   std::string_view option = {};
 };
-constexpr std::array<Takers, 10> takers{{
+constexpr std::array<Takers, 11> takers{{
     {InputKind::memory,
      "list show gallery verify rename forget prune undo history copy export localise track home "
      "serve ros2 map scale arrange memorise route_record route_follow merge synchronise navigate "
      "evaluate"},
     {InputKind::dataset,
      "memorise localise track home map route_record route_follow unwrap convert catchment"},
+    {InputKind::narrow_dataset, "localise convert"},
     {InputKind::pictures,
      "try memorise localise track map route_record route_follow unwrap calibrate convert "
      "catchment"},
@@ -125,14 +126,16 @@ DescribedInput describe_dataset(const std::string& folder) {
   const auto some = find_known_fields(dataset);
   if (some.positions || some.odometry) described.posed_dataset = folder;
   for (const auto& warning : dataset.warnings) described.facts.push_back(warning);
+  if (dataset.source.kind == PictureKind::pinhole) {
+    described.use = {list_verbs_that_take(InputKind::narrow_dataset),
+                     {"panonav", "localise", "MEMORY", folder}};
+    return described;
+  }
   described.use = {list_verbs_that_take(InputKind::dataset), make_memorise_command(folder, {})};
   std::erase_if(described.use.verbs, [&](const std::string& verb) {
     return (verb == "route record" && !fields.positions && !fields.odometry) ||
            (verb == "catchment" && !fields.headings);
   });
-  if (dataset.source.kind == PictureKind::pinhole) {
-    described.use = {{"localise", "convert"}, {"panonav", "localise", "MEMORY", folder}};
-  }
   return described;
 }
 

@@ -18,7 +18,8 @@ struct InputUse {
 /// Kinds of inputs with the same uses.
 enum class InputKind {
   memory,
-  dataset,  ///< with dataset.toml
+  dataset,         ///< with dataset.toml
+  narrow_dataset,  ///< with dataset.toml, of pictures that show a part of the azimuth
   pictures,
   picture,
   video,

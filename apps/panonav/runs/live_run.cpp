@@ -1,5 +1,4 @@
 #include "runs/live_run.hpp"
-#include "runs/picture_layout.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -15,6 +14,7 @@
 #include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
+#include "runs/picture_layout.hpp"
 
 namespace panonav::command {
 

@@ -74,7 +74,7 @@ PictureSource make_pinhole_source(const PictureArguments& pictures) {
   }
   if (const auto width_deg = pictures.field_of_view_deg) {
     const double width_rad = radians(*width_deg);
-    if (!(width_rad >= min_field_of_view_rad && width_rad <= max_field_of_view_rad)) {
+    if (!is_field_of_view(width_rad)) {
       throw UsageError("--field-of-view is " + to_text(*width_deg) +
                        "; allowed: 10 to 150 degrees");
     }

@@ -37,21 +37,18 @@ std::string describe_fields(const Dataset::Fields& done) {
 /// recording does not contain the layout.
 std::vector<std::string> list_layout_flags(const PictureSource& source,
                                            const ConvertArguments& arguments) {
-  if (source.kind == PictureKind::mirror) {
+  std::vector<std::string> flags{"--kind", std::string(to_string(source.kind))};
+  if (source.camera) {
     const std::string file =
         arguments.pictures.camera.value_or((fs::path(arguments.input) / "camera.toml").string());
-    return {"--kind", "mirror", "--camera", fs::exists(file) ? file : "CAMERA_FILE"};
-  }
-  std::vector<std::string> flags{"--kind", std::string(to_string(source.kind))};
-  if (source.kind == PictureKind::pinhole) {
-    if (source.field_of_view_rad) {
-      flags.insert(flags.end(),
-                   {"--field-of-view", to_text(to_exact_degrees(*source.field_of_view_rad))});
-    } else if (source.camera) {
-      flags.insert(flags.end(), {"--camera", (fs::path(arguments.input) / "camera.toml").string()});
-    }
+    flags.insert(flags.end(), {"--camera", fs::exists(file) ? file : "CAMERA_FILE"});
     return flags;
   }
+  if (source.field_of_view_rad) {
+    flags.insert(flags.end(),
+                 {"--field-of-view", to_text(to_exact_degrees(*source.field_of_view_rad))});
+  }
+  if (source.kind == PictureKind::pinhole) return flags;
   const bool is_sphere = source.kind == PictureKind::equirectangular;
   if (source.layout.direction == ColumnDirection::counter_clockwise) {
     flags.insert(flags.end(), {"--columns-run", "counter-clockwise"});

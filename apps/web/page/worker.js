@@ -6,7 +6,7 @@ import { loadPanonav } from "./panonav.js";
 const loading = loadPanonav();
 loading.catch(() => {});  // is reported with the first task
 let memory = null;
-let description = null;  // of the memory
+let description = null;  // describes the open memory
 let maker = null;
 
 /** Pixels of a file or of a picture of the camera. */

@@ -46,8 +46,7 @@ Direction3 unproject(const PinholeModel& model, double right_px, double up_px) {
 }
 
 double focal_length_from_field_of_view(int width_px, double field_of_view_rad) {
-  require(field_of_view_rad >= min_field_of_view_rad && field_of_view_rad <= max_field_of_view_rad,
-          "field of view in radians", field_of_view_rad,
+  require(is_field_of_view(field_of_view_rad), "field of view in radians", field_of_view_rad,
           to_text(min_field_of_view_rad) + " .. " + to_text(max_field_of_view_rad));
   return 0.5 * width_px / std::tan(0.5 * field_of_view_rad);
 }

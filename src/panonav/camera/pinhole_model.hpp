@@ -24,6 +24,10 @@ struct PinholeModel {
 inline constexpr double min_field_of_view_rad = 0.17453292519943295;
 /// Largest accepted field of view along a picture's width, in radians: 150 degrees.
 inline constexpr double max_field_of_view_rad = 2.6179938779914944;
+/// True if a field of view is accepted; false for NaN.
+[[nodiscard]] constexpr bool is_field_of_view(double field_of_view_rad) noexcept {
+  return field_of_view_rad >= min_field_of_view_rad && field_of_view_rad <= max_field_of_view_rad;
+}
 
 /// Throws ContractError that names the field, its value and its range.
 void validate(const PinholeModel& model);

@@ -53,7 +53,7 @@ PictureSource read_pinhole_source(TomlFields& images, const fs::path& folder) {
   }
   if (const auto degrees_wide = images.number("field_of_view_deg")) {
     const double width_rad = radians(*degrees_wide);
-    if (!(width_rad >= min_field_of_view_rad && width_rad <= max_field_of_view_rad)) {
+    if (!is_field_of_view(width_rad)) {
       images.fail("field_of_view_deg", to_text(*degrees_wide), "10 .. 150");
     }
     source.field_of_view_rad = width_rad;

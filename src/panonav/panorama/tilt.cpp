@@ -103,6 +103,17 @@ void sample_row(const Panorama& seen, const Shifts& shifts, std::span<float> val
                              kernels::chosen_instructions());
 }
 
+Direction3 rotate_about_x(const Direction3& d, double angle_rad) noexcept {
+  const double cosine = std::cos(angle_rad);
+  const double sine = std::sin(angle_rad);
+  return {d.x, cosine * d.y - sine * d.z, sine * d.y + cosine * d.z};
+}
+Direction3 rotate_about_y(const Direction3& d, double angle_rad) noexcept {
+  const double cosine = std::cos(angle_rad);
+  const double sine = std::sin(angle_rad);
+  return {cosine * d.x + sine * d.z, d.y, -sine * d.x + cosine * d.z};
+}
+
 }  // namespace
 
 bool is_whole_sphere(const ElevationBand& band) noexcept {
@@ -122,21 +133,11 @@ void validate(const Tilt& tilt, const std::optional<ElevationBand>& seen) {
 }
 
 Direction3 level_direction(const Direction3& seen, const Tilt& tilt) noexcept {
-  const double cp = std::cos(tilt.pitch_rad);
-  const double sp = std::sin(tilt.pitch_rad);
-  const double cr = std::cos(tilt.roll_rad);
-  const double sr = std::sin(tilt.roll_rad);
-  const double z = sr * seen.y + cr * seen.z;
-  return {cp * seen.x + sp * z, cr * seen.y - sr * seen.z, -sp * seen.x + cp * z};
+  return rotate_about_y(rotate_about_x(seen, tilt.roll_rad), tilt.pitch_rad);
 }
 
 Direction3 tilt_direction(const Direction3& level, const Tilt& tilt) noexcept {
-  const double cp = std::cos(tilt.pitch_rad);
-  const double sp = std::sin(tilt.pitch_rad);
-  const double cr = std::cos(tilt.roll_rad);
-  const double sr = std::sin(tilt.roll_rad);
-  const double z = sp * level.x + cp * level.z;
-  return {cp * level.x - sp * level.z, cr * level.y + sr * z, -sr * level.y + cr * z};
+  return rotate_about_x(rotate_about_y(level, -tilt.pitch_rad), -tilt.roll_rad);
 }
 
 Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,

@@ -213,7 +213,7 @@ struct PlaceRecogniser::Implementation {
   std::filesystem::path path;              // where not held
   std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
-  std::mutex narrow_mutex;                 // of the next two
+  std::mutex narrow_mutex;                 // guards the next two
   std::optional<SectorRecogniser> narrow;  // set if pictures are narrow, or from the first such one
   std::optional<MemoryFile> narrow_file;   // until `narrow` is made from it
   std::shared_ptr<FeatureCache> features;  // null: the memory has none

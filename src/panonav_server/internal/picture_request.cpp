@@ -12,8 +12,7 @@
 
 namespace panonav::server {
 
-std::optional<PictureSource> read_narrow_source(
-    const std::map<std::string, std::string, std::less<>>& arguments) {
+std::optional<PictureSource> read_narrow_source(const HttpArguments& arguments) {
   if (arguments.empty()) return std::nullopt;
   constexpr std::string_view name = "field_of_view_deg";
   const auto& [argument, value] = *arguments.begin();
@@ -23,8 +22,7 @@ std::optional<PictureSource> read_narrow_source(
   PictureSource source{.kind = PictureKind::pinhole};
   if (value == "exif") return source;
   double width_deg = 0.0;
-  if (!read_number(value, width_deg) || !(radians(width_deg) >= min_field_of_view_rad) ||
-      !(radians(width_deg) <= max_field_of_view_rad)) {
+  if (!read_number(value, width_deg) || !is_field_of_view(radians(width_deg))) {
     throw ContractError(name, to_readable_line(value), "10 .. 150 or exif");
   }
   source.field_of_view_rad = radians(width_deg);
@@ -36,7 +34,8 @@ Observation decode_observation(std::string_view picture,
   const auto* const first = reinterpret_cast<const std::uint8_t*>(picture.data());
   const std::span bytes(first, picture.size());
   Observation observation(decode_image(bytes, "the image", picture_limits));
-  if (narrow_source) observation.encoded.assign(bytes.begin(), bytes.end());
+  const bool needs_exif = narrow_source && !narrow_source->field_of_view_rad;
+  if (needs_exif) observation.encoded.assign(bytes.begin(), bytes.end());
   observation.narrow_source = std::move(narrow_source);
   return observation;
 }

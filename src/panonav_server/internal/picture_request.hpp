@@ -1,14 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <map>
 #include <optional>
-#include <string>
 #include <string_view>
 
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/observation.hpp"
+#include "panonav_server/http_server.hpp"
 
 namespace panonav::server {
 
@@ -20,8 +18,7 @@ inline constexpr ImageLimits picture_limits{
 /// the left and the right edge of a narrow picture in degrees, or "exif", which is that of the
 /// picture's own data. Returns nullopt for pictures as the memory's, which have none. Throws
 /// ContractError on other arguments, or a value out of range.
-[[nodiscard]] std::optional<PictureSource> read_narrow_source(
-    const std::map<std::string, std::string, std::less<>>& arguments);
+[[nodiscard]] std::optional<PictureSource> read_narrow_source(const HttpArguments& arguments);
 
 /// Decodes a PNG or JPEG. Throws Error if it is none or too large.
 [[nodiscard]] Observation decode_observation(std::string_view picture,
