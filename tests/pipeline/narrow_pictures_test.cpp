@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 
 #include "panonav/core/error.hpp"
@@ -83,6 +84,28 @@ TEST_F(NarrowPictures, UseTheModelThatIsStored) {
   const auto stored = load_stored_models(file, memory);
   ASSERT_TRUE(stored && stored->sector && stored->sector->learnt);
   EXPECT_EQ(*stored->sector, SectorLocaliser(memory, make_gradient_source(file)).model());
+}
+
+TEST_F(NarrowPictures, AreMissedByMemoriesWithoutCorners) {
+  const auto path = folder / "plain walls.panonav";
+  Panorama smooth(48, 256, patch_band);
+  for (int y = 0; y < smooth.rows(); ++y) {
+    for (int x = 0; x < smooth.columns(); ++x) {
+      smooth.at(y, x) = static_cast<float>(0.5 + 0.3 * std::sin(2.0 * std::numbers::pi * x / 256));
+    }
+  }
+  MemoriserOptions options{.source = PictureSource{}, .narrow = true, .map = false, .left_out = {}};
+  options.source->layout.elevations = patch_band;
+  Memoriser memoriser(path, options);
+  for (int i = 0; i < 9; ++i) {
+    Observation view(rotate_columns(smooth, 20 * i));
+    view.name = std::to_string(i);
+    view.pose = ReferencePose{1.0 * i, 0.0, 0.0};
+    memoriser.add(std::move(view));
+  }
+  EXPECT_NO_THROW((void)memoriser.finish());
+  EXPECT_TRUE(contains(message_of<ContractError>([&] { PlaceRecogniser(path, narrow_options()); }),
+                       "features for narrow pictures"));
 }
 
 TEST_F(NarrowPictures, ChangeNothingForWholePanoramas) {

@@ -229,7 +229,11 @@ LearntModels learn_all_from(const VisualMemory& memory, const FeatureSource& fea
     models.by_features =
         features &&
         evaluate_features(ranking, support, keep_read_features(features)).is_significantly_better();
-    if (narrow_features) models.sector = SectorLocaliser(memory, narrow_features).model();
+    if (!narrow_features) return;
+    try {
+      models.sector = SectorLocaliser(memory, narrow_features).model();
+    } catch (const ContractError&) {  // no view has corners
+    }
   };
   const std::array<std::function<void()>, 3> parts{learn_places, learn_positions, learn_support};
   executor.for_each_chunk(parts.size(), 1,

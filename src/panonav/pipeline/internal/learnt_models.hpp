@@ -22,7 +22,7 @@ struct LearntModels {
   std::optional<ObservationModel> observation;
   /// True if local features sort the best matches (`FeatureTrial::is_significantly_better`).
   bool by_features = false;
-  /// Set if the views have features for narrow pictures.
+  /// nullopt if no view has features for narrow pictures.
   std::optional<SectorModel> sector;
   friend bool operator==(const LearntModels&, const LearntModels&) = default;
 };
