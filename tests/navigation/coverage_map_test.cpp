@@ -65,6 +65,29 @@ TEST(CoverageMap, NothingRemainsInAClosedRoomWithEverythingCovered) {
   for (const Point2& corner : corners) EXPECT_TRUE(covered.is_covered(corner));
 }
 
+// A corridor of known, covered floor from (0, 0) to (20, 0), and behind its end an uncovered floor
+// this wide and deep.
+FloorObservations make_corridor_to_floor(double side_m) {
+  FloorObservations floor;
+  floor.driven.push_back({{0.0, 0.0}, {20.0, 0.0}});
+  for (double x_m = 0.0; x_m <= 20.0; x_m += 0.25) floor.views.push_back({{x_m, 0.0}, 0.5});
+  for (double y_m = -0.5 * side_m; y_m <= 0.5 * side_m; y_m += 0.1) {
+    floor.open.push_back({{20.6, y_m}, {20.6 + side_m, y_m}});
+  }
+  return floor;
+}
+
+TEST(CoverageMap, AnotherRoomIsWorthAPathThatARemnantIsNotWorth) {
+  // One view covers less than a square metre of either.
+  const auto room = CoverageMap(make_corridor_to_floor(3.0), {}).find_view_point({0.0, 0.0});
+  ASSERT_TRUE(room);
+  EXPECT_GT(room->position.x_m, 20.0);
+  EXPECT_LT(room->area_m2, 1.0);
+  const CoverageMap remnant(make_corridor_to_floor(0.5), {});
+  EXPECT_FALSE(remnant.find_view_point({0.0, 0.0}));
+  EXPECT_TRUE(remnant.find_view_point({19.0, 0.0}));
+}
+
 TEST(CoverageMap, AViewDoesNotCoverWhatIsBehindAnObstacle) {
   FloorObservations floor;
   floor.driven.push_back({{0.0, 0.0}, {0.0, 0.0}});

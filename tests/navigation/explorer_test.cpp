@@ -13,6 +13,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "panonav/navigation/internal/explorer_pose.hpp"
 #include "support/random_views.hpp"
 #include "support/remembered_worlds.hpp"
 
@@ -170,6 +171,40 @@ TEST(Explorer, WithABumperAloneItSeldomTriesTheSameWayAgain) {
   }
   // It does so where its map contradicted itself.
   EXPECT_LE(repeated, run.contacts.size() / 4);
+}
+
+// Memorises views every 0.4 m along a line of 2 m, and then at (2, 1), where odometry that slips
+// takes the robot to be `slip_m` farther ahead. `look` returns the view at a pose.
+template <class Look>
+Pose2 memorise_after_slip(const Look& look, double slip_m) {
+  ExplorerPose robot(0.5, OdometryNoise{.translation_scale_error = 0.5});
+  constexpr double step_m = 0.4;
+  for (int i = 0; i <= 5; ++i) {
+    if (i > 0) robot.move({step_m, 0.0, 0.0});
+    const OdometryView view(look(Pose2{1.0 + i * step_m, 1.0, 0.0}));
+    robot.add_view(view, robot.correct(view));
+  }
+  robot.move({-1.0 + slip_m, 0.0, 0.0});
+  const OdometryView view(look(Pose2{2.0, 1.0, 0.0}));
+  robot.add_view(view, robot.correct(view));
+  return robot.pose();
+}
+
+TEST(ExplorerPose, AViewOfAKnownPlaceCorrectsAPoseThatSlipped) {
+  const testing::ToyWorld world = testing::two_rooms(9013, false);
+  Random noise(3);
+  const auto look = [&](const Pose2& pose) {
+    return testing::two_rooms_signature(world, pose, noise);
+  };
+  for (const double slip_m : {0.0, 2.0, 4.0}) {
+    EXPECT_NEAR(memorise_after_slip(look, slip_m).x_m, 1.0, 0.5) << slip_m;
+  }
+}
+
+TEST(ExplorerPose, AViewOfANewPlaceLeavesThePoseToOdometry) {
+  Random random(4);
+  const auto look = [&](const Pose2&) { return testing::random_signature(random, {16, 15}); };
+  EXPECT_NEAR(memorise_after_slip(look, 4.0).x_m, 5.0, 0.05);
 }
 
 TEST(Explorer, TheSameCallsGiveTheSameBits) {

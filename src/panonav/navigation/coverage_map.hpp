@@ -87,7 +87,8 @@ class CoverageMap {
   /// Returns the frontier area in the catchment area of a view at `position`.
   [[nodiscard]] double compute_gain_m2(Point2 position) const;
   /// Finds the position with the largest frontier area for its path length. nullopt if no reachable
-  /// position has `CoverageOptions::min_area_m2`: the floor is covered. Cost: O(cells).
+  /// position has `CoverageOptions::min_area_m2`, and a connected frontier that is worth the path:
+  /// the floor is covered. Cost: O(cells).
   [[nodiscard]] std::optional<ViewPoint> find_view_point(Point2 robot) const;
   /// Finds the shortest path through cells that are not blocked; nullopt if there is none. `path`
   /// does not contain `from`.
@@ -114,6 +115,8 @@ class CoverageMap {
   [[nodiscard]] Paths find_paths(Point2 from) const;
   [[nodiscard]] std::vector<Point2> trace_path(const Paths& paths, std::size_t end) const;
   [[nodiscard]] std::vector<double> weigh_cells() const;
+  /// Returns the area of the connected frontier that each cell belongs to; 0 for other cells.
+  [[nodiscard]] std::vector<double> measure_connected_frontiers() const;
   [[nodiscard]] std::vector<double> sum_in_squares(const std::vector<double>& weights) const;
 
   CoverageOptions options_;

@@ -9,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/relative_pose/pair_evidence.hpp"
+#include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {
 
@@ -29,6 +30,8 @@ constexpr double direction_deviation_rad = 0.2;
 constexpr double max_turn_error_rad = 0.35;
 // Largest error of the direction of a recognised view: that of a right home vector.
 constexpr double max_direction_error_rad = std::numbers::pi / 4.0;
+// Number of views elsewhere that may show the place of an observation: the most similar ones.
+constexpr std::size_t closure_candidates = 4;
 // Probability from which a view is recognised anywhere.
 constexpr double min_probability = 0.9;
 
@@ -121,12 +124,56 @@ void ExplorerPose::correct_position(Point2 view, double world_direction_rad) {
   position_variance_m2_ *= 1.0 - 0.5 * gain;  // one of two directions
 }
 
+// Finds views that show the place of an observation, although the pose expects them elsewhere. Two
+// of them must agree on the pose, as other places may look similar to a single view.
+std::vector<ExplorerPose::Recognition> ExplorerPose::find_closures(
+    const OdometryView& current) const {
+  std::vector<std::pair<double, std::size_t>> similar;
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    if (distance(poses_[i].position(), pose_.position()) <= compared_radii * radius_m_) continue;
+    similar.emplace_back(dissimilarity_l1(views_[i].signature, current.signature), i);
+  }
+  const std::size_t count = std::min(similar.size(), closure_candidates);
+  std::ranges::partial_sort(similar, similar.begin() + static_cast<std::ptrdiff_t>(count));
+  struct Closure {
+    Recognition recognition;
+    Pose2 pose;  // of the robot
+  };
+  std::vector<Closure> possible;
+  for (const auto& [dissimilarity, i] : std::span(similar).first(count)) {
+    const auto evidence = compute_pair_evidence(views_[i].coefficients, current.coefficients);
+    if (!evidence || evidence->probability < min_probability) continue;
+    const Pose2 robot_from_view = estimate_robot_from_view(evidence->vector);
+    const Pose2 pose = poses_[i] * inverse(robot_from_view);
+    // A difference that the errors of direction and length explain is no contradiction.
+    if (distance(pose.position(), pose_.position()) <= (compared_radii + 1.0) * radius_m_) continue;
+    possible.push_back({{i, robot_from_view}, pose});
+  }
+  std::vector<Recognition> closures;
+  for (const Closure& a : possible) {
+    const bool is_confirmed = std::ranges::any_of(possible, [&](const Closure& b) {
+      return a.recognition.view != b.recognition.view &&
+             distance(a.pose.position(), b.pose.position()) <= radius_m_ &&
+             std::abs(angle_difference(a.pose.heading_rad, b.pose.heading_rad)) <=
+                 max_turn_error_rad;
+    });
+    if (is_confirmed) closures.push_back(a.recognition);
+  }
+  return closures;
+}
+
 void ExplorerPose::add_view(OdometryView current, const std::vector<Recognition>& recognised) {
+  const std::vector<Recognition> closures = find_closures(current);
   const std::size_t number = views_.size();
   views_.push_back(std::move(current));
   poses_.push_back(pose_);
   if (number > 0) {
-    add_edges(number, recognised);
+    add_driven_edge(number);
+    for (const Recognition& seen : recognised) {
+      const double away_m = std::hypot(seen.robot_from_view.x_m, seen.robot_from_view.y_m);
+      add_seen_edge(number, seen, position_deviation_m + direction_deviation_rad * away_m);
+    }
+    for (const Recognition& seen : closures) add_seen_edge(number, seen, radius_m_);
     edge_weights_ = optimise_pose_graph(poses_, edges_).edge_weights;
   }
   pose_ = poses_.back();
@@ -139,7 +186,7 @@ void ExplorerPose::add_view(OdometryView current, const std::vector<Recognition>
   unrecognised_m_ = 0.0;
 }
 
-void ExplorerPose::add_edges(std::size_t number, const std::vector<Recognition>& recognised) {
+void ExplorerPose::add_driven_edge(std::size_t number) {
   const auto square = [](double value) { return value * value; };
   const double turn_variance_rad2 = square(odometry_.rotation_from_translation) * since_view_m_ +
                                     square(odometry_.rotation_from_rotation) * since_view_rad_;
@@ -152,16 +199,25 @@ void ExplorerPose::add_edges(std::size_t number, const std::vector<Recognition>&
                     .a_from_b = since_view_,
                     .position_deviation_m = min_deviation + std::sqrt(variance_m2),
                     .heading_deviation_rad = min_deviation + std::sqrt(turn_variance_rad2)});
-  for (const Recognition& seen : recognised) {
-    const double away_m = std::hypot(seen.robot_from_view.x_m, seen.robot_from_view.y_m);
-    edges_.push_back(
-        {.a = number,
-         .b = seen.view,
-         .a_from_b = seen.robot_from_view,
-         .position_deviation_m = position_deviation_m + direction_deviation_rad * away_m,
-         .heading_deviation_rad = turn_deviation_rad,
-         .doubtful = true});
-  }
+}
+
+void ExplorerPose::add_seen_edge(std::size_t number, const Recognition& seen,
+                                 double position_deviation) {
+  edges_.push_back({.a = number,
+                    .b = seen.view,
+                    .a_from_b = seen.robot_from_view,
+                    .position_deviation_m = position_deviation,
+                    .heading_deviation_rad = turn_deviation_rad,
+                    .doubtful = true});
+}
+
+// Returns the pose of a view in the frame of the robot by the home vector to it, which is at most
+// a catchment radius long.
+Pose2 ExplorerPose::estimate_robot_from_view(const HomeVector& vector) const {
+  const double away_m = std::min(vector.length(), 1.0) * radius_m_;
+  if (away_m == 0.0) return {0.0, 0.0, vector.heading_rad};
+  return {away_m * std::cos(vector.direction_rad()), away_m * std::sin(vector.direction_rad()),
+          vector.heading_rad};
 }
 
 bool ExplorerPose::relocalise(const OdometryView& current) {
@@ -176,10 +232,7 @@ bool ExplorerPose::relocalise(const OdometryView& current) {
     vector = evidence->vector;
   }
   if (!best) return false;
-  const double away_m = std::min(vector.length(), 1.0) * radius_m_;
-  pose_ =
-      poses_[*best] * inverse(Pose2{away_m * std::cos(vector.direction_rad()),
-                                    away_m * std::sin(vector.direction_rad()), vector.heading_rad});
+  pose_ = poses_[*best] * inverse(estimate_robot_from_view(vector));
   anchor_ = *best;
   unrecognised_m_ = 0.0;
   position_variance_m2_ = radius_m_ * radius_m_;

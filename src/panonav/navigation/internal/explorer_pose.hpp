@@ -10,12 +10,14 @@
 #include "panonav/mapping/topological_map.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "panonav/relative_pose/home_vector.hpp"
 
 namespace panonav {
 
 /// Pose of an exploring robot among the views that it memorised, in the frame of the first one:
 /// odometry, corrected by visual steps from the views around. A new view is joined to these by
-/// edges of a pose graph, which moves all views.
+/// edges of a pose graph, which moves all views; and to views elsewhere that show its place, so
+/// that a robot that drifted does not explore the same floor once more.
 class ExplorerPose {
  public:
   /// A view that an observation shows.
@@ -32,6 +34,7 @@ class ExplorerPose {
   /// Corrects the pose by visual steps from the views around. Returns those that it recognises:
   /// turn and direction are where the pose expects them.
   std::vector<Recognition> correct(const OdometryView& current);
+  /// Memorises a view. Cost: four `compute_pair_evidence`, and an optimisation of the pose graph.
   void add_view(OdometryView current, const std::vector<Recognition>& recognised);
   /// Searches all views; true if one is recognised, whose pose the robot then takes over. Cost: a
   /// `compute_pair_evidence` for each view.
@@ -56,9 +59,12 @@ class ExplorerPose {
 
  private:
   [[nodiscard]] std::vector<std::size_t> find_near_views() const;
+  [[nodiscard]] std::vector<Recognition> find_closures(const OdometryView& current) const;
+  [[nodiscard]] Pose2 estimate_robot_from_view(const HomeVector& vector) const;
   void correct_heading(double turn_error_rad);
   void correct_position(Point2 view, double world_direction_rad);
-  void add_edges(std::size_t number, const std::vector<Recognition>& recognised);
+  void add_driven_edge(std::size_t number);
+  void add_seen_edge(std::size_t number, const Recognition& seen, double position_deviation);
 
   double radius_m_;
   OdometryNoise odometry_;
