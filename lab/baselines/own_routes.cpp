@@ -7,6 +7,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/path_follower.hpp"
+#include "panonav/panorama/preprocessing.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/route/chain_follower.hpp"
 #include "panonav/route/chain_recorder.hpp"
@@ -51,8 +52,10 @@ class ChainMethod final : public RouteMethod {
   [[nodiscard]] bool reports_arrival() const override { return true; }
 
  private:
+  // Views have the mean and the gain that the command gives them, in any light.
   [[nodiscard]] HomingView view(const RoutePicture& picture) const {
-    const FourierSignature signature = compute_signature(picture.panorama, shape_.components);
+    const FourierSignature signature =
+        compute_signature(preprocess(picture.panorama, {}), shape_.components);
     return is_horizon_ ? horizon_view(signature) : homing_view(signature);
   }
 

@@ -145,8 +145,6 @@ std::vector<ExplorerPose::Recognition> ExplorerPose::find_closures(
     if (!evidence || evidence->probability < min_probability) continue;
     const Pose2 robot_from_view = estimate_robot_from_view(evidence->vector);
     const Pose2 pose = poses_[i] * inverse(robot_from_view);
-    // A difference that the errors of direction and length explain is no contradiction.
-    if (distance(pose.position(), pose_.position()) <= (compared_radii + 1.0) * radius_m_) continue;
     possible.push_back({{i, robot_from_view}, pose});
   }
   std::vector<Recognition> closures;
@@ -157,7 +155,10 @@ std::vector<ExplorerPose::Recognition> ExplorerPose::find_closures(
              std::abs(angle_difference(a.pose.heading_rad, b.pose.heading_rad)) <=
                  max_turn_error_rad;
     });
-    if (is_confirmed) closures.push_back(a.recognition);
+    // A difference that the errors of direction and length explain is no contradiction.
+    const bool is_elsewhere =
+        distance(a.pose.position(), pose_.position()) > (compared_radii + 1.0) * radius_m_;
+    if (is_confirmed && is_elsewhere) closures.push_back(a.recognition);
   }
   return closures;
 }
