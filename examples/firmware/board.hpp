@@ -12,8 +12,8 @@ namespace board {
 constexpr int width = 160;   // width of a picture in pixels
 constexpr int height = 120;  // height of a picture in pixels
 
-std::span<const std::uint8_t> chain();              // `SnapshotChain::pack`, in flash memory
-std::span<const std::uint16_t> sampler();           // `make_sampler_pixels` of this camera
+std::span<const std::uint8_t> chain();              // in flash memory: panonav export --firmware
+std::span<const std::uint16_t> sampler();           // the same, with --camera
 bool capture(std::span<std::uint8_t> grey);         // waits for a picture; false: switched off
 panonav::Pose2 odometry();                          // at that picture
 void set_velocity(const panonav::Velocity& drive);  // until the next one

@@ -5,9 +5,15 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <sstream>
 
 #include "command/room_run.hpp"
+#include "panonav/io/camera_file.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "panonav/route/sampler_pixels.hpp"
+#include "panonav/route/snapshot_chain.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "panonav_simulation/mirror.hpp"
 #include "support/command_runner.hpp"
 #include "support/recorded_messages.hpp"
 #include "support/report_pages.hpp"
@@ -63,6 +69,56 @@ TEST_F(ChainVerbs, AChainIsRecordedListedAndFollowedInBothDirections) {
 }
 
 // The trajectory, the record and the page of a run hold the same poses as its answers.
+// Returns the numbers between the braces of an array in a C header.
+std::vector<int> array_of(const std::string& header, const std::string& name) {
+  std::vector<int> numbers;
+  const std::size_t at = header.find(" " + name + "[");
+  if (at == std::string::npos) return numbers;
+  const std::size_t begin = header.find('{', at) + 1;
+  std::istringstream text(header.substr(begin, header.find('}', begin) - begin));
+  for (int number = 0; text >> number; text.ignore(1)) numbers.push_back(number);
+  return numbers;
+}
+
+TEST_F(ChainVerbs, AHeaderForFirmwareHoldsThePackedChainAndThePixelsOfTheCamera) {
+  (void)record({"--name", "home", "--method", "chain"});
+  const std::string memory = folder_ / "m.panonav";
+  const fs::path header = folder_ / "home.h";
+  Camera camera = simulation::make_simulated_mirror_camera();
+  write_camera(folder_ / "large.toml", {camera, std::nullopt});
+  constexpr double scale = 0.25;
+  camera.image_size = {160, 120};
+  camera.centre = {scale * camera.centre.u_px, scale * camera.centre.v_px};
+  camera.rim_radius_px *= scale;
+  camera.inner_radius_px *= scale;
+  std::get<HyperboloidalModel>(camera.model).focal_length_px *= scale;
+  write_camera(folder_ / "small.toml", {camera, std::nullopt});
+
+  const json reported = answer_of(
+      {"export", memory, "--firmware", header, "--camera", folder_ / "small.toml", "--json"});
+  const SnapshotChain chain = MemoryFile::open(memory, Access::read_only).chain("home").value();
+  const auto packed = chain.pack();
+  EXPECT_EQ(reported["chain_bytes"], packed.size());
+  EXPECT_EQ(array_of(bytes_of(header), "panonav_chain"),
+            std::vector<int>(packed.begin(), packed.end()));
+  const auto pixels =
+      make_sampler_pixels(camera, chain.elevations().value(),
+                          {.rows = chain.shape().rows, .components = chain.shape().components});
+  EXPECT_EQ(array_of(bytes_of(header), "panonav_sampler"),
+            std::vector<int>(pixels.begin(), pixels.end()));
+  run_well({"export", memory, "--firmware", header});
+  EXPECT_TRUE(array_of(bytes_of(header), "panonav_sampler").empty());
+
+  expect_refusal({"export", memory, "--firmware", header, "--camera", folder_ / "large.toml"},
+                 "large.toml: pixels of a picture is 307200; allowed: <= 65536");
+  expect_refusal({"export", memory, "--firmware", memory}, "MEMORY");
+  expect_refusal({"export", memory, "--web", folder_ / "page", "--name", "home"},
+                 "--name has no effect without --firmware");
+  (void)record({"--name", "lines"});
+  expect_refusal({"export", memory, "--firmware", header, "--name", "lines"},
+                 "route 'lines' is a route panorama; allowed here: a chain of snapshots");
+}
+
 TEST_F(ChainVerbs, OutputsHoldThePosesOfTheAnswers) {
   (void)record({"--name", "home", "--method", "chain"});
   const std::string memory = folder_ / "m.panonav";

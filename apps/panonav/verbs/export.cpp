@@ -1,8 +1,13 @@
 #include "cli/option_values.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/number_text.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/memory_export.hpp"
 #include "panonav/pipeline/narrow_features.hpp"
+#include "panonav/route/firmware_header.hpp"
+#include "panonav/route/sampler_pixels.hpp"
 #include "runs/recording.hpp"
 #include "runs/web_folder.hpp"
 
@@ -15,6 +20,9 @@ struct ExportArguments {
   std::optional<std::string> out;
   std::optional<std::string> web;
   std::optional<std::string> pictures;  ///< recording of which the page shows pictures
+  std::optional<std::string> firmware;
+  std::optional<std::string> name;    ///< route of the firmware
+  std::optional<std::string> camera;  ///< camera file of the firmware
 };
 
 /// Lists the values that the data set does not have, each with the reason.
@@ -117,7 +125,56 @@ ExitCode export_web(const ExportArguments& arguments, Session& session) {
   return ExitCode::done;
 }
 
+/// Returns the pixels at which pictures of the camera are sampled for snapshots of this chain.
+std::vector<std::uint16_t> read_sampler_pixels(const std::string& camera,
+                                               const SnapshotChain& chain) {
+  if (!chain.elevations()) {
+    throw ContractError("elevations of the chain", "unknown",
+                        "known, to sample pictures of a camera; record the route with "
+                        "--elevation-deg or a mirror camera");
+  }
+  try {
+    return make_sampler_pixels(
+        read_camera(camera).camera, *chain.elevations(),
+        {.rows = chain.shape().rows, .components = chain.shape().components});
+  } catch (const ContractError& error) {
+    throw FileError(camera, error.what());
+  }
+}
+
+/// Writes a route as constant arrays for the firmware of a small robot.
+ExitCode export_firmware(const ExportArguments& arguments, Session& session) {
+  const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
+  const std::string name = find_route_name(memory, arguments.name);
+  const SnapshotChain chain = memory.chain(name).value();
+  std::vector<std::uint16_t> pixels;
+  if (arguments.camera) pixels = read_sampler_pixels(*arguments.camera, chain);
+  write_file(*arguments.firmware, format_firmware_header(chain, pixels));
+  const std::size_t chain_bytes = chain.pack().size();
+  const std::size_t sampler_bytes = pixels.size() * sizeof(std::uint16_t);
+  if (session.json()) {
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                         {"file", *arguments.firmware},
+                                         {"route", name},
+                                         {"snapshots", chain.snapshots()},
+                                         {"chain_bytes", chain_bytes},
+                                         {"sampler_bytes", sampler_bytes}}));
+    return ExitCode::done;
+  }
+  session.print(session.bold(*arguments.firmware) + " holds the route " + name + ": " +
+                format_count(chain.snapshots(), "snapshot") + ", " +
+                format_count(chain_bytes, "byte") + " as panonav_chain" +
+                (pixels.empty() ? ""
+                                : ", and " + format_count(sampler_bytes, "byte") +
+                                      " of pixels as panonav_sampler"));
+  if (pixels.empty()) {
+    session.print("To add the pixels at which pictures are sampled, use --camera FILE.");
+  }
+  return ExitCode::done;
+}
+
 ExitCode export_all(const ExportArguments& arguments, Session& session) {
+  if (arguments.firmware) return export_firmware(arguments, session);
   if (arguments.web) return export_web(arguments, session);
   const std::string& out = *arguments.out;
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
@@ -152,12 +209,25 @@ Run declare_export(Arguments& arguments) {
   arguments.option("--pictures RECORDING", values->pictures,
                    "With --web: show the places by the images of the recording from which the "
                    "memory was made; default: by the thumbnails of the memory");
-  arguments.declare_outputs({"--out", "--web"});
+  arguments.option("--firmware FILE", values->firmware,
+                   "Instead, write a chain of snapshots (route record --method chain, home learn) "
+                   "as constant arrays into this C header, for the firmware of a small robot");
+  arguments.option("--name NAME", values->name,
+                   "With --firmware: name of the route; needed if the memory contains several");
+  arguments.option("--camera FILE", values->camera,
+                   "With --firmware: camera of the small robot, whose pictures have at most 65,536 "
+                   "pixels; adds the pixels at which its pictures are sampled");
+  arguments.declare_outputs({"--out", "--web", "--firmware"});
   arguments.reject_options_unless(
       {"--pictures"}, [values] { return values->web.has_value(); }, "without --web");
+  arguments.reject_options_unless(
+      {"--name", "--camera"}, [values] { return values->firmware.has_value(); },
+      "without --firmware");
   return [values](Session& session) {
-    if (values->out.has_value() == values->web.has_value()) {
-      throw UsageError("export needs one of --out FOLDER and --web FOLDER");
+    if (int{values->out.has_value()} + int{values->web.has_value()} +
+            int{values->firmware.has_value()} !=
+        1) {
+      throw UsageError("export needs one of --out FOLDER, --web FOLDER and --firmware FILE");
     }
     return export_all(*values, session);
   };
@@ -166,19 +236,22 @@ Run declare_export(Arguments& arguments) {
 }  // namespace
 
 Verb export_verb() {
-  return {"export",
-          VerbGroup::memory,
-          "Export a memory as a data set, or as a page to localise with",
-          "A memory stores its images only as thumbnails. The verb enlarges these thumbnails to "
-          "panoramas that panonav memorise can read. The files views.csv and signatures.npy "
-          "contain the poses and signatures of all views without loss. Links, maps and routes are "
-          "not exported. With --web, the folder is a page instead: a browser localises pictures in "
-          "it by itself and sends them nowhere; put it on any web server. If the export is "
-          "interrupted, no folder is written.",
-          "  panonav export office.panonav -o office_views\n"
-          "  panonav memorise again.panonav office_views --config office_views/memorise.toml\n"
-          "  panonav export office.panonav --web office_page",
-          declare_export};
+  return {
+      "export",
+      VerbGroup::memory,
+      "Export a memory as a data set, a page or firmware arrays",
+      "A memory stores its images only as thumbnails. The verb enlarges these thumbnails to "
+      "panoramas that panonav memorise can read. The files views.csv and signatures.npy "
+      "contain the poses and signatures of all views without loss. Links, maps and routes are "
+      "not exported. With --web, the folder is a page instead: a browser localises pictures in "
+      "it by itself and sends them nowhere; put it on any web server. If the export is "
+      "interrupted, no folder is written. With --firmware, the result is the route that a small "
+      "robot follows by ChainPilot, without a file system.",
+      "  panonav export office.panonav -o office_views\n"
+      "  panonav memorise again.panonav office_views --config office_views/memorise.toml\n"
+      "  panonav export office.panonav --web office_page\n"
+      "  panonav export walk.panonav --firmware walk.h --name home",
+      declare_export};
 }
 
 }  // namespace panonav::command
