@@ -11,6 +11,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/panorama/preprocessing.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/route/chain_follower.hpp"
 #include "panonav/route/chain_recorder.hpp"
@@ -243,6 +244,73 @@ TEST(ChainFollower, SearchesForASnapshotThatOdometryHasMissed) {
     EXPECT_LT(driven.end_m, 0.5);
   }
   EXPECT_GE(searched, 1);
+}
+
+// A view in a room with light from one side: with 1, the darkest azimuth has no light.
+HomingView side_lit_view(const ToyWorld& world, const Pose2& pose, double side_light,
+                         Random& noise) {
+  Panorama panorama = world.panorama(pose, 12, 64, ElevationBand{radians(-25.0), radians(35.0)},
+                                     noise, {1.0, 0.01});
+  const auto values = panorama.values();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double azimuth_rad = 2.0 * std::numbers::pi * static_cast<double>(i % 64) / 64.0;
+    values[i] *= static_cast<float>(1.0 + side_light * std::cos(azimuth_rad + pose.heading_rad));
+  }
+  return homing_view(compute_signature(preprocess(panorama, {}), 8));
+}
+
+// Records a chain through a room and drives along it in light from one side. `end_difference`: of
+// the last view and the last snapshot.
+Drive drive_in_side_light(std::uint64_t seed, double side_light, double& end_difference) {
+  const ToyWorld world = two_rooms(seed, false);
+  Random noise(seed);
+  ChainRecorder recorder;
+  constexpr double step_m = 0.1;
+  const Pose2 start{0.7, 0.6, 0.0};
+  Pose2 pose = start;
+  for (int i = 0; i <= 25; ++i) {
+    if (i > 0) pose = pose * Pose2{step_m, 0.0, 0.0};
+    recorder.add(side_lit_view(world, pose, 0.0, noise), i == 0 ? Pose2{} : Pose2{step_m, 0, 0});
+  }
+  const SnapshotChain chain = recorder.finish();
+  ChainFollower follower(chain, ChainDirection::forward);
+  Drive driven;
+  Pose2 moved;
+  Pose2 robot = start;
+  for (int step = 0; step < 400; ++step) {
+    const HomingView view = side_lit_view(world, robot, side_light, noise);
+    const ChainDecision decision = follower.decide(view, moved);
+    driven.state = decision.state;
+    end_difference =
+        image_difference(chain.view(chain.nodes().size() - 1), reduce_view(view, 8, 6));
+    if (decision.state == ChainState::arrived || decision.state == ChainState::lost) break;
+    moved = Pose2{0.0, 0.0, decision.turn_rad} * Pose2{decision.advance_m, 0.0, 0.0};
+    robot = robot * moved;
+    moved.x_m *= 1.03;
+    moved.y_m *= 1.03;
+  }
+  driven.end_m = distance(robot.position(), pose.position());
+  return driven;
+}
+
+TEST(ChainFollower, ArrivesInLightFromOneSideOrSaysThatItIsLost) {
+  int arrived = 0;
+  int less_similar = 0;
+  for (const double side_light : {0.3, 0.9}) {
+    for (std::uint64_t seed = 9101; seed <= 9106; ++seed) {
+      double end_difference = 0.0;
+      const Drive driven = drive_in_side_light(seed, side_light, end_difference);
+      if (driven.state != ChainState::arrived) {
+        EXPECT_EQ(driven.state, ChainState::lost);
+        continue;
+      }
+      ++arrived;
+      EXPECT_LT(driven.end_m, 0.5) << "seed " << seed;
+      less_similar += end_difference > static_cast<double>(ChainModel{}.arrived_difference) ? 1 : 0;
+    }
+  }
+  EXPECT_GE(arrived, 3);
+  EXPECT_GE(less_similar, 1);
 }
 
 TEST(ChainFollower, IsLostInAnotherPlace) {

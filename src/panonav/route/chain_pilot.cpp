@@ -16,6 +16,11 @@ namespace {
 // Home vectors shorter than this, in units of R, end at a snapshot that is not the last one: from
 // there the vector itself says where the robot is.
 constexpr double near_length = 0.1;
+// In other light the images differ beside a snapshot, too. There homing has ended where home
+// vectors are shorter than this, in units of R; and a robot has arrived where the end of homing is
+// no farther than this from where odometry expects the last snapshot.
+constexpr double converged_length = 2.0 * near_length;
+constexpr double arrival_radius_m = 0.5;
 // A way point is reached at this distance, the tolerance of the legs.
 constexpr double way_point_radius_m = 0.15;
 // Half of the window of headings beyond the error of odometry: the error of the compass at a
@@ -140,11 +145,12 @@ void ChainPilot::start(const CoefficientView& view) {
       if (other.difference < sight.difference) target_ = node, sight = other;
     }
   }
+  const std::size_t first = forward ? 0 : route_.stops.size() - 1;
   way_point_ = target_;
   has_started_ = true;
   const Point2 place = position(target_);
   pose_ = {place.x_m, place.y_m, wrap_angle(-sight.vector.heading_rad)};
-  if (is_confident(sight)) {
+  if (is_confident(sight) || target_ == first) {
     begin_homing();
   } else {
     state_ = ChainState::lost;
@@ -277,6 +283,16 @@ ChainDecision ChainPilot::travel(const CoefficientView& view) {
   return move_to(position(way_point_));
 }
 
+// True if homing, whose last stage stops now, has ended beside the target although the images
+// differ more than they did beside snapshots in one light: nine of ten home vectors like those of
+// this stage are right, and odometry allows the place.
+bool ChainPilot::has_converged(const HomeVector& vector, bool has_next) const {
+  const double off_m = portable_distance(pose_.position(), position(target_));
+  return homing_stage_ + 1 == homing_stages && vector.length() <= converged_length &&
+         approach_confidence_ >= static_cast<double>(route_.header.model.homing_confidence) &&
+         off_m <= error_m() && (has_next || off_m <= arrival_radius_m);
+}
+
 ChainDecision ChainPilot::home(const CoefficientView& view) {
   SnapshotSight sight = look_at(target_, view, false);
   if (homing_stage_ == 1) {
@@ -297,7 +313,8 @@ ChainDecision ChainPilot::home(const CoefficientView& view) {
   const double advance_m = approach_.next_m(vector, r_m, options_.max_step_m);
   const bool stops = advance_m < options_.stop_step_m || approach_.steps_since_min() >= patience ||
                      homing_steps_ >= options_.max_homing_steps;
-  if (is_beside && (stops || (next && vector.length() <= near_length))) {
+  const bool is_similar_end = is_beside && (stops || (next && vector.length() <= near_length));
+  if (is_similar_end || (stops && has_converged(vector, next.has_value()))) {
     fix_pose(vector);
     if (!next) return end_with(ChainState::arrived);
     aim_at(*next);

@@ -58,7 +58,9 @@ struct ChainFollowerOptions {
 /// odometry. A snapshot that is not found where odometry expects it is searched for along a spiral
 /// with turns half as far apart as homing reaches, up to the error of the odometry; without success
 /// the robot is lost. It has arrived only if homing ended at a view as similar to the last snapshot
-/// as those beside snapshots while recording, and where the error of odometry allows it to be.
+/// as those beside snapshots while recording, and where the error of odometry allows it to be. In
+/// other light views are less similar: there homing ends where confident home vectors vanish, and
+/// the robot has arrived if this is within 0.5 m of the last snapshot by odometry.
 class ChainPilot {
  public:
   /// Returns the size of the workspace that a pilot needs.
@@ -100,6 +102,7 @@ class ChainPilot {
   [[nodiscard]] bool is_confident(const SnapshotSight& sight) const;
   [[nodiscard]] Point2 home_from_robot(const HomeVector& vector) const;
   [[nodiscard]] bool agrees_with_odometry(const SnapshotSight& sight) const;
+  [[nodiscard]] bool has_converged(const HomeVector& vector, bool has_next) const;
 
   void start(const CoefficientView& view);
   void aim_at(std::size_t node);
