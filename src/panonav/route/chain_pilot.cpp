@@ -17,10 +17,10 @@ namespace {
 // there the vector itself says where the robot is.
 constexpr double near_length = 0.1;
 // In other light the images differ beside a snapshot, too. There homing has ended where home
-// vectors are shorter than this, in units of R; and a robot has arrived where the end of homing is
-// no farther than this from where odometry expects the last snapshot.
+// vectors are shorter than this, in units of R. A robot has arrived where odometry expects the last
+// snapshot no farther than this from the end of homing: if both are as much off, at half a metre.
 constexpr double converged_length = 2.0 * near_length;
-constexpr double arrival_radius_m = 0.5;
+constexpr double arrival_radius_m = 0.35;
 // A way point is reached at this distance, the tolerance of the legs.
 constexpr double way_point_radius_m = 0.15;
 // Half of the window of headings beyond the error of odometry: the error of the compass at a

@@ -55,12 +55,10 @@ struct ChainFollowerOptions {
 /// Repeats a route along a chain of snapshots, without heap memory and exceptions, with the same
 /// bits on a microcontroller. The robot travels from snapshot to snapshot by odometry. At each one
 /// it homes, which resets the drift of position and heading and shows the systematic errors of the
-/// odometry. A snapshot that is not found where odometry expects it is searched for along a spiral
-/// with turns half as far apart as homing reaches, up to the error of the odometry; without success
-/// the robot is lost. It has arrived only if homing ended at a view as similar to the last snapshot
-/// as those beside snapshots while recording, and where the error of odometry allows it to be. In
-/// other light views are less similar: there homing ends where confident home vectors vanish, and
-/// the robot has arrived if this is within 0.5 m of the last snapshot by odometry.
+/// odometry. A snapshot that is not found is searched for along a spiral up to the error of the
+/// odometry; without success the robot is lost. It has arrived only where homing ended at a view as
+/// similar to the last snapshot as those beside snapshots while recording, or, in other light,
+/// where confident home vectors vanish within 0.35 m of the last snapshot by odometry.
 class ChainPilot {
  public:
   /// Returns the size of the workspace that a pilot needs.
