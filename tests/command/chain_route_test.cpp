@@ -17,6 +17,7 @@
 #include "support/command_runner.hpp"
 #include "support/recorded_messages.hpp"
 #include "support/report_pages.hpp"
+#include "support/scene_views.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -68,7 +69,6 @@ TEST_F(ChainVerbs, AChainIsRecordedListedAndFollowedInBothDirections) {
   }
 }
 
-// The trajectory, the record and the page of a run hold the same poses as its answers.
 // Returns the numbers between the braces of an array in a C header.
 std::vector<int> array_of(const std::string& header, const std::string& name) {
   std::vector<int> numbers;
@@ -84,14 +84,8 @@ TEST_F(ChainVerbs, AHeaderForFirmwareHoldsThePackedChainAndThePixelsOfTheCamera)
   (void)record({"--name", "home", "--method", "chain"});
   const std::string memory = folder_ / "m.panonav";
   const fs::path header = folder_ / "home.h";
-  Camera camera = simulation::make_simulated_mirror_camera();
-  write_camera(folder_ / "large.toml", {camera, std::nullopt});
-  constexpr double scale = 0.25;
-  camera.image_size = {160, 120};
-  camera.centre = {scale * camera.centre.u_px, scale * camera.centre.v_px};
-  camera.rim_radius_px *= scale;
-  camera.inner_radius_px *= scale;
-  std::get<HyperboloidalModel>(camera.model).focal_length_px *= scale;
+  const Camera camera = small_mirror_camera();
+  write_camera(folder_ / "large.toml", {simulation::make_simulated_mirror_camera(), std::nullopt});
   write_camera(folder_ / "small.toml", {camera, std::nullopt});
 
   const json reported = answer_of(
@@ -119,6 +113,7 @@ TEST_F(ChainVerbs, AHeaderForFirmwareHoldsThePackedChainAndThePixelsOfTheCamera)
                  "route 'lines' is a route panorama; allowed here: a chain of snapshots");
 }
 
+// The trajectory, the record and the page of a run hold the same poses as its answers.
 TEST_F(ChainVerbs, OutputsHoldThePosesOfTheAnswers) {
   (void)record({"--name", "home", "--method", "chain"});
   const std::string memory = folder_ / "m.panonav";

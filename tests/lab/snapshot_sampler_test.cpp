@@ -22,20 +22,10 @@
 #include "panonav_simulation/mirror.hpp"
 #include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/scenes.hpp"
+#include "support/scene_views.hpp"
 
 namespace panonav {
 namespace {
-
-Camera small_mirror_camera() {
-  constexpr double scale = 0.25;
-  Camera camera = simulation::make_simulated_mirror_camera();
-  std::get<HyperboloidalModel>(camera.model).focal_length_px *= scale;
-  camera.image_size = {160, 120};
-  camera.centre = {camera.centre.u_px * scale, camera.centre.v_px * scale};
-  camera.rim_radius_px *= scale;
-  camera.inner_radius_px *= scale;
-  return camera;
-}
 
 HomingView sample_view(const SnapshotSampler& sampler, const Image& picture,
                        const ElevationBand& band) {
@@ -49,7 +39,7 @@ HomingView sample_view(const SnapshotSampler& sampler, const Image& picture,
 
 // Waves around the robot, whatever the elevation.
 TEST(SnapshotSampler, FindsTheCoefficientsOfAPaintedPicture) {
-  const Camera camera = small_mirror_camera();
+  const Camera camera = testing::small_mirror_camera();
   const ElevationBand band = visible_elevations(camera);
   Image picture(160, 120);
   for (int v = 0; v < 120; ++v) {
@@ -82,7 +72,7 @@ TEST(SnapshotSampler, FindsTheCoefficientsOfAPaintedPicture) {
 }
 
 TEST(SnapshotSampler, ChecksItsTable) {
-  const Camera camera = small_mirror_camera();
+  const Camera camera = testing::small_mirror_camera();
   const ElevationBand band = visible_elevations(camera);
   EXPECT_THROW((void)make_sampler_pixels(camera, band, {.azimuths = 65}), ContractError);
   EXPECT_THROW((void)make_sampler_pixels(camera, band, {.components = 25}), ContractError);
@@ -106,7 +96,7 @@ HomewardMeans measure_homeward_means(const char* scene_name, std::uint64_t seed,
   const simulation::FreeSpace space(scene);
   Executor executor(1);
   const simulation::Renderer renderer(scene, {}, executor);
-  const Camera camera = small_mirror_camera();
+  const Camera camera = testing::small_mirror_camera();
   const ElevationBand band = visible_elevations(camera);
   const Unwarper unwarper(camera, {.rows = 40, .columns = 256, .elevations = band});
   const auto pixels = make_sampler_pixels(camera, band, shape);

@@ -28,18 +28,6 @@ const fs::path golden = fs::path(PANONAV_TEST_DATA) / "golden";
 
 constexpr char instructions[] = "sse4.2";
 
-// The simulated mirror camera with a quarter of its pixels along each side.
-Camera small_mirror_camera() {
-  Camera camera = make_simulated_mirror_camera();
-  constexpr double quarter = 0.25;
-  camera.image_size = {camera.image_size.width / 4, camera.image_size.height / 4};
-  camera.centre = {quarter * camera.centre.u_px, quarter * camera.centre.v_px};
-  camera.rim_radius_px *= quarter;
-  camera.inner_radius_px *= quarter;
-  std::get<HyperboloidalModel>(camera.model).focal_length_px *= quarter;
-  return camera;
-}
-
 // Not looking along any wall.
 Viewpoint viewpoint_in(const Scene& scene) {
   return viewpoint_on_tour(scene, 0.3, 0.4);

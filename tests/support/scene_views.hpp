@@ -8,11 +8,24 @@
 #include "panonav/motion/path.hpp"
 #include "panonav/panorama/panorama.hpp"
 #include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/mirror.hpp"
 #include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/renderer.hpp"
 #include "panonav_simulation/scene.hpp"
 
 namespace panonav::testing {
+
+/// The simulated mirror camera with a quarter of its pixels along each side.
+inline Camera small_mirror_camera() {
+  Camera camera = simulation::make_simulated_mirror_camera();
+  constexpr double quarter = 0.25;
+  camera.image_size = {camera.image_size.width / 4, camera.image_size.height / 4};
+  camera.centre = {quarter * camera.centre.u_px, quarter * camera.centre.v_px};
+  camera.rim_radius_px *= quarter;
+  camera.inner_radius_px *= quarter;
+  std::get<HyperboloidalModel>(camera.model).focal_length_px *= quarter;
+  return camera;
+}
 
 /// A free place at this share (0 .. 1) of the shortest way along the first side of the scene's
 /// round trip.

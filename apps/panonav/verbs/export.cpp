@@ -150,7 +150,7 @@ ExitCode export_firmware(const ExportArguments& arguments, Session& session) {
   std::vector<std::uint16_t> pixels;
   if (arguments.camera) pixels = read_sampler_pixels(*arguments.camera, chain);
   write_file(*arguments.firmware, format_firmware_header(chain, pixels));
-  const std::size_t chain_bytes = chain.pack().size();
+  const std::uint64_t chain_bytes = memory.route_bytes(name);
   const std::size_t sampler_bytes = pixels.size() * sizeof(std::uint16_t);
   if (session.json()) {
     session.print(json_line(ordered_json{{"memory", arguments.memory},

@@ -22,8 +22,7 @@ constexpr double border_weight = 6.0;
 // not preferred to a far one with much.
 constexpr double added_radii = 0.5;
 // Smallest area of a connected frontier for each metre of the path to it (m2/m): a far remnant is
-// not worth a visit, another room of which ranges show a part is. Chosen in `office`, `lab`, `loop`
-// and `small_house` (seeds 9101 to 9103); half of it doubles the path in `small_house`.
+// not worth a visit, another room of which ranges show a part is.
 constexpr double min_area_per_path_m = 0.08;
 // Radius around a position from which no view was recognised, in catchment radii: half the distance
 // between successive observations.
@@ -167,6 +166,13 @@ void CoverageMap::visit_line(const FloorObservations::Line& line, const Visit& v
   }
 }
 
+template <class Visit>
+void CoverageMap::visit_frontiers_beside(std::size_t cell, const Visit& visit) const {
+  for (const std::size_t beside : {cell - 1, cell + 1, cell - columns_, cell + columns_}) {
+    if (beside < flags_.size() && is_frontier(beside)) visit(beside);
+  }
+}
+
 bool CoverageMap::is_blocked(Point2 position) const noexcept {
   const auto cell = cell_at(position);
   return cell && (flags_[*cell] & blocked_bit) != 0;
@@ -223,10 +229,8 @@ std::vector<double> CoverageMap::weigh_cells() const {
   std::vector<double> weights(flags_.size(), 0.0);
   for (std::size_t cell = 0; cell < flags_.size(); ++cell) {
     if (!is_frontier(cell)) continue;
-    int others = 0;
-    for (const std::size_t beside : {cell - 1, cell + 1, cell - columns_, cell + columns_}) {
-      others += beside < flags_.size() && is_frontier(beside) ? 0 : 1;
-    }
+    int others = 4;
+    visit_frontiers_beside(cell, [&](std::size_t) { --others; });
     weights[cell] = 1.0 + border_weight * others / 4.0;
   }
   return weights;
@@ -241,12 +245,11 @@ std::vector<double> CoverageMap::measure_connected_frontiers() const {
     connected.assign(1, first);
     areas_m2[first] = cell_m2;
     for (std::size_t i = 0; i < connected.size(); ++i) {
-      const std::size_t cell = connected[i];
-      for (const std::size_t beside : {cell - 1, cell + 1, cell - columns_, cell + columns_}) {
-        if (beside >= flags_.size() || !is_frontier(beside) || areas_m2[beside] > 0.0) continue;
+      visit_frontiers_beside(connected[i], [&](std::size_t beside) {
+        if (areas_m2[beside] > 0.0) return;
         areas_m2[beside] = cell_m2;
         connected.push_back(beside);
-      }
+      });
     }
     for (const std::size_t cell : connected) {
       areas_m2[cell] = static_cast<double>(connected.size()) * cell_m2;

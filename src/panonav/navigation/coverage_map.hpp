@@ -108,6 +108,8 @@ class CoverageMap {
   void visit_disc(Point2 middle, double radius_m, const Visit& visit) const;
   template <class Visit>
   void visit_line(const FloorObservations::Line& line, const Visit& visit) const;
+  template <class Visit>
+  void visit_frontiers_beside(std::size_t cell, const Visit& visit) const;
   void set_bounds(const FloorObservations& floor);
   void mark_floor(const FloorObservations& floor);
   void mark_covered(const FloorObservations& floor);

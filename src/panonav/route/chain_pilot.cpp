@@ -136,7 +136,8 @@ bool ChainPilot::agrees_with_odometry(const SnapshotSight& sight) const {
 
 void ChainPilot::start(const CoefficientView& view) {
   const bool forward = direction_ == ChainDirection::forward;
-  target_ = forward ? 0 : route_.stops.size() - 1;
+  const std::size_t first = forward ? 0 : route_.stops.size() - 1;
+  target_ = first;
   SnapshotSight sight = look_at(target_, view, true);
   if (!is_confident(sight)) {
     for (std::size_t node = 0; node < route_.stops.size(); ++node) {
@@ -145,7 +146,6 @@ void ChainPilot::start(const CoefficientView& view) {
       if (other.difference < sight.difference) target_ = node, sight = other;
     }
   }
-  const std::size_t first = forward ? 0 : route_.stops.size() - 1;
   way_point_ = target_;
   has_started_ = true;
   const Point2 place = position(target_);

@@ -124,8 +124,8 @@ void ExplorerPose::correct_position(Point2 view, double world_direction_rad) {
   position_variance_m2_ *= 1.0 - 0.5 * gain;  // one of two directions
 }
 
-// Finds views that show the place of an observation, although the pose expects them elsewhere. Two
-// of them must agree on the pose, as other places may look similar to a single view.
+// Finds views that show the place of an observation, although the pose expects them elsewhere. They
+// count only in pairs that agree on the pose, as other places may look similar to a single view.
 std::vector<ExplorerPose::Recognition> ExplorerPose::find_closures(
     const OdometryView& current) const {
   std::vector<std::pair<double, std::size_t>> similar;
@@ -137,27 +137,26 @@ std::vector<ExplorerPose::Recognition> ExplorerPose::find_closures(
   std::ranges::partial_sort(similar, similar.begin() + static_cast<std::ptrdiff_t>(count));
   struct Closure {
     Recognition recognition;
-    Pose2 pose;  // of the robot
+    Pose2 robot;
   };
   std::vector<Closure> possible;
   for (const auto& [dissimilarity, i] : std::span(similar).first(count)) {
     const auto evidence = compute_pair_evidence(views_[i].coefficients, current.coefficients);
     if (!evidence || evidence->probability < min_probability) continue;
     const Pose2 robot_from_view = estimate_robot_from_view(evidence->vector);
-    const Pose2 pose = poses_[i] * inverse(robot_from_view);
-    possible.push_back({{i, robot_from_view}, pose});
+    possible.push_back({{i, robot_from_view}, poses_[i] * inverse(robot_from_view)});
   }
   std::vector<Recognition> closures;
   for (const Closure& a : possible) {
     const bool is_confirmed = std::ranges::any_of(possible, [&](const Closure& b) {
       return a.recognition.view != b.recognition.view &&
-             distance(a.pose.position(), b.pose.position()) <= radius_m_ &&
-             std::abs(angle_difference(a.pose.heading_rad, b.pose.heading_rad)) <=
+             distance(a.robot.position(), b.robot.position()) <= radius_m_ &&
+             std::abs(angle_difference(a.robot.heading_rad, b.robot.heading_rad)) <=
                  max_turn_error_rad;
     });
     // A difference that the errors of direction and length explain is no contradiction.
     const bool is_elsewhere =
-        distance(a.pose.position(), pose_.position()) > (compared_radii + 1.0) * radius_m_;
+        distance(a.robot.position(), pose_.position()) > (compared_radii + 1.0) * radius_m_;
     if (is_confirmed && is_elsewhere) closures.push_back(a.recognition);
   }
   return closures;
