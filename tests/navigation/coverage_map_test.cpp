@@ -88,6 +88,13 @@ TEST(CoverageMap, AnotherRoomIsWorthAPathThatARemnantIsNotWorth) {
   EXPECT_TRUE(remnant.find_view_point({19.0, 0.0}));
 }
 
+TEST(CoverageMap, ARoomOfWhichLittleIsExpectedToBeFloorIsNotWorthALongPath) {
+  const CoverageMap map(make_corridor_to_floor(3.0), {});
+  EXPECT_TRUE(map.find_view_point({0.0, 0.0}, 0.5));
+  EXPECT_FALSE(map.find_view_point({0.0, 0.0}, 0.05));
+  EXPECT_TRUE(map.find_view_point({20.0, 0.0}, 0.05));
+}
+
 TEST(CoverageMap, AViewDoesNotCoverWhatIsBehindAnObstacle) {
   FloorObservations floor;
   floor.driven.push_back({{0.0, 0.0}, {0.0, 0.0}});

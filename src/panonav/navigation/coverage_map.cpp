@@ -340,7 +340,8 @@ std::vector<Point2> CoverageMap::trace_path(const Paths& paths, std::size_t end)
   return path;
 }
 
-std::optional<CoverageMap::ViewPoint> CoverageMap::find_view_point(Point2 robot) const {
+std::optional<CoverageMap::ViewPoint> CoverageMap::find_view_point(
+    Point2 robot, double covered_share) const {
   const Paths paths = find_paths(robot);
   const std::vector<double> weights = weigh_cells();
   const std::vector<double> squares = sum_in_squares(weights);
@@ -373,7 +374,7 @@ std::optional<CoverageMap::ViewPoint> CoverageMap::find_view_point(Point2 robot)
     const double area_m2 = static_cast<double>(cells) * options_.cell_m * options_.cell_m;
     const double score = weight / (paths.length_m[cell] + added_m);
     if (area_m2 < options_.min_area_m2 || score <= best_score) continue;
-    if (frontier_m2 < min_area_per_path_m * paths.length_m[cell]) continue;
+    if (covered_share * frontier_m2 < min_area_per_path_m * paths.length_m[cell]) continue;
     best_score = score;
     best = ViewPoint{position, area_m2, paths.length_m[cell], trace_path(paths, cell)};
   }

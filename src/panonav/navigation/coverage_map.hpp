@@ -88,8 +88,10 @@ class CoverageMap {
   [[nodiscard]] double compute_gain_m2(Point2 position) const;
   /// Finds the position with the largest frontier area for its path length. nullopt if no reachable
   /// position has `CoverageOptions::min_area_m2`, and a connected frontier that is worth the path:
-  /// the floor is covered. Cost: O(cells).
-  [[nodiscard]] std::optional<ViewPoint> find_view_point(Point2 robot) const;
+  /// the floor is covered. `covered_share`: share of a frontier that views are expected to cover, 0
+  /// .. 1; less than 1 where a part of them is no floor. Cost: O(cells).
+  [[nodiscard]] std::optional<ViewPoint> find_view_point(Point2 robot,
+                                                         double covered_share = 1.0) const;
   /// Finds the shortest path through cells that are not blocked; nullopt if there is none. `path`
   /// does not contain `from`.
   [[nodiscard]] std::optional<std::vector<Point2>> find_path(Point2 from, Point2 to) const;

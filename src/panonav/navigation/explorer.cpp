@@ -26,6 +26,10 @@ constexpr int max_contacts = 8;
 // as long.
 constexpr double assumed_open_radii = 1.3;
 constexpr double felt_width_m = 0.15;
+// Weight of the last target in the share of promised areas that views covered: some five targets
+// count. In a map that drift distorted, walls stand twice, and what lies between is no floor.
+// Chosen in `lab` (seeds 9101 to 9108), with paths of at most 1.9 sweeps instead of 5.
+constexpr double covered_share_gain = 0.2;
 // Observations on a way back after which the robot is lost: 50 m in steps of 0.25 m.
 constexpr int max_driving_back = 200;
 // Observations after which the map is made again: a metre of ranges.
@@ -235,13 +239,26 @@ class Explorer::Implementation {
     if (!target_) return false;
     const Point2 target = resolve(*target_);
     if (distance(robot_.pose().position(), target) > arrival_m) return false;
-    if (map_->compute_gain_m2(robot_.pose().position()) >= options_.min_area_m2) return true;
-    give_up_target();
-    return false;
+    const double area_m2 = map_->compute_gain_m2(robot_.pose().position());
+    if (area_m2 < options_.min_area_m2) {
+      give_up_target();
+      return false;
+    }
+    learn_covered_share(area_m2);
+    return true;
+  }
+
+  void learn_covered_share(double covered_m2) {
+    const double share = std::min(covered_m2 / target_area_m2_, 1.0);
+    covered_share_ += covered_share_gain * (share - covered_share_);
   }
 
   void give_up_target() {
     given_up_.push_back(*target_);
+    drop_target();
+  }
+  void drop_target() {
+    learn_covered_share(0.0);
     target_.reset();
   }
 
@@ -255,18 +272,21 @@ class Explorer::Implementation {
       const double area_m2 = map_->compute_gain_m2(resolve(*target_));
       if (area_m2 < std::max(options_.min_area_m2, 0.5 * target_area_m2_) ||
           map_->is_blocked(resolve(*target_))) {
-        target_.reset();
+        drop_target();
       }
     }
     if (target_) return true;
-    auto next = map_->find_view_point(robot_.pose().position());
+    const auto find = [this] {
+      return map_->find_view_point(robot_.pose().position(), covered_share_);
+    };
+    auto next = find();
     if (!next && coverage_.robot_radius_m > robot_radius_m_) {
       // Enclosed by what it assumes: until the next view an obstacle is no wider than it felt.
       coverage_.robot_radius_m = robot_radius_m_;
       map_ = make_map();
-      next = map_->find_view_point(robot_.pose().position());
+      next = find();
     }
-    if (!next && forget_contradictions()) next = map_->find_view_point(robot_.pose().position());
+    if (!next && forget_contradictions()) next = find();
     if (!next) return false;
     target_ = anchor(next->position);
     target_area_m2_ = next->area_m2;
@@ -352,6 +372,7 @@ class Explorer::Implementation {
   int map_age_ = 0;  // observations since it was made
   std::optional<AnchoredPoint> target_;
   double target_area_m2_ = 0.0;
+  double covered_share_ = 1.0;           // of the areas that targets promise
   std::optional<HomingPursuit> homing_;  // to the start
   int contacts_ = 0;                     // on the way to the target
   int driving_back_ = 0;                 // observations since it drives back

@@ -154,9 +154,8 @@ std::vector<ExplorerPose::Recognition> ExplorerPose::find_closures(
              std::abs(angle_difference(a.robot.heading_rad, b.robot.heading_rad)) <=
                  max_turn_error_rad;
     });
-    // A difference that the errors of direction and length explain is no contradiction.
     const bool is_elsewhere =
-        distance(a.robot.position(), pose_.position()) > (compared_radii + 1.0) * radius_m_;
+        distance(a.robot.position(), pose_.position()) > compared_radii * radius_m_;
     if (is_confirmed && is_elsewhere) closures.push_back(a.recognition);
   }
   return closures;
