@@ -6,6 +6,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/panorama/preprocessing.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 #include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
@@ -17,13 +18,27 @@ HomingPlace make_homing_place(simulation::Scene scene, HomingCamera camera, Exec
   return {simulation::make_place(std::move(scene), executor), camera};
 }
 
-HomingView capture_homing_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
+namespace {
+
+Panorama capture_level_panorama(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
   Executor here(1);
   const HomingCamera& camera = place.camera;
   const Panorama seen = simulation::capture_panorama(*place.renderer, pose, camera.rendering,
                                                      camera.frame, camera.sensor, seed, here);
   const Tilt measured = camera.levelled ? sample_tilt(camera.frame, seed) : Tilt{};
-  return homing_view(compute_signature(level_panorama(seen, measured), camera.components));
+  return level_panorama(seen, measured);
+}
+
+}  // namespace
+
+HomingView capture_homing_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
+  return homing_view(
+      compute_signature(capture_level_panorama(place, pose, seed), place.camera.components));
+}
+
+HomingView capture_chain_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
+  return homing_view(compute_signature(preprocess(capture_level_panorama(place, pose, seed), {}),
+                                       place.camera.components));
 }
 
 std::string_view to_string(HomingRunEnd end) {

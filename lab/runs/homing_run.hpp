@@ -37,6 +37,9 @@ struct HomingPlace : simulation::SimulatedPlace {
 /// Renders the robot's view at `pose`. The same pose and seed give the same bits.
 [[nodiscard]] HomingView capture_homing_view(const HomingPlace& place, const Pose2& pose,
                                              std::uint64_t seed);
+/// The same, preprocessed as the command does it for chains of snapshots and home areas.
+[[nodiscard]] HomingView capture_chain_view(const HomingPlace& place, const Pose2& pose,
+                                            std::uint64_t seed);
 
 struct HomingRunOptions {
   /// Error of the wheels, and the drive: a differential robot turns before it drives, a holonomic

@@ -83,7 +83,7 @@ SnapshotChain record_chain(const HomingPlace& place, std::span<const Pose2> rout
   const DriftingOdometry odometry({}, errors);
   Random noise_of_views(seed, 4);
   for (std::size_t i = 0; i < route.size(); ++i) {
-    recorder.add(capture_homing_view(place, route[i], noise_of_views.next()),
+    recorder.add(capture_chain_view(place, route[i], noise_of_views.next()),
                  i == 0 ? Pose2{} : odometry.measure(route[i - 1], route[i]));
   }
   return recorder.finish();
@@ -118,7 +118,7 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
     run.path.push_back(robot.pose());
     run.lateral_m.push_back(simulation::distance_from_route_m(robot.pose().position(), route));
     const ChainDecision decision =
-        follower.decide(capture_homing_view(place, robot.pose(), noise_of_views.next()), moved);
+        follower.decide(capture_chain_view(place, robot.pose(), noise_of_views.next()), moved);
     run.state = decision.state;
     if (run.state == ChainState::arrived || run.state == ChainState::lost) break;
     const Pose2 before = robot.pose();

@@ -111,36 +111,130 @@ Eigen::VectorXd packed_coefficients(const HomingView& view, double heading_rad) 
   return values;
 }
 
-// Fits home vectors linearly to the coefficients of every other view, and returns the homeward
-// component at the rest. Of the strengths of the ridge the best one is taken, for the rival's good.
-double measure_regression(const std::vector<HomingView>& views, const std::vector<Pose2>& walk) {
-  const auto size = packed_coefficients(views.front(), 0.0).size();
-  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(size, size);
-  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(size, 2);
-  const auto home_vector_at = [&](std::size_t i) {
-    return Eigen::Vector2d(walk.front().x_m - walk[i].x_m, walk.front().y_m - walk[i].y_m);
-  };
-  for (std::size_t i = 0; i < walk.size(); i += 2) {
-    const Eigen::VectorXd values = packed_coefficients(views[i], walk[i].heading_rad);
-    squares += values * values.transpose();
-    products += values * home_vector_at(i).transpose();
+// Packed coefficients of views, a row for each one, and the home vectors there.
+struct HomeSamples {
+  Eigen::MatrixXd inputs;
+  Eigen::MatrixXd homes;
+};
+
+// Returns every other view of a walk.
+HomeSamples sample_views(const std::vector<HomingView>& views, const std::vector<Pose2>& walk,
+                         std::size_t first) {
+  const auto count = static_cast<Eigen::Index>((walk.size() - first + 1) / 2);
+  HomeSamples samples{{count, packed_coefficients(views.front(), 0.0).size()}, {count, 2}};
+  for (Eigen::Index row = 0; row < count; ++row) {
+    const std::size_t i = first + 2 * static_cast<std::size_t>(row);
+    samples.inputs.row(row) = packed_coefficients(views[i], walk[i].heading_rad);
+    samples.homes.row(row) << walk.front().x_m - walk[i].x_m, walk.front().y_m - walk[i].y_m;
   }
+  return samples;
+}
+
+// Returns the mean homeward component of fitted home vectors, away from home; -1 without any.
+double measure_component(const Eigen::MatrixXd& fitted, const Eigen::MatrixXd& homes) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (Eigen::Index i = 0; i < homes.rows(); ++i) {
+    if (homes.row(i).norm() <= home_radius_m) continue;
+    sum += fitted.row(i).normalized().dot(homes.row(i).normalized());
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : -1.0;
+}
+
+// Fits home vectors linearly, and returns the homeward component at the other views. Of the
+// strengths of the ridge the best one is taken, for the rival's good.
+double measure_regression(const HomeSamples& learnt, const HomeSamples& others) {
+  const Eigen::MatrixXd squares = learnt.inputs.transpose() * learnt.inputs;
+  const Eigen::MatrixXd products = learnt.inputs.transpose() * learnt.homes;
+  const auto size = squares.rows();
   double best = -1.0;
   for (const double part : {1e-6, 1e-4, 1e-2, 1.0}) {
     const double ridge = part * squares.trace() / static_cast<double>(size);
     const Eigen::MatrixXd weights =
         (squares + ridge * Eigen::MatrixXd::Identity(size, size)).ldlt().solve(products);
-    double sum = 0.0;
-    double count = 0.0;
-    for (std::size_t i = 1; i < walk.size(); i += 2) {
-      const Eigen::Vector2d home = home_vector_at(i);
-      if (home.norm() <= home_radius_m) continue;
-      const Eigen::Vector2d fitted =
-          weights.transpose() * packed_coefficients(views[i], walk[i].heading_rad);
-      sum += fitted.normalized().dot(home.normalized());
-      count += 1.0;
-    }
-    if (count > 0.0) best = std::max(best, sum / count);
+    best = std::max(best, measure_component(others.inputs * weights, others.homes));
+  }
+  return best;
+}
+
+// Gradient descent with moments [Kingma, Ba 2015] on one matrix of weights.
+class Adam {
+ public:
+  explicit Adam(const Eigen::MatrixXd& weights)
+      : mean_(Eigen::ArrayXXd::Zero(weights.rows(), weights.cols())), square_(mean_) {}
+
+  void descend(Eigen::MatrixXd& weights, const Eigen::MatrixXd& slope) {
+    constexpr double rate = 0.01;
+    mean_keep_ *= 0.9;
+    square_keep_ *= 0.999;
+    mean_ = 0.9 * mean_ + 0.1 * slope.array();
+    square_ = 0.999 * square_ + 0.001 * slope.array().square();
+    weights.array() -=
+        rate * (mean_ / (1.0 - mean_keep_)) / ((square_ / (1.0 - square_keep_)).sqrt() + 1e-8);
+  }
+
+ private:
+  Eigen::ArrayXXd mean_;
+  Eigen::ArrayXXd square_;
+  double mean_keep_ = 1.0;
+  double square_keep_ = 1.0;
+};
+
+// A network of one hidden layer of nine cells, 821 weights that are not always 0.
+struct HomeNetwork {
+  static constexpr int hidden = 9;
+  Eigen::MatrixXd first;
+  Eigen::MatrixXd second;
+
+  [[nodiscard]] Eigen::MatrixXd excite(const Eigen::MatrixXd& inputs) const {
+    Eigen::MatrixXd cells(inputs.rows(), hidden + 1);
+    cells << (inputs * first).array().tanh().matrix(), Eigen::MatrixXd::Ones(inputs.rows(), 1);
+    return cells;
+  }
+};
+
+HomeNetwork learn_network(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& homes,
+                          double penalty, std::uint64_t seed) {
+  constexpr int steps = 2000;
+  Random random(seed, 9);
+  const auto draw = [&random](Eigen::Index rows, Eigen::Index columns) -> Eigen::MatrixXd {
+    const double deviation = 1.0 / std::sqrt(static_cast<double>(rows));
+    return Eigen::MatrixXd::NullaryExpr(rows, columns,
+                                        [&] { return random.normal(0.0, deviation); });
+  };
+  HomeNetwork network;
+  network.first = draw(inputs.cols(), HomeNetwork::hidden);
+  network.second = draw(HomeNetwork::hidden + 1, 2);
+  Adam first(network.first);
+  Adam second(network.second);
+  for (int step = 0; step < steps; ++step) {
+    const Eigen::MatrixXd cells = network.excite(inputs);
+    const Eigen::MatrixXd errors =
+        (cells * network.second - homes) / static_cast<double>(inputs.rows());
+    const Eigen::MatrixXd back =
+        ((errors * network.second.topRows(HomeNetwork::hidden).transpose()).array() *
+         (1.0 - cells.leftCols(HomeNetwork::hidden).array().square()))
+            .matrix();
+    first.descend(network.first, inputs.transpose() * back + penalty * network.first);
+    second.descend(network.second, cells.transpose() * errors + penalty * network.second);
+  }
+  return network;
+}
+
+// Learns the network, and returns the homeward component at the other views. Of the penalties on
+// large weights the best one is taken.
+double measure_network(const HomeSamples& learnt, const HomeSamples& others, std::uint64_t seed) {
+  const double input_scale =
+      std::sqrt(static_cast<double>(learnt.inputs.size()) / learnt.inputs.squaredNorm());
+  const double home_scale = 1.0 / learnt.homes.rowwise().norm().maxCoeff();
+  double best = -1.0;
+  for (const double penalty : {1e-4, 1e-3, 1e-2}) {
+    const HomeNetwork network =
+        learn_network(input_scale * learnt.inputs, home_scale * learnt.homes, penalty, seed);
+    best = std::max(best,
+                    measure_component(network.excite(input_scale * others.inputs) * network.second,
+                                      others.homes));
   }
   return best;
 }
@@ -185,14 +279,17 @@ LearntHome learn_home(const HomingPlace& place, const HomeTask& task, std::uint6
   learnt.walk_m = path_length_m(walk);
   WindyOdometry odometry(task.wind, seed + 1);
   const auto views = simulation::make_each(executor, walk.size(), [&](std::size_t i) {
-    return capture_homing_view(place, walk[i], Random(seed, 1000 + i).next());
+    return capture_chain_view(place, walk[i], Random(seed, 1000 + i).next());
   });
   HomeAreaLearner learner({}, {.max_bytes = task.max_bytes});
   for (std::size_t i = 0; i < walk.size(); ++i) {
     learner.add(views[i], i == 0 ? Pose2{} : odometry.measure(walk[i - 1], walk[i]));
   }
   learnt.area = learner.finish(executor);
-  learnt.regression_component = measure_regression(views, walk);
+  const HomeSamples samples = sample_views(views, walk, 0);
+  const HomeSamples others = sample_views(views, walk, 1);
+  learnt.regression_component = measure_regression(samples, others);
+  learnt.network_component = measure_network(samples, others, seed);
   return learnt;
 }
 
@@ -215,7 +312,7 @@ HomeFlight fly_home(const HomingPlace& place, const LearntHome& home, const Home
   Random noise_of_views(seed, 2);
   const auto see = [&](const Pose2& pose) {
     const std::uint64_t noise = noise_of_views.next();
-    if (finder.may_be_near()) finder.see(capture_homing_view(place, pose, noise));
+    if (finder.may_be_near()) finder.see(capture_chain_view(place, pose, noise));
   };
   // The robot starts at home at the heading of the walk.
   finder.move(odometry.measure(home.home, way.front()));
@@ -252,6 +349,7 @@ struct HomeResults {
   std::vector<double> bytes;
   std::vector<double> component;
   std::vector<double> regression_component;
+  std::vector<double> network_component;
 };
 
 void add_flights(const std::string& id, const std::string& what,
@@ -286,6 +384,7 @@ void measure_homes(const HomingPlace& place, const std::string& name, int flight
     all.bytes.push_back(static_cast<double>(home.area.chain.pack().size()));
     all.component.push_back(home.area.homeward_component());
     all.regression_component.push_back(home.regression_component);
+    all.network_component.push_back(home.network_component);
   }
   add_flights(measured.id + "." + name, measured.what + " in " + name, here, std::nullopt,
               context.result);
@@ -306,6 +405,9 @@ void report_homes(const MeasuredTask& measured, Reproduction& result) {
   add_mean(result, id + ".regression",
            what + ": the same by ridge regression on packed coefficients, 178 numbers", "",
            all.regression_component);
+  add_mean(result, id + ".network",
+           what + ": the same by a network of nine hidden cells, 821 numbers", "",
+           all.network_component);
   std::vector<double> errors_m;
   for (const HomeFlight& flight : all.flights) errors_m.push_back(flight.odometry_error_m);
   add_median(result, id + ".error", what + ": error of the position at the end of the way out", "m",

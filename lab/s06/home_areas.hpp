@@ -53,6 +53,8 @@ struct LearntHome {
   /// Homeward component of a rival at the held-out views: the home vector as a linear function of
   /// the packed coefficients, by ridge regression over the other views, with a true compass.
   double regression_component = 0.0;
+  /// The same of a network of 821 weights, as small as that of the flights of robotic bees.
+  double network_component = 0.0;
 };
 
 /// Learns a random home of the place by a walk of petals around it. The same seed gives the same

@@ -340,8 +340,8 @@ std::vector<Point2> CoverageMap::trace_path(const Paths& paths, std::size_t end)
   return path;
 }
 
-std::optional<CoverageMap::ViewPoint> CoverageMap::find_view_point(
-    Point2 robot, double covered_share) const {
+std::optional<CoverageMap::ViewPoint> CoverageMap::find_view_point(Point2 robot,
+                                                                   double covered_share) const {
   const Paths paths = find_paths(robot);
   const std::vector<double> weights = weigh_cells();
   const std::vector<double> squares = sum_in_squares(weights);
