@@ -87,7 +87,7 @@ Pose2 measure(const Pose2& from, const Pose2& to, double wind) {
 
 HomeArea learn(const ToyWorld& world, const std::vector<Pose2>& walk, double wind, int threads = 1,
                int max_bytes = 1000) {
-  HomeAreaLearner learner({}, {.max_bytes = max_bytes});
+  HomeAreaLearner learner(home_snapshot_shape, {.max_bytes = max_bytes});
   for (std::size_t i = 0; i < walk.size(); ++i) {
     learner.add(forest_view(world, walk[i]),
                 i == 0 ? Pose2{} : measure(walk[i - 1], walk[i], wind));

@@ -42,8 +42,7 @@ void check_new_chain(const MemoryFile& memory, const std::string& name, const Dr
   }
 }
 
-SnapshotShape snapshot_shape(const MemoryFile& memory) {
-  SnapshotShape shape;
+SnapshotShape limit_shape(SnapshotShape shape, const MemoryFile& memory) {
   shape.rows = std::min(shape.rows, memory.header().shape.rows);
   shape.components = std::min(shape.components, memory.header().shape.components);
   return shape;
@@ -71,7 +70,7 @@ SnapshotChain record_chain(MemoryFile& memory, const std::string& name, const Dr
                            const ChainSpacing& spacing, Executor& executor,
                            const std::function<void()>& progress) {
   check_new_chain(memory, name, drive);
-  ChainRecorder recorder(snapshot_shape(memory), spacing);
+  ChainRecorder recorder(limit_shape({}, memory), spacing);
   add_drive(memory, drive, executor, progress,
             [&](const HomingView& view, const Pose2& moved) { recorder.add(view, moved); });
   SnapshotChain chain = recorder.finish();
@@ -83,7 +82,7 @@ HomeArea learn_home_area(MemoryFile& memory, const std::string& name, const Driv
                          const HomeAreaOptions& options, Executor& executor,
                          const std::function<void()>& progress) {
   check_new_chain(memory, name, walk);
-  HomeAreaLearner learner(snapshot_shape(memory), options);
+  HomeAreaLearner learner(limit_shape(home_snapshot_shape, memory), options);
   add_drive(memory, walk, executor, progress,
             [&](const HomingView& view, const Pose2& moved) { learner.add(view, moved); });
   HomeArea area = learner.finish(executor);

@@ -12,6 +12,10 @@
 
 namespace panonav {
 
+/// Snapshots of a home area. With coefficients of 4 bits, as in a chain, the place where the home
+/// vector vanishes is up to 0.05 R away from home: half a metre in a hall.
+inline constexpr SnapshotShape home_snapshot_shape{.bits = 6};
+
 /// Size of a home area.
 struct HomeAreaOptions {
   int max_bytes = 1000;  ///< of the packed area, 200 .. 1,000,000
@@ -49,7 +53,8 @@ struct HomeArea {
 class HomeAreaLearner {
  public:
   /// Throws OptionError; ContractError if the bytes are too few for one snapshot.
-  explicit HomeAreaLearner(const SnapshotShape& shape = {}, const HomeAreaOptions& options = {});
+  explicit HomeAreaLearner(const SnapshotShape& shape = home_snapshot_shape,
+                           const HomeAreaOptions& options = {});
 
   /// Adds a view after the motion `moved` (robot_old_from_robot_new, by odometry; ignored for the
   /// first view, which is home). Throws ContractError as `ChainRecorder::add`.

@@ -32,10 +32,12 @@ constexpr double fix_spacing_m = 1.0;
 constexpr double max_mismatch = 11.34;
 // Half of the window of headings beyond three deviations, as of `ChainPilot`.
 constexpr double pose_heading_error_rad = 0.35;
-// Views this far apart test a hypothesis [Wald 1945, sequential probability ratio test]: whether
-// the pose of the next view agrees, which half of the views in the area do, and elsewhere some of a
-// hundred by chance. It counts at odds of 1000, and is dropped at odds of 1 to 10.
-constexpr double test_spacing_m = 0.25;
+// Views this far apart, as a part of R, test a hypothesis [Wald 1945, sequential probability ratio
+// test]: whether the pose of the next view agrees, which half of the views in the area do, and
+// elsewhere some of a hundred by chance. Nearer views are of the same surroundings, as of one aisle
+// of many, and agree in the same error. It counts at odds of 1000, and is dropped at odds of 1 to
+// 10.
+constexpr double test_spacing_of_r = 0.15;
 constexpr double agreeing_if_right = 0.5;
 constexpr double agreeing_by_chance = 0.08;
 constexpr double sure_log_odds = 6.9;
@@ -253,24 +255,20 @@ void HomeFinder::see(const HomingView& view) {
 
 void HomeFinder::test_hypothesis() {
   Hypothesis& tested = *hypothesis_;
-  if (tested.since_test_m < test_spacing_m) return;
+  const double spacing_m =
+      test_spacing_of_r * static_cast<double>(area_.model().typical_distance_m);
+  if (tested.since_test_m < spacing_m) return;
   tested.since_test_m = 0.0;
   const std::optional<Fix> fix = find_fix(tested.pose, *view_);
   if (fix) {
     correct_pose(tested.pose, *fix, tested.since_fix_m);
     tested.since_fix_m = 0.0;
     tested.log_odds += std::log(agreeing_if_right / agreeing_by_chance);
-  } else {
+  } else if (distance(tested.pose.pose().position(), {}) <= area_radius_m_) {
     tested.log_odds += std::log((1.0 - agreeing_if_right) / (1.0 - agreeing_by_chance));
   }
   tested.log_odds = std::min(tested.log_odds, max_log_odds);
-  if (tested.log_odds < wrong_log_odds) {
-    drop_hypothesis();
-  } else if (tested.log_odds >= sure_log_odds && !is_back_) {
-    by_odometry_ = tested.pose;
-    since_fix_m_ = tested.since_fix_m;
-    hypothesis_.reset();
-  }
+  if (tested.log_odds < wrong_log_odds) drop_hypothesis();
 }
 
 void HomeFinder::drop_hypothesis() {
@@ -344,7 +342,6 @@ ChainDecision HomeFinder::approach() {
 ChainDecision HomeFinder::decide() {
   if (state_ == ChainState::arrived || state_ == ChainState::lost) return {state_, 0, 0.0, 0.0};
   if (follower_) return view_ ? approach() : ChainDecision{state_, 0, 0.0, 0.0};
-  is_back_ = true;
   const double home_m = distance(estimate().pose().position(), {});
   const auto reach_m = static_cast<double>(area_.model().reach_m);
   const bool is_sure =

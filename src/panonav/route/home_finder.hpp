@@ -58,10 +58,10 @@ class DriftingPose {
 /// Leads a robot home that left it some way ago, by odometry. Where the error of odometry allows
 /// the robot to be in the home area, views are compared with the snapshots there; the one of the
 /// greatest confidence gives the pose. On the way out, such poses show the drift that odometry does
-/// not see. Where odometry is uncertain, a pose is a hypothesis until further views confirm it.
-/// Without one the robot searches along a spiral around home, up to the error of odometry. The last
-/// metre is led by a `ChainFollower` of the snapshot at home; the robot has arrived if that says so
-/// and the pose agrees.
+/// not see. Where odometry is uncertain, a pose is a hypothesis, which views of the area confirm or
+/// refute as long as it is used. Without one the robot searches along a spiral around home, up to
+/// the error of odometry. The last metre is led by a `ChainFollower` of the snapshot at home; the
+/// robot has arrived if that says so and the pose agrees.
 class HomeFinder {
  public:
   /// The robot is at home, at the heading of the learning walk's first view. Throws OptionError;
@@ -122,7 +122,6 @@ class HomeFinder {
   ChainState state_ = ChainState::travelling;
   std::unique_ptr<ChainFollower> follower_;  // of the last metre
   Pose2 moved_;                              // since the last decision of the follower
-  bool is_back_ = false;
   // The search.
   double search_radius_m_ = 0.0;
   double spiral_turn_m_ = 0.0;
