@@ -372,7 +372,7 @@ class Explorer::Implementation {
   int map_age_ = 0;  // observations since it was made
   std::optional<AnchoredPoint> target_;
   double target_area_m2_ = 0.0;
-  double covered_share_ = 1.0;           // of the areas that targets promise
+  double covered_share_ = 1.0;           // share of promised areas that views covered
   std::optional<HomingPursuit> homing_;  // to the start
   int contacts_ = 0;                     // on the way to the target
   int driving_back_ = 0;                 // observations since it drives back

@@ -34,9 +34,9 @@ constexpr double max_mismatch = 11.34;
 constexpr double pose_heading_error_rad = 0.35;
 // Views this far apart, as a part of R, test a hypothesis [Wald 1945, sequential probability ratio
 // test]: whether the pose of the next view agrees, which half of the views in the area do, and
-// elsewhere some of a hundred by chance. Nearer views are of the same surroundings, as of one aisle
-// of many, and agree in the same error. It counts at odds of 1000, and is dropped at odds of 1 to
-// 10.
+// elsewhere some of a hundred by chance. Nearer views show the same surroundings, such as an aisle
+// among many, and agree in the same error. It counts at odds of 1000, and is dropped at odds of 1
+// to 10.
 constexpr double test_spacing_of_r = 0.15;
 constexpr double agreeing_if_right = 0.5;
 constexpr double agreeing_by_chance = 0.08;
