@@ -257,14 +257,14 @@ ChainDirection choose_direction(bool back) {
 
 ChainSummary record_chain_of(const Dataset& dataset, const std::filesystem::path& memory,
                              const std::string& name, bool odometry, const ChainSpacing& spacing,
-                             int threads) {
+                             const ChainOdometry& chain_odometry, int threads) {
   InterruptibleExecutor executor(threads);
   MemoryFile file =
       memory_exists(memory)
           ? MemoryFile::open(memory, Access::read_write)
           : MemoryFile::create(memory, make_header_from_recording(dataset, {}, {}, executor));
   const DrivePoses drive = find_drive_poses(dataset, file, name, odometry, executor);
-  return summarise_chain(record_chain(file, name, drive, spacing, executor));
+  return summarise_chain(record_chain(file, name, drive, spacing, chain_odometry, executor));
 }
 
 void bind_chain_records(py::module_& m) {
@@ -328,17 +328,18 @@ void bind_chains(py::module_& m) {
          const std::optional<PictureSource>& source, bool odometry, int threads,
          const py::kwargs& keywords) {
         ChainSpacing spacing;
-        Keywords(keywords).options(spacing).finish();
+        ChainOdometry chain_odometry;
+        Keywords(keywords).options(spacing).options(chain_odometry).finish();
         const Dataset dataset = to_dataset_for_memory(memory, recording, source);
         const py::gil_scoped_release free;
-        return record_chain_of(dataset, memory, name, odometry, spacing, threads);
+        return record_chain_of(dataset, memory, name, odometry, spacing, chain_odometry, threads);
       },
       py::arg("memory"), py::arg("recording"), py::arg("name") = "route",
       py::arg("source") = py::none(), py::kw_only(), py::arg("odometry") = false,
       py::arg("threads") = 0,
       append_option_list("Records a route as a chain of snapshots, like `panonav route record "
                          "--method chain`.",
-                         {options_of<ChainSpacing>()})
+                         {options_of<ChainSpacing>(), options_of<ChainOdometry>()})
           .c_str());
   m.def(
       "follow_chain",

@@ -40,14 +40,18 @@ TEST_F(ChainVerbs, AChainIsRecordedListedAndFollowedInBothDirections) {
               chain["bytes"].get<double>() / chain["length_m"].get<double>(), 1e-6);
   const json cheap = record({"--name", "cheap", "--method", "chain", "--bytes-per-100-m", "2000"});
   EXPECT_LE(cheap["snapshots"], chain["snapshots"]);
+  const json exact = record({"--name", "exact", "--method", "chain", "--distance-error", "0.01",
+                             "--heading-error-rad-per-m", "0.001", "--drift", "0"});
+  EXPECT_LE(exact["snapshots"], chain["snapshots"]) << "odometry is trusted farther";
+  EXPECT_LT(exact["expected_offset_m"], chain["expected_offset_m"]);
   // The memory lists the reported values.
   const json routes = answer_of({"info", memory, "--json"})["routes"];
-  ASSERT_EQ(routes.size(), 3U);
-  EXPECT_EQ(routes[1]["name"], "home");
-  EXPECT_EQ(routes[1]["bytes"], chain["bytes"]);
-  EXPECT_EQ(routes[1]["spacing_m"], chain["spacing_m"]);
-  EXPECT_EQ(routes[1]["expected_offset_m"], chain["expected_offset_m"]);
-  EXPECT_EQ(routes[2]["method"], "panorama");
+  ASSERT_EQ(routes.size(), 4U);
+  EXPECT_EQ(routes[2]["name"], "home");
+  EXPECT_EQ(routes[2]["bytes"], chain["bytes"]);
+  EXPECT_EQ(routes[2]["spacing_m"], chain["spacing_m"]);
+  EXPECT_EQ(routes[2]["expected_offset_m"], chain["expected_offset_m"]);
+  EXPECT_EQ(routes[3]["method"], "panorama");
   const std::string text = run_panonav({"info", memory}).out;
   EXPECT_TRUE(contains(text, "bytes per metre")) << text;
   EXPECT_TRUE(contains(text, "expected offset")) << text;

@@ -57,7 +57,7 @@ TEST(SnapshotChain, PacksAndUnpacksToTheBit) {
   const auto bytes = chain.pack();
   // A header, snapshots, and three bytes for each leg.
   EXPECT_EQ(bytes.size(),
-            32 + chain.snapshots() * chain_shape.bytes() + 3 * (chain.nodes().size() - 1));
+            23 + chain.snapshots() * chain_shape.bytes() + 3 * (chain.nodes().size() - 1));
   EXPECT_NEAR(chain.bytes_per_100_m(), 100.0 * static_cast<double>(bytes.size()) / chain.length_m(),
               1e-9);
   const SnapshotChain unpacked = SnapshotChain::unpack(bytes);
@@ -70,9 +70,52 @@ TEST(SnapshotChain, HoldsElevationsAsItsPackedFormDoes) {
   SnapshotChain chain({}, band);
   chain.append({}, HomingView(8, 6, std::vector<float>(48), std::vector<float>(48), band));
   ASSERT_TRUE(chain.elevations().has_value());
-  EXPECT_NEAR(chain.elevations()->bottom_rad, band.bottom_rad, 1e-7);
-  EXPECT_NEAR(chain.elevations()->top_rad, band.top_rad, 1e-7);
+  constexpr double half_step_rad = 0.5 * ChainHeader::elevation_step_rad + 1e-7;
+  EXPECT_NEAR(chain.elevations()->bottom_rad, band.bottom_rad, half_step_rad);
+  EXPECT_NEAR(chain.elevations()->top_rad, band.top_rad, half_step_rad);
   EXPECT_EQ(SnapshotChain::unpack(chain.pack()), chain);
+  const ElevationBand sphere{-std::numbers::pi / 2.0, std::numbers::pi / 2.0};
+  const auto held = SnapshotChain({}, sphere).elevations();
+  ASSERT_TRUE(held.has_value());
+  EXPECT_NEAR(held->bottom_rad, sphere.bottom_rad, 1e-7);
+  EXPECT_NEAR(held->top_rad, sphere.top_rad, 1e-7);
+}
+
+TEST(SnapshotChain, HoldsTheErrorsOfOdometryToHalfAPercent) {
+  const ChainOdometry odometry{.distance_error = 0.03, .heading_error_rad_per_m = 0.01, .drift = 0};
+  SnapshotChain chain({}, std::nullopt, odometry);
+  chain.append({}, HomingView(8, 6, std::vector<float>(48), std::vector<float>(48)));
+  EXPECT_NEAR(chain.odometry().distance_error, 0.03, 0.004 * 0.03);
+  EXPECT_NEAR(chain.odometry().heading_error_rad_per_m, 0.01, 0.004 * 0.01);
+  EXPECT_EQ(chain.odometry().drift, 0.0);
+  EXPECT_EQ(SnapshotChain::unpack(chain.pack()), chain);
+  EXPECT_THROW(SnapshotChain({}, std::nullopt, {.drift = 1.5}), OptionError);
+}
+
+TEST(SnapshotChain, EndsOfARouteAreFine) {
+  const ToyWorld world = striped_round_room(6.0, 1);
+  const auto route = bend();
+  constexpr SnapshotShape coarse{.rows = 1, .components = 12, .bits = 4};
+  ChainRecorder recorder(coarse, {.max_spacing_m = 1.5});
+  // The chain must end well wherever the recording stops.
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    recorder.add(chain_view(world, route[i]), i == 0 ? Pose2{} : inverse(route[i - 1]) * route[i]);
+    const SnapshotChain chain = recorder.finish();
+    const auto nodes = chain.nodes();
+    std::size_t bytes = ChainHeader::bytes;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      EXPECT_EQ(nodes[n].is_fine, n == 0 || n + 1 == nodes.size()) << i;
+      bytes += nodes[n].snapshot.size() + (n > 0 ? ChainLeg::bytes : 0);
+      if (nodes[n].is_fine) EXPECT_EQ(nodes[n].snapshot.size(), make_fine(coarse).bytes());
+    }
+    const auto packed = chain.pack();
+    EXPECT_EQ(packed.size(), bytes);
+    EXPECT_EQ(SnapshotChain::unpack(packed), chain);
+    std::vector<ChainStop> stops(nodes.size());
+    const auto read = read_chain(packed, stops);
+    ASSERT_TRUE(read.has_value());
+    EXPECT_TRUE(read->stops.back().is_fine);
+  }
 }
 
 TEST(SnapshotChain, RoundingErrorsOfLegsDoNotAddUp) {
@@ -85,8 +128,8 @@ TEST(SnapshotChain, RoundingErrorsOfLegsDoNotAddUp) {
     place.x_m += random.uniform(-1.0, 5.0);
     place.y_m += random.uniform(-4.0, 4.0);
     chain.append(place, i % 3 == 0 ? std::optional(view) : std::nullopt);
-    // Half a centimetre along the leg, and half of 2 pi / 4096 of at most 6.5 m across.
-    EXPECT_LT(distance(chain.nodes().back().position, place), 0.0071);
+    // Half a centimetre along the leg, and half of 2 pi / 2048 of at most 6.5 m across.
+    EXPECT_LT(distance(chain.nodes().back().position, place), 0.0113);
   }
   chain.append(place, view);
   EXPECT_EQ(SnapshotChain::unpack(chain.pack()), chain);
@@ -102,15 +145,19 @@ TEST(SnapshotChain, RefusesBytesThatAreNotWritten) {
     EXPECT_THROW((void)SnapshotChain::unpack(changed), ContractError) << "byte " << index;
   };
   expect_refused(0, 0);      // magic number
-  expect_refused(4, 0);      // rows
-  expect_refused(5, 1);      // components
-  expect_refused(6, 9);      // bits
-  expect_refused(19, 0xBF);  // typical distance: negative
-  expect_refused(23, 0x7F);  // reach
-  expect_refused(27, 0x7F);  // arrived difference
-  expect_refused(31, 0x7F);  // homing confidence
-  expect_refused(32, 0);     // a snapshot without scale
-  const std::vector<std::size_t> sizes{0, 31, 32, 32 + chain_shape.bytes() + 2, bytes.size() - 1};
+  expect_refused(2, 0);      // rows
+  expect_refused(3, 1);      // components
+  expect_refused(4, 9);      // bits
+  expect_refused(10, 0xBF);  // typical distance: negative
+  expect_refused(12, 0x7F);  // reach
+  expect_refused(14, 0x7F);  // arrived difference
+  expect_refused(16, 0x7F);  // homing confidence
+  expect_refused(18, 0x7F);  // errors of distances
+  expect_refused(20, 0x7F);  // errors of the heading
+  expect_refused(22, 0x7F);  // drift
+  expect_refused(23, 0);     // a snapshot without scale
+  expect_refused(23 + chain_shape.bytes(), bytes[23 + chain_shape.bytes()] | 3U);  // kind of a node
+  const std::vector<std::size_t> sizes{0, 22, 23, 23 + chain_shape.bytes() + 2, bytes.size() - 1};
   for (const std::size_t size : sizes) {
     EXPECT_THROW((void)SnapshotChain::unpack(std::span(bytes).first(size)), ContractError) << size;
   }
@@ -277,7 +324,7 @@ Drive drive_in_side_light(std::uint64_t seed, double side_light, double& end_dif
   Drive driven;
   Pose2 moved;
   Pose2 robot = start;
-  for (int step = 0; step < 400; ++step) {
+  for (int step = 0; step < 1000; ++step) {
     const HomingView view = side_lit_view(world, robot, side_light, noise);
     const ChainDecision decision = follower.decide(view, moved);
     driven.state = decision.state;

@@ -201,7 +201,7 @@ TEST_F(MemoryFileAttack, IsNamed) {
       {"INSERT INTO routes VALUES('chain', 0, 3, row_sum('chain', 0, 3));"
        "INSERT INTO route_blocks VALUES('chain', 0, x'504E4331', blob_sum('chain', 0, "
        "x'504E4331'))",
-       "route chain: bytes of a chain is 4; allowed: > 32"},
+       "route chain: bytes of a chain is 4; allowed: > 23"},
       {"INSERT INTO routes VALUES('bomb', 16384, 51200, row_sum('bomb', 16384, 51200));"
        "WITH RECURSIVE n(i, b) AS (SELECT 0, bomb(256 * 16410) UNION ALL SELECT i + 1, b FROM n "
        "WHERE i < 199) INSERT INTO route_blocks SELECT 'bomb', i, b, blob_sum('bomb', i, b) FROM n",

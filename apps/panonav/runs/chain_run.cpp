@@ -81,10 +81,11 @@ std::string format_chain(const ChainSummary& chain, const Session& session) {
 }
 
 void record_chain_run(const NamedChain& chain, MemoryFile& memory, const DrivePoses& drive,
-                      std::size_t images, const ChainSpacing& spacing, Session& session) {
+                      std::size_t images, const ChainSpacing& spacing,
+                      const ChainOdometry& odometry, Session& session) {
   Progress bar(session, "recording", drive.drive.entries.size());
-  const ChainSummary summary = summarise_chain(
-      record_chain(memory, chain.name, drive, spacing, session.executor(), [&] { bar.advance(); }));
+  const ChainSummary summary = summarise_chain(record_chain(
+      memory, chain.name, drive, spacing, odometry, session.executor(), [&] { bar.advance(); }));
   bar.clear();
   const std::size_t without_pose = images - drive.drive.entries.size();
   if (session.json()) {

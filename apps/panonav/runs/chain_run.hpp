@@ -27,7 +27,8 @@ struct NamedChain {
 /// Records a drive as a chain of snapshots and prints the result. Throws as
 /// `panonav::record_chain`. `images`: number of images of the recording, with those without pose.
 void record_chain_run(const NamedChain& chain, MemoryFile& memory, const DrivePoses& drive,
-                      std::size_t images, const ChainSpacing& spacing, Session& session);
+                      std::size_t images, const ChainSpacing& spacing,
+                      const ChainOdometry& odometry, Session& session);
 
 /// One image of a run along a chain, and the motion that follows from it.
 struct ChainStep {

@@ -33,6 +33,7 @@ struct RecordArguments {
   HorizonScanlineOptions line;
   std::optional<std::string> method;
   ChainSpacing chain;
+  ChainOdometry chain_odometry;
 
   [[nodiscard]] bool is_chain() const { return method == "chain"; }
 };
@@ -289,7 +290,7 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   if (arguments.is_chain()) {
     remove_if_failing([&] {
       record_chain_run({arguments.memory, arguments.name}, *memory, drive, dataset.entries.size(),
-                       arguments.chain, session);
+                       arguments.chain, arguments.chain_odometry, session);
     });
     return ExitCode::done;
   }
@@ -339,8 +340,10 @@ Run declare_route_record(Arguments& arguments) {
                    "What is stored: lines of pixels (panorama, default), or a chain of small "
                    "snapshots with odometry between them, of some bytes a metre");
   arguments.options("chain", values->chain);
+  arguments.options("chain_odometry", values->chain_odometry);
   arguments.reject_options_unless(
-      {"[chain]"}, [values] { return values->is_chain(); }, "without --method chain");
+      {"[chain]", "[chain_odometry]"}, [values] { return values->is_chain(); },
+      "without --method chain");
   arguments.reject_options_unless(
       {"--every-m", "--horizon-rows", "--report", "[line]"},
       [values] { return !values->is_chain(); }, "with --method chain");
@@ -362,9 +365,11 @@ Verb route_record_verb() {
       "recording that starts at the end of the route extends the route. Its poses are those of "
       "the data set or of the memory's map; those of odometry or images alone are in a frame of "
       "the route's own, which is not that of the views. With --method chain, the verb stores a "
-      "few small snapshots instead, along which a robot with odometry drives there and back.",
+      "few small snapshots instead, along which a robot with odometry drives there and back. The "
+      "smaller the stated errors of its odometry, the fewer snapshots it needs.",
       "  panonav route record office.panonav teach_run\n"
-      "  panonav route record office.panonav teach_run --name home --method chain\n"
+      "  panonav route record office.panonav teach_run --name home --method chain "
+      "--heading-error-rad-per-m 0.01 --drift 0\n"
       "  panonav route record office.panonav teach_run --name corridor --odometry --report "
       "corridor",
       declare_route_record};

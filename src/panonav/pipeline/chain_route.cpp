@@ -22,7 +22,7 @@ ChainSummary summarise_chain(const SnapshotChain& chain) {
   if (summary.snapshots > 1) {
     summary.spacing_m = summary.length_m / static_cast<double>(summary.snapshots - 1);
   }
-  summary.expected_offset_m = ChainOdometry{}.position_error_m(summary.spacing_m);
+  summary.expected_offset_m = chain.odometry().position_error_m(summary.spacing_m);
   return summary;
 }
 
@@ -67,10 +67,10 @@ void add_drive(const MemoryFile& memory, const DrivePoses& drive, Executor& exec
 }  // namespace
 
 SnapshotChain record_chain(MemoryFile& memory, const std::string& name, const DrivePoses& drive,
-                           const ChainSpacing& spacing, Executor& executor,
-                           const std::function<void()>& progress) {
+                           const ChainSpacing& spacing, const ChainOdometry& odometry,
+                           Executor& executor, const std::function<void()>& progress) {
   check_new_chain(memory, name, drive);
-  ChainRecorder recorder(limit_shape({}, memory), spacing);
+  ChainRecorder recorder(limit_shape({}, memory), spacing, odometry);
   add_drive(memory, drive, executor, progress,
             [&](const HomingView& view, const Pose2& moved) { recorder.add(view, moved); });
   SnapshotChain chain = recorder.finish();

@@ -28,8 +28,8 @@ struct ChainSummary {
   std::uint64_t bytes = 0;     ///< of the packed form
   double bytes_per_m = 0.0;    ///< 0 for a chain without length
   double spacing_m = 0.0;      ///< mean distance between snapshots along the legs; 0: one snapshot
-  /// Offset to be expected from the errors of odometry, as `ChainOdometry` limits them, after
-  /// travelling `spacing_m` from a snapshot.
+  /// Offset to be expected from the errors of odometry, as the chain limits them, after travelling
+  /// `spacing_m` from a snapshot.
   double expected_offset_m = 0.0;
 };
 /// Computes the size and spacing of a chain. Throws ContractError as `SnapshotChain::pack`.
@@ -41,8 +41,8 @@ struct ChainSummary {
 /// FileError if the memory has a route of that name, if poses are in view steps, or on an image
 /// that cannot be read; OptionError.
 SnapshotChain record_chain(MemoryFile& memory, const std::string& name, const DrivePoses& drive,
-                           const ChainSpacing& spacing, Executor& executor,
-                           const std::function<void()>& progress = {});
+                           const ChainSpacing& spacing, const ChainOdometry& odometry,
+                           Executor& executor, const std::function<void()>& progress = {});
 
 /// Decides the motions of a robot along a stored chain, observation by observation.
 class ChainGuide {

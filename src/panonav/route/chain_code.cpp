@@ -15,8 +15,14 @@ std::uint32_t read_number(std::span<const std::uint8_t> bytes) noexcept {
   return value;
 }
 
-float read_float(std::span<const std::uint8_t> bytes, std::size_t offset) noexcept {
-  return std::bit_cast<float>(read_number(bytes.subspan(offset, 4)));
+// Reads the upper half of a float.
+float read_half(std::span<const std::uint8_t> bytes, std::size_t offset) noexcept {
+  return std::bit_cast<float>(read_number(bytes.subspan(offset, 2)) << 16U);
+}
+
+float read_elevation(std::span<const std::uint8_t> bytes, std::size_t offset) noexcept {
+  const auto steps = static_cast<std::int16_t>(read_number(bytes.subspan(offset, 2)));
+  return static_cast<float>(steps * ChainHeader::elevation_step_rad);
 }
 
 }  // namespace
@@ -41,32 +47,40 @@ Point2 ChainLeg::step() const noexcept {
 
 ChainHeader decode_header(std::span<const std::uint8_t> bytes) noexcept {
   ChainHeader header;
-  header.magic_found = read_number(bytes.first(4));
-  header.shape = {bytes[4], bytes[5], static_cast<int>(read_number(bytes.subspan(6, 2)))};
-  header.bottom_rad = read_float(bytes, 8);
-  header.top_rad = read_float(bytes, 12);
-  header.model = {read_float(bytes, 16), read_float(bytes, 20), read_float(bytes, 24),
-                  read_float(bytes, 28)};
+  header.magic_found = read_number(bytes.first(2));
+  header.shape = {bytes[2], bytes[3], bytes[4]};
+  header.bottom_rad = read_elevation(bytes, 5);
+  header.top_rad = read_elevation(bytes, 7);
+  header.model = {read_half(bytes, 9), read_half(bytes, 11), read_half(bytes, 13),
+                  read_half(bytes, 15)};
+  header.odometry = {static_cast<double>(read_half(bytes, 17)),
+                     static_cast<double>(read_half(bytes, 19)),
+                     static_cast<double>(read_half(bytes, 21))};
   return header;
 }
 
 std::optional<ChainStop> ChainCursor::next() noexcept {
-  bool has_snapshot = true;
+  auto kind = ChainNodeKind::fine_snapshot;  // that of the first node
   if (!is_first_) {
     if (rest_.size() < ChainLeg::bytes) return std::nullopt;
     const std::uint32_t packed = read_number(rest_.first(ChainLeg::bytes));
-    has_snapshot = (packed & 1U) != 0;
-    leg_ = {packed >> 1U & ChainLeg::max_distance, packed >> 12U};
+    if ((packed & 3U) > static_cast<std::uint32_t>(ChainNodeKind::fine_snapshot)) {
+      return std::nullopt;
+    }
+    kind = static_cast<ChainNodeKind>(packed & 3U);
+    leg_ = {packed >> 2U & ChainLeg::max_distance, packed >> 13U};
     const Point2 step = leg_.step();
     position_ = {position_.x_m + step.x_m, position_.y_m + step.y_m};
     rest_ = rest_.subspan(ChainLeg::bytes);
   }
   is_first_ = false;
   ChainStop stop{position_};
-  if (!has_snapshot) return stop;
-  if (rest_.size() < snapshot_bytes_) return std::nullopt;
+  if (kind == ChainNodeKind::way_point) return stop;
+  stop.is_fine = kind == ChainNodeKind::fine_snapshot;
+  const std::size_t snapshot_bytes = (stop.is_fine ? make_fine(shape_) : shape_).bytes();
+  if (rest_.size() < snapshot_bytes) return std::nullopt;
   stop.snapshot = rest_.data();
-  rest_ = rest_.subspan(snapshot_bytes_);
+  rest_ = rest_.subspan(snapshot_bytes);
   return stop;
 }
 

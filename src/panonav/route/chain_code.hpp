@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <optional>
 #include <span>
 
@@ -41,11 +42,11 @@ struct ChainModel {
   friend bool operator==(const ChainModel&, const ChainModel&) = default;
 };
 
-/// A straight step between two nodes, as its 23 bits say.
+/// A straight step between two nodes, as its 22 bits say.
 struct ChainLeg {
   static constexpr std::size_t bytes = 3;              ///< of the packed form, with the kind of end
   static constexpr std::uint32_t max_distance = 2047;  ///< 11 bits, in centimetres
-  static constexpr std::uint32_t directions = 4096;    ///< 12 bits for a full turn
+  static constexpr std::uint32_t directions = 2048;    ///< 11 bits for a full turn
   std::uint32_t distance = 0;                          ///< in centimetres
   std::uint32_t direction = 0;                         ///< counter-clockwise from the x axis
 
@@ -57,6 +58,7 @@ struct ChainLeg {
 struct ChainStop {
   Point2 position;                         ///< in the frame of the recording's odometry
   const std::uint8_t* snapshot = nullptr;  ///< nullptr: a way point
+  bool is_fine = false;                    ///< the snapshot has the shape of `make_fine`
 
   /// True for the place of a snapshot, false for a way point.
   [[nodiscard]] bool has_snapshot() const noexcept { return snapshot != nullptr; }
@@ -64,14 +66,20 @@ struct ChainStop {
 
 /// Values of a chain that all nodes share.
 struct ChainHeader {
-  static constexpr std::uint32_t magic = 0x31434E50;  ///< "PNC1": magic and version
-  static constexpr std::size_t bytes = 32;            ///< size of the packed header
-  std::uint32_t magic_found = 0;                      ///< the first four bytes
-  SnapshotShape shape;                                ///< of all snapshots
-  float bottom_rad = 0.0F;  ///< lowest elevation of the rows; unknown if both are 0
-  float top_rad = 0.0F;     ///< highest elevation of the rows
-  ChainModel model;         ///< learnt while recording
+  static constexpr std::uint32_t magic = 0x4350;  ///< "PC"
+  static constexpr std::size_t bytes = 23;        ///< size of the packed header
+  /// A step of the packed elevations: 32,767 are a right angle.
+  static constexpr double elevation_step_rad = std::numbers::pi / 65'534.0;
+  std::uint32_t magic_found = 0;  ///< the first two bytes
+  SnapshotShape shape;            ///< of the snapshots that are not fine
+  float bottom_rad = 0.0F;        ///< lowest elevation of the rows; unknown if both are 0
+  float top_rad = 0.0F;           ///< highest elevation of the rows
+  ChainModel model;               ///< learnt while recording
+  ChainOdometry odometry;         ///< on which the spacing relies
 };
+
+/// The kinds of nodes, as the lowest two bits of a packed leg say them.
+enum class ChainNodeKind : std::uint8_t { way_point = 0, snapshot = 1, fine_snapshot = 2 };
 
 /// Reads the header. The caller guarantees `ChainHeader::bytes` bytes.
 [[nodiscard]] ChainHeader decode_header(std::span<const std::uint8_t> bytes) noexcept;
@@ -81,7 +89,7 @@ class ChainCursor {
  public:
   /// `bytes` include the header and outlive the cursor and the snapshots of its nodes.
   ChainCursor(std::span<const std::uint8_t> bytes, const SnapshotShape& shape) noexcept
-      : rest_(bytes.subspan(ChainHeader::bytes)), snapshot_bytes_(shape.bytes()) {}
+      : rest_(bytes.subspan(ChainHeader::bytes)), shape_(shape) {}
 
   /// Returns the next node; nullopt if the bytes end before it does.
   [[nodiscard]] std::optional<ChainStop> next() noexcept;
@@ -92,7 +100,7 @@ class ChainCursor {
 
  private:
   std::span<const std::uint8_t> rest_;
-  std::size_t snapshot_bytes_;
+  SnapshotShape shape_;
   ChainLeg leg_;
   Point2 position_;
   bool is_first_ = true;

@@ -14,7 +14,8 @@ std::vector<ChainStop> make_stops(const SnapshotChain& chain) {
   require(chain.nodes().back().has_snapshot(), "snapshots of the last node", 0.0, "1");
   std::vector<ChainStop> stops;
   for (const ChainNode& node : chain.nodes()) {
-    stops.push_back({node.position, node.has_snapshot() ? node.snapshot.data() : nullptr});
+    stops.push_back(
+        {node.position, node.has_snapshot() ? node.snapshot.data() : nullptr, node.is_fine});
   }
   return stops;
 }
@@ -34,13 +35,12 @@ void visit_options(ChainFollowerOptions& options, OptionVisitor& visitor) {
 }
 
 ChainFollower::ChainFollower(SnapshotChain chain, ChainDirection direction,
-                             const ChainFollowerOptions& options, const ChainOdometry& odometry)
+                             const ChainFollowerOptions& options)
     : chain_(std::move(chain)),
       stops_(make_stops(chain_)),
       workspace_(ChainPilot::workspace_size(chain_.shape())),
-      pilot_({chain_.header(), stops_}, workspace_, direction, options, odometry) {
+      pilot_({chain_.header(), stops_}, workspace_, direction, options) {
   validate(options);
-  validate(odometry);
 }
 
 ChainDecision ChainFollower::decide(const HomingView& view, const Pose2& moved) {

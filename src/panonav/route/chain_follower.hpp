@@ -18,7 +18,7 @@ class ChainFollower {
  public:
   /// Throws OptionError; ContractError on a chain without nodes.
   ChainFollower(SnapshotChain chain, ChainDirection direction,
-                const ChainFollowerOptions& options = {}, const ChainOdometry& odometry = {});
+                const ChainFollowerOptions& options = {});
   ChainFollower(const ChainFollower&) = delete;  // the pilot refers to the chain
   ChainFollower& operator=(const ChainFollower&) = delete;
   ChainFollower(ChainFollower&&) = default;

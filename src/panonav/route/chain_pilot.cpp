@@ -21,6 +21,8 @@ constexpr double near_length = 0.1;
 // snapshot no farther than this from the end of homing: if both are as much off, at half a metre.
 constexpr double converged_length = 2.0 * near_length;
 constexpr double arrival_radius_m = 0.35;
+// A robot has arrived this near to the last snapshot.
+constexpr double end_radius_m = 0.5;
 // A way point is reached at this distance, the tolerance of the legs.
 constexpr double way_point_radius_m = 0.15;
 // Half of the window of headings beyond the error of odometry: the error of the compass at a
@@ -55,8 +57,9 @@ CoefficientView ChainPilot::snapshot_view(std::size_t node) const noexcept {
   const std::size_t size = workspace_size(header.shape) / 2;
   const std::span cosines = workspace_.first(size);
   const std::span sines = workspace_.subspan(size, size);
-  decode_snapshot({route_.stops[node].snapshot, header.shape.bytes()}, header.shape, cosines,
-                  sines);
+  const ChainStop& stop = route_.stops[node];
+  const SnapshotShape shape = stop.is_fine ? make_fine(header.shape) : header.shape;
+  decode_snapshot({stop.snapshot, shape.bytes()}, shape, cosines, sines);
   return {.rows = header.shape.rows,
           .components = header.shape.components,
           .all_cosines = cosines.data(),
@@ -85,7 +88,7 @@ std::optional<std::size_t> ChainPilot::next_snapshot(std::size_t node) const noe
 double ChainPilot::error_m() const noexcept {
   const double fix_m = near_length * static_cast<double>(route_.header.model.typical_distance_m);
   const double driven_m = spiral_points_ == 0 ? since_fix_m_ : fix_to_search_m_;
-  return portable::hypot(fix_m, odometry_.position_error_m(driven_m));
+  return portable::hypot(fix_m, odometry().position_error_m(driven_m));
 }
 
 double ChainPilot::path_to_target_m() const {
@@ -98,7 +101,7 @@ double ChainPilot::path_to_target_m() const {
 
 SnapshotSight ChainPilot::look_at(std::size_t node, const CoefficientView& view,
                                   bool any_heading) noexcept {
-  const double half_rad = compass_error_rad + odometry_.heading_error_rad(since_fix_m_);
+  const double half_rad = compass_error_rad + odometry().heading_error_rad(since_fix_m_);
   HeadingWindow window;
   if (!any_heading && half_rad < std::numbers::pi) {
     window = {static_cast<float>(-pose_.heading_rad), static_cast<float>(half_rad)};
@@ -192,11 +195,11 @@ void ChainPilot::learn_drift(const Pose2& fixed) {
   drift_m_per_m_.y_m += learning_gain * off.y_m / size;
   scale_error_ += learning_gain * (off.x_m * moved.x_m + off.y_m * moved.y_m) / size;
   const double drift = portable::hypot(drift_m_per_m_.x_m, drift_m_per_m_.y_m);
-  const double factor = drift > 0.0 ? std::min(1.0, 2.0 * odometry_.drift / drift) : 1.0;
+  const double factor = drift > 0.0 ? std::min(1.0, 2.0 * odometry().drift / drift) : 1.0;
   drift_m_per_m_ = {factor * drift_m_per_m_.x_m, factor * drift_m_per_m_.y_m};
-  const double max_scale = 2.0 * odometry_.distance_error;
+  const double max_scale = 2.0 * odometry().distance_error;
   scale_error_ = std::clamp(scale_error_, -max_scale, max_scale);
-  const double max_turn = 2.0 * odometry_.heading_error_rad_per_m;
+  const double max_turn = 2.0 * odometry().heading_error_rad_per_m;
   turn_rad_per_m_ = std::clamp(
       turn_rad_per_m_ +
           learning_gain * wrap_angle(fixed.heading_rad - heading_by_odometry_rad_) / since_fix_m_,
@@ -304,10 +307,13 @@ ChainDecision ChainPilot::home(const CoefficientView& view) {
   const auto r_m = static_cast<double>(route_.header.model.typical_distance_m);
   const bool is_too_far = portable_distance(pose_.position(), position(target_)) >
                           options_.error_factor * error_m() + r_m * near_length;
+  const std::optional<std::size_t> next = next_snapshot(target_);
+  // Images differ the more the farther the robot is from a snapshot: those called similar were
+  // taken up to `near_length` away, which is too far from the end where R is large.
+  const double end_factor = next ? 1.0 : std::min(1.0, end_radius_m / (near_length * r_m));
   const bool is_beside =
       !is_too_far &&
-      sight.difference <= static_cast<double>(route_.header.model.arrived_difference);
-  const std::optional<std::size_t> next = next_snapshot(target_);
+      sight.difference <= end_factor * static_cast<double>(route_.header.model.arrived_difference);
   approach_confidence_ = std::max(approach_confidence_, sight.confidence);
   approach_.add_difference(sight.difference);
   const double advance_m = approach_.next_m(vector, r_m, options_.max_step_m);

@@ -57,8 +57,8 @@ struct ChainFollowerOptions {
 /// it homes, which resets the drift of position and heading and shows the systematic errors of the
 /// odometry. A snapshot that is not found is searched for along a spiral up to the error of the
 /// odometry; without success the robot is lost. It has arrived only where homing ended at a view as
-/// similar to the last snapshot as those beside snapshots while recording, or, in other light,
-/// where confident home vectors vanish within 0.35 m of the last snapshot by odometry.
+/// similar to the last snapshot as those within half a metre of snapshots while recording, or, in
+/// other light, where confident home vectors vanish within 0.35 m of the last snapshot by odometry.
 class ChainPilot {
  public:
   /// Returns the size of the workspace that a pilot needs.
@@ -69,12 +69,8 @@ class ChainPilot {
   /// The stops, their snapshots and the workspace outlive the pilot. The caller guarantees options
   /// in their ranges, and at least one stop, the first and the last with a snapshot.
   ChainPilot(const ChainRoute& route, std::span<float> workspace, ChainDirection direction,
-             const ChainFollowerOptions& options = {}, const ChainOdometry& odometry = {}) noexcept
-      : route_(route),
-        workspace_(workspace),
-        direction_(direction),
-        options_(options),
-        odometry_(odometry) {}
+             const ChainFollowerOptions& options = {}) noexcept
+      : route_(route), workspace_(workspace), direction_(direction), options_(options) {}
 
   /// Decides the next motion after the motion `moved` since the last view
   /// (robot_old_from_robot_new, by odometry; ignored for the first view). `view` has the shape of
@@ -93,6 +89,7 @@ class ChainPilot {
   [[nodiscard]] Point2 position(std::size_t node) const noexcept {
     return route_.stops[node].position;
   }
+  [[nodiscard]] const ChainOdometry& odometry() const noexcept { return route_.header.odometry; }
   [[nodiscard]] double error_m() const noexcept;
   [[nodiscard]] double path_to_target_m() const;
   [[nodiscard]] SnapshotSight look_at(std::size_t node, const CoefficientView& view,
@@ -121,7 +118,6 @@ class ChainPilot {
   std::span<float> workspace_;
   ChainDirection direction_;
   ChainFollowerOptions options_;
-  ChainOdometry odometry_;
   ChainState state_ = ChainState::travelling;
   bool has_started_ = false;
   // The last comparison of the present view.

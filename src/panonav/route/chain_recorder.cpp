@@ -62,9 +62,8 @@ void visit_options(ChainSpacing& spacing, OptionVisitor& visitor) {
 
 ChainRecorder::ChainRecorder(const SnapshotShape& shape, const ChainSpacing& spacing,
                              const ChainOdometry& odometry)
-    : spacing_(spacing), odometry_(odometry), chain_(shape) {
+    : spacing_(spacing), chain_(shape, std::nullopt, odometry) {
   validate(spacing_);
-  validate(odometry_);
   const double fewest = 100.0 * bytes_per_snapshot() / spacing_.max_spacing_m;
   require(spacing_.bytes_per_100_m == 0.0 || spacing_.bytes_per_100_m >= fewest, "bytes_per_100_m",
           spacing_.bytes_per_100_m,
@@ -83,7 +82,7 @@ double ChainRecorder::min_spacing_m() const noexcept {
 }
 
 bool ChainRecorder::can_home(const StoredView& from, const StoredView& to) const {
-  const HomeVector vector = home_vector(to.view, from.view, {}, compared_headings);
+  const HomeVector vector = home_vector(to.snapshot, from.view, {}, compared_headings);
   return vector.length() > 0.0 &&
          is_right_direction(vector.direction_rad(), from.position, to.position);
 }
@@ -92,7 +91,7 @@ bool ChainRecorder::can_home(const StoredView& from, const StoredView& to) const
 // in both directions.
 bool ChainRecorder::can_be_reached(std::size_t index) const {
   const StoredView& view = views_[index];
-  const double error_m = odometry_.position_error_m(view.path_m);
+  const double error_m = chain_.odometry().position_error_m(view.path_m);
   for (std::size_t i = 1; i < index; ++i) {
     const StoredView& other = views_[i];
     const auto must_reach = [&](const StoredView& to) {
@@ -108,17 +107,19 @@ bool ChainRecorder::can_be_reached(std::size_t index) const {
 std::size_t ChainRecorder::add(const HomingView& view, const Pose2& moved) {
   require(is_finite(moved), "motion between views", moved.x_m, "finite");
   if (views_.empty()) {
-    chain_ = SnapshotChain(chain_.shape(), view.elevations());
+    chain_ = SnapshotChain(chain_.shape(), view.elevations(), chain_.odometry());
     const HomingView reduced = reduce_view(view, chain_.shape().rows, chain_.shape().components);
     chain_.append({}, reduced);
-    views_.push_back({chain_.view(0), {}, 0.0});
+    views_.push_back({reduced, chain_.view(0), {}, 0.0});
     return 1;
   }
   odometry_from_robot_ = odometry_from_robot_ * moved;
   path_m_ += std::hypot(moved.x_m, moved.y_m);
   if (path_m_ - views_.back().path_m < kept_view_spacing_m) return chain_.snapshots();
   const HomingView reduced = reduce_view(view, chain_.shape().rows, chain_.shape().components);
-  views_.push_back({rotate(reduced, -odometry_from_robot_.heading_rad),
+  const HomingView level = rotate(reduced, -odometry_from_robot_.heading_rad);
+  const SnapshotShape& shape = chain_.shape();
+  views_.push_back({level, unpack_snapshot(pack_snapshot(level, shape), shape, level.elevations()),
                     odometry_from_robot_.position(), path_m_});
   const std::size_t last = views_.size() - 1;
   if (path_m_ >= min_spacing_m() && path_m_ <= spacing_.max_spacing_m && can_be_reached(last)) {
@@ -180,6 +181,7 @@ SnapshotChain ChainRecorder::finish() const {
   ChainRecorder ended = *this;
   if (reachable_ > 0 && reachable_ + 1 < views_.size()) ended.take_snapshot(reachable_);
   if (ended.views_.size() > 1) ended.take_snapshot(ended.views_.size() - 1);
+  if (!ended.views_.empty()) ended.chain_.refine_last(ended.views_.back().view);
   ended.chain_.set_model(learn_chain_model(ended.pairs_, ended.reaches_m_));
   return ended.chain_;
 }

@@ -25,7 +25,7 @@ void visit_options(ChainSpacing& spacing, OptionVisitor& visitor);
 /// Memorises a route while the robot drives it. The next snapshot is taken as far from the last one
 /// as homing reaches and odometry may be trusted: the error of odometry over the way from the one
 /// to the other is at most the distance from which the home vectors of all views between them point
-/// to the snapshot, ahead of it and behind it. So it is wide in a hall and narrow in a
+/// to the packed snapshot, ahead of it and behind it. So it is wide in a hall and narrow in a
 /// doorway. Where the path bends, way points of 3 bytes keep the legs near it.
 ///
 /// Memory: the reduced views since the last snapshot, one per 0.1 m, and 40 bytes for each compared
@@ -51,6 +51,7 @@ class ChainRecorder {
   /// A reduced view since the last snapshot, turned to heading 0.
   struct StoredView {
     HomingView view;
+    HomingView snapshot;  // the view as a chain would hold it
     Point2 position;
     double path_m = 0.0;  // since the last snapshot
   };
@@ -62,7 +63,6 @@ class ChainRecorder {
   void compare_with_snapshot(std::size_t index);
 
   ChainSpacing spacing_;
-  ChainOdometry odometry_;
   SnapshotChain chain_;
   std::vector<StoredView> views_;  // the first one is the last snapshot
   std::vector<SnapshotPair> pairs_;

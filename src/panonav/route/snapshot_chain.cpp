@@ -25,14 +25,32 @@ ChainLeg make_leg(Point2 from, Point2 to) {
       static_cast<std::uint32_t>(direction % ChainLeg::directions)};
 }
 
+std::uint32_t kind_bits(const ChainNode& node) {
+  auto kind = ChainNodeKind::way_point;
+  if (node.has_snapshot()) {
+    kind = node.is_fine ? ChainNodeKind::fine_snapshot : ChainNodeKind::snapshot;
+  }
+  return static_cast<std::uint32_t>(kind);
+}
+
 void write_number(std::vector<std::uint8_t>& bytes, std::uint32_t value, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i) & 0xFFU));
   }
 }
 
-void write_float(std::vector<std::uint8_t>& bytes, double value) {
-  write_number(bytes, std::bit_cast<std::uint32_t>(static_cast<float>(value)), 4);
+// Returns the bits of the upper half of the nearest float that has no lower half.
+std::uint32_t half_bits(double value) {
+  return (std::bit_cast<std::uint32_t>(static_cast<float>(value)) + 0x8000U) >> 16U;
+}
+
+float round_to_half(double value) {
+  return std::bit_cast<float>(half_bits(value) << 16U);
+}
+
+std::uint32_t elevation_bits(double elevation_rad) {
+  return static_cast<std::uint32_t>(std::llround(elevation_rad / ChainHeader::elevation_step_rad)) &
+         0xFFFFU;
 }
 
 void check_model(const ChainModel& model) {
@@ -46,9 +64,6 @@ void check_model(const ChainModel& model) {
   check("homing confidence of a chain", model.homing_confidence, -1.0F, 1.0F);
 }
 
-// Position of the elevations in a packed header.
-constexpr std::size_t header_elevations = 8;
-
 // Returns the band that a header says.
 std::optional<ElevationBand> make_band(float bottom_rad, float top_rad) {
   if (bottom_rad == 0.0F && top_rad == 0.0F) return std::nullopt;
@@ -60,15 +75,21 @@ std::optional<ElevationBand> make_band(float bottom_rad, float top_rad) {
   return band;
 }
 
-// Returns the band as the packed form says it, in floats.
+// Returns the band as the packed form says it.
 std::optional<ElevationBand> round_band(const std::optional<ElevationBand>& band) {
   if (!band) return std::nullopt;
-  std::vector<std::uint8_t> packed(header_elevations);
-  write_float(packed, band->bottom_rad);
-  write_float(packed, band->top_rad);
-  packed.resize(ChainHeader::bytes);
-  const ChainHeader header = decode_header(packed);
-  return make_band(header.bottom_rad, header.top_rad);
+  const auto round = [](double elevation_rad) {
+    const auto steps = static_cast<std::int16_t>(elevation_bits(elevation_rad));
+    return static_cast<float>(steps * ChainHeader::elevation_step_rad);
+  };
+  return make_band(round(band->bottom_rad), round(band->top_rad));
+}
+
+ChainOdometry round_odometry(const ChainOdometry& odometry) {
+  validate(odometry);
+  const auto round = [](double value) { return static_cast<double>(round_to_half(value)); };
+  return {round(odometry.distance_error), round(odometry.heading_error_rad_per_m),
+          round(odometry.drift)};
 }
 
 }  // namespace
@@ -87,14 +108,16 @@ void visit_options(ChainOdometry& odometry, OptionVisitor& visitor) {
 }
 
 SnapshotChain::SnapshotChain(const SnapshotShape& shape,
-                             const std::optional<ElevationBand>& elevations)
-    : shape_(shape), elevations_(round_band(elevations)) {
+                             const std::optional<ElevationBand>& elevations,
+                             const ChainOdometry& odometry)
+    : shape_(shape), elevations_(round_band(elevations)), odometry_(round_odometry(odometry)) {
   validate(shape_);
+  set_model({});
 }
 
-void SnapshotChain::append(Point2 position, const std::optional<HomingView>& view) {
-  ChainNode node;
-  if (view) node.snapshot = pack_snapshot(*view, shape_);
+void SnapshotChain::append(Point2 position, const std::optional<HomingView>& view, bool is_fine) {
+  ChainNode node{.is_fine = view && (is_fine || nodes_.empty())};
+  if (view) node.snapshot = pack_snapshot(*view, shape_of(node.is_fine));
   if (nodes_.empty()) {
     require(node.has_snapshot(), "snapshots of the first node of a chain", 0.0, "1");
   } else {
@@ -105,13 +128,22 @@ void SnapshotChain::append(Point2 position, const std::optional<HomingView>& vie
   nodes_.push_back(std::move(node));
 }
 
+void SnapshotChain::refine_last(const HomingView& view) {
+  require(!nodes_.empty() && nodes_.back().has_snapshot(), "snapshots of the last node", 0.0, "1");
+  nodes_.back().snapshot = pack_snapshot(view, make_fine(shape_));
+  nodes_.back().is_fine = true;
+}
+
 void SnapshotChain::set_model(const ChainModel& model) {
   check_model(model);
-  model_ = model;
+  const auto round = [](float value) { return round_to_half(static_cast<double>(value)); };
+  model_ = {round(model.typical_distance_m), round(model.reach_m), round(model.arrived_difference),
+            round(model.homing_confidence)};
 }
 
 ChainHeader SnapshotChain::header() const noexcept {
-  ChainHeader header{.magic_found = ChainHeader::magic, .shape = shape_, .model = model_};
+  ChainHeader header{
+      .magic_found = ChainHeader::magic, .shape = shape_, .model = model_, .odometry = odometry_};
   if (elevations_) {
     header.bottom_rad = static_cast<float>(elevations_->bottom_rad);
     header.top_rad = static_cast<float>(elevations_->top_rad);
@@ -122,7 +154,7 @@ ChainHeader SnapshotChain::header() const noexcept {
 HomingView SnapshotChain::view(std::size_t node) const {
   require(node < nodes_.size() && nodes_[node].has_snapshot(), "node with a snapshot",
           static_cast<double>(node), "a node of the chain with a snapshot");
-  return unpack_snapshot(nodes_[node].snapshot, shape_, elevations_);
+  return unpack_snapshot(nodes_[node].snapshot, shape_of(nodes_[node].is_fine), elevations_);
 }
 
 std::size_t SnapshotChain::snapshots() const noexcept {
@@ -147,21 +179,25 @@ std::vector<std::uint8_t> SnapshotChain::pack() const {
   require(!nodes_.empty() && nodes_.back().has_snapshot(), "snapshots of the last node of a chain",
           0.0, "1");
   std::vector<std::uint8_t> bytes;
-  write_number(bytes, ChainHeader::magic, 4);
-  write_number(bytes, static_cast<std::uint32_t>(shape_.rows), 1);
-  write_number(bytes, static_cast<std::uint32_t>(shape_.components), 1);
-  write_number(bytes, static_cast<std::uint32_t>(shape_.bits), 2);
-  write_float(bytes, elevations_ ? elevations_->bottom_rad : 0.0);
-  write_float(bytes, elevations_ ? elevations_->top_rad : 0.0);
+  write_number(bytes, ChainHeader::magic, 2);
+  for (const int value : {shape_.rows, shape_.components, shape_.bits}) {
+    write_number(bytes, static_cast<std::uint32_t>(value), 1);
+  }
+  write_number(bytes, elevation_bits(elevations_ ? elevations_->bottom_rad : 0.0), 2);
+  write_number(bytes, elevation_bits(elevations_ ? elevations_->top_rad : 0.0), 2);
   for (const float value : {model_.typical_distance_m, model_.reach_m, model_.arrived_difference,
                             model_.homing_confidence}) {
-    write_float(bytes, static_cast<double>(value));
+    write_number(bytes, half_bits(static_cast<double>(value)), 2);
+  }
+  for (const double value :
+       {odometry_.distance_error, odometry_.heading_error_rad_per_m, odometry_.drift}) {
+    write_number(bytes, half_bits(value), 2);
   }
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (i > 0) {
       const ChainLeg leg = make_leg(nodes_[i - 1].position, nodes_[i].position);
-      const std::uint32_t is_snapshot = nodes_[i].has_snapshot() ? 1U : 0U;
-      write_number(bytes, is_snapshot | leg.distance << 1U | leg.direction << 12U, ChainLeg::bytes);
+      write_number(bytes, kind_bits(nodes_[i]) | leg.distance << 2U | leg.direction << 13U,
+                   ChainLeg::bytes);
     }
     bytes.insert(bytes.end(), nodes_[i].snapshot.begin(), nodes_[i].snapshot.end());
   }
@@ -176,9 +212,10 @@ SnapshotChain SnapshotChain::unpack(std::span<const std::uint8_t> bytes) {
           to_text(ChainHeader::magic));
   SnapshotChain chain;
   try {
-    chain = SnapshotChain(header.shape, make_band(header.bottom_rad, header.top_rad));
+    chain =
+        SnapshotChain(header.shape, make_band(header.bottom_rad, header.top_rad), header.odometry);
   } catch (const OptionError& error) {
-    throw ContractError(std::string("snapshots of a chain: ") + error.what());
+    throw ContractError(std::string("header of a chain: ") + error.what());
   }
   chain.set_model(header.model);
   ChainCursor cursor(bytes, header.shape);
@@ -186,13 +223,14 @@ SnapshotChain SnapshotChain::unpack(std::span<const std::uint8_t> bytes) {
     const std::size_t rest = cursor.rest();
     const std::optional<ChainStop> stop = cursor.next();
     require(stop.has_value(), "bytes left in a chain", static_cast<double>(rest),
-            "those of a leg, and of a snapshot at its end");
+            "those of a leg of a known kind, and of a snapshot at its end");
     require(cursor.leg().distance > 0 || cursor.leg().direction == 0,
             "direction of a leg without length", cursor.leg().direction, "0");
-    ChainNode node{.position = stop->position};
+    ChainNode node{.position = stop->position, .is_fine = stop->is_fine};
     if (stop->has_snapshot()) {
-      const std::span snapshot(stop->snapshot, header.shape.bytes());
-      (void)snapshot_steps(snapshot, header.shape);  // refuses bytes that are not written
+      const SnapshotShape shape = chain.shape_of(stop->is_fine);
+      const std::span snapshot(stop->snapshot, shape.bytes());
+      (void)snapshot_steps(snapshot, shape);  // refuses bytes that are not written
       node.snapshot.assign(snapshot.begin(), snapshot.end());
     }
     chain.nodes_.push_back(std::move(node));
