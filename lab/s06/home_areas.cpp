@@ -281,7 +281,7 @@ LearntHome learn_home(const HomingPlace& place, const HomeTask& task, std::uint6
   const auto views = simulation::make_each(executor, walk.size(), [&](std::size_t i) {
     return capture_chain_view(place, walk[i], Random(seed, 1000 + i).next());
   });
-  HomeAreaLearner learner(home_snapshot_shape, {.max_bytes = task.max_bytes});
+  HomeAreaLearner learner({}, {.max_bytes = task.max_bytes});
   for (std::size_t i = 0; i < walk.size(); ++i) {
     learner.add(views[i], i == 0 ? Pose2{} : odometry.measure(walk[i - 1], walk[i]));
   }

@@ -82,7 +82,7 @@ HomeArea learn_home_area(MemoryFile& memory, const std::string& name, const Driv
                          const HomeAreaOptions& options, Executor& executor,
                          const std::function<void()>& progress) {
   check_new_chain(memory, name, walk);
-  HomeAreaLearner learner(limit_shape(home_snapshot_shape, memory), options);
+  HomeAreaLearner learner(limit_shape({}, memory), options);
   add_drive(memory, walk, executor, progress,
             [&](const HomingView& view, const Pose2& moved) { learner.add(view, moved); });
   HomeArea area = learner.finish(executor);

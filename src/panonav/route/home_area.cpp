@@ -118,7 +118,8 @@ class SnapshotChoice {
       : candidates_(candidates), held_out_(held_out), best_(held_out.size()) {
     std::vector<HomingView> snapshots;
     for (const LevelView& candidate : candidates) {
-      snapshots.push_back(unpack_snapshot(pack_snapshot(candidate.view, shape), shape,
+      const SnapshotShape packed = snapshots.empty() ? make_fine(shape) : shape;
+      snapshots.push_back(unpack_snapshot(pack_snapshot(candidate.view, packed), packed,
                                           candidate.view.elevations()));
     }
     std::vector<SnapshotPair> pairs(held_out.size() * candidates.size());
@@ -211,6 +212,41 @@ class SnapshotChoice {
   ChainModel model_;
 };
 
+struct ChosenArea {
+  HomeArea area;
+  bool is_full = false;  // a further snapshot would have improved the home vectors
+};
+
+// Chooses the snapshots of an area, the first candidate among them, and packs them.
+ChosenArea choose_area(const std::vector<LevelView>& candidates,
+                       const std::vector<LevelView>& held_out, const SnapshotShape& shape,
+                       std::size_t max_bytes, Executor& executor) {
+  SnapshotChoice choice(candidates, held_out, shape, executor);
+  ChosenArea chosen{.area = {.chain = SnapshotChain(shape, candidates.front().view.elevations()),
+                             .held_out = {}}};
+  SnapshotChain& chain = chosen.area.chain;
+  std::size_t bytes =
+      ChainHeader::bytes - ChainLeg::bytes + make_fine(shape).bytes() - shape.bytes();
+  const std::size_t snapshot_bytes = ChainLeg::bytes + shape.bytes();
+  for (std::optional<std::size_t> next = 0; next; next = choice.find_next()) {
+    const Point2 place = candidates[*next].pose.position();
+    const bool is_far =
+        !chain.nodes().empty() && distance(place, chain.nodes().back().position) > max_leg_m;
+    const std::size_t added = snapshot_bytes + (is_far ? ChainLeg::bytes : 0);
+    if (bytes + added > max_bytes) {
+      chosen.is_full = true;
+      break;
+    }
+    bytes += added;
+    if (is_far) chain.append({}, std::nullopt);  // legs by way of home
+    chain.append(place, candidates[*next].view);
+    choice.take(*next);
+  }
+  chain.set_model(choice.model());
+  chosen.area.held_out = choice.home_vectors();
+  return chosen;
+}
+
 }  // namespace
 
 void visit_options(HomeAreaOptions& options, OptionVisitor& visitor) {
@@ -241,7 +277,7 @@ HomeAreaLearner::HomeAreaLearner(const SnapshotShape& shape, const HomeAreaOptio
     : shape_(shape), options_(options) {
   validate(shape_);
   validate(options_);
-  const std::size_t fewest = ChainHeader::bytes + shape_.bytes();
+  const std::size_t fewest = ChainHeader::bytes + make_fine(shape_).bytes();
   require(static_cast<std::size_t>(options_.max_bytes) >= fewest, "max_bytes", options_.max_bytes,
           ">= " + to_text(static_cast<double>(fewest)) + " for one snapshot");
 }
@@ -366,30 +402,16 @@ HomeArea HomeAreaLearner::finish(Executor& executor) const {
     ((i / stride) % 2 == 0 ? candidates : held_out)
         .push_back({rotate(views_[i].view, -poses[i].heading_rad), poses[i]});
   }
-  SnapshotChoice choice(candidates, held_out, shape_, executor);
-  HomeArea area{.chain = SnapshotChain(shape_, views_.front().view.elevations()),
-                .held_out = {},
-                .returns = returns.size() - 1};
-  std::size_t bytes = ChainHeader::bytes - ChainLeg::bytes;
-  const std::size_t snapshot_bytes = ChainLeg::bytes + shape_.bytes();
-  for (std::optional<std::size_t> next = 0;
-       next && bytes + snapshot_bytes <= static_cast<std::size_t>(options_.max_bytes);
-       next = choice.find_next()) {
-    const Point2 place = candidates[*next].pose.position();
-    const bool is_far = !area.chain.nodes().empty() &&
-                        distance(place, area.chain.nodes().back().position) > max_leg_m;
-    if (is_far) {
-      bytes += ChainLeg::bytes;
-      if (bytes + snapshot_bytes > static_cast<std::size_t>(options_.max_bytes)) break;
-      area.chain.append({}, std::nullopt);  // legs by way of home
+  const auto max_bytes = static_cast<std::size_t>(options_.max_bytes);
+  ChosenArea chosen = choose_area(candidates, held_out, make_fine(shape_), max_bytes, executor);
+  if (chosen.is_full && shape_ != make_fine(shape_)) {
+    ChosenArea coarse = choose_area(candidates, held_out, shape_, max_bytes, executor);
+    if (coarse.area.homeward_component() > chosen.area.homeward_component()) {
+      chosen = std::move(coarse);
     }
-    area.chain.append(place, candidates[*next].view);
-    choice.take(*next);
-    bytes += snapshot_bytes;
   }
-  area.chain.set_model(choice.model());
-  area.held_out = choice.home_vectors();
-  return area;
+  chosen.area.returns = returns.size() - 1;
+  return std::move(chosen.area);
 }
 
 }  // namespace panonav

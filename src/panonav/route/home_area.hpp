@@ -12,10 +12,6 @@
 
 namespace panonav {
 
-/// Snapshots of a home area. With coefficients of 4 bits, as in a chain, the place where the home
-/// vector vanishes is up to 0.05 R away from home: half a metre in a hall.
-inline constexpr SnapshotShape home_snapshot_shape{.bits = 6};
-
 /// Size of a home area.
 struct HomeAreaOptions {
   int max_bytes = 1000;  ///< of the packed area, 200 .. 1,000,000
@@ -43,18 +39,17 @@ struct HomeArea {
 };
 
 /// Learns the surroundings of a home from a walk that begins there and passes it now and then, as
-/// bees do it. What odometry is off by when a view shows that the walk is at home again is shared
-/// out along the path since the last time, so that a constant wind and drift of the heading
-/// cancel. Of the views, every other one may become a snapshot; the home vectors of the rest decide
-/// which: the next snapshot is the one that improves them most, until the bytes are used up or no
-/// snapshot improves them.
+/// bees do it. The error of odometry when a view shows that the walk is at home again is shared out
+/// along the path since the last time, so that constant drift cancels. Every other view may become
+/// a snapshot; the home vectors of the rest decide which: the next snapshot is the one that
+/// improves them most, until the bytes are used up or none does. All snapshots are fine, unless
+/// more snapshots that are not improve the home vectors; that of home always is.
 ///
 /// Memory: one reduced view for each 0.1 m of the path.
 class HomeAreaLearner {
  public:
   /// Throws OptionError; ContractError if the bytes are too few for one snapshot.
-  explicit HomeAreaLearner(const SnapshotShape& shape = home_snapshot_shape,
-                           const HomeAreaOptions& options = {});
+  explicit HomeAreaLearner(const SnapshotShape& shape = {}, const HomeAreaOptions& options = {});
 
   /// Adds a view after the motion `moved` (robot_old_from_robot_new, by odometry; ignored for the
   /// first view, which is home). Throws ContractError as `ChainRecorder::add`.

@@ -51,6 +51,7 @@ constexpr double arrival_error_m = 0.3;
 constexpr double spiral_point_radius_m = 0.3;
 constexpr int max_steps_per_point = 6;
 constexpr int max_failed_ends = 6;
+constexpr int max_steps_without_progress = 20;
 constexpr double spiral_circle_rad = 2.0 * std::numbers::pi;
 
 Eigen::Matrix3d measurement_covariance(double deviation_m, double deviation_rad) {
@@ -170,9 +171,9 @@ HomeFinder::HomeFinder(SnapshotChain area, const OdometryNoise& noise,
     : area_(std::move(area)), options_(options), by_odometry_(noise, options) {
   require(area_.snapshots() > 0, "snapshots of the home area", 0.0, ">= 1");
   for (const ChainNode& node : area_.nodes()) {
-    area_radius_m_ = std::max(area_radius_m_, distance(node.position, {}));
+    nodes_radius_m_ = std::max(nodes_radius_m_, distance(node.position, {}));
   }
-  area_radius_m_ += static_cast<double>(area_.model().reach_m);
+  area_radius_m_ = nodes_radius_m_ + static_cast<double>(area_.model().reach_m);
 }
 
 void HomeFinder::move(const Pose2& moved) {
@@ -184,6 +185,8 @@ void HomeFinder::move(const Pose2& moved) {
     hypothesis_->pose.move(moved);
     hypothesis_->since_fix_m += step_m;
     hypothesis_->since_test_m += step_m;
+    // The robot leaves the area before the hypothesis was confirmed.
+    if (hypothesis_->log_odds < sure_log_odds && !may_be_near()) drop_hypothesis();
   }
   moved_ = moved_ * moved;
   view_.reset();
@@ -195,9 +198,16 @@ bool HomeFinder::may_be_near() const {
          area_radius_m_ + near_deviations * estimate().deviation_m();
 }
 
+// Farther away, places that look alike come into question only after those nearer by were searched.
+double HomeFinder::likely_error_m() const {
+  constexpr double likely_deviations = 1.5;  // two of three positions [Rayleigh distribution]
+  return std::max(nodes_radius_m_, likely_deviations * by_odometry_.deviation_m());
+}
+
 // Returns the pose by the snapshot of the greatest confidence, of those that the estimate allows.
 std::optional<HomeFinder::Fix> HomeFinder::find_fix(const DriftingPose& pose,
-                                                    const HomingView& view) const {
+                                                    const HomingView& view,
+                                                    double max_shift_m) const {
   const auto r_m = static_cast<double>(area_.model().typical_distance_m);
   HeadingWindow window;
   const double half_rad = pose_heading_error_rad + 3.0 * pose.deviation_rad();
@@ -222,6 +232,7 @@ std::optional<HomeFinder::Fix> HomeFinder::find_fix(const DriftingPose& pose,
         {place.x_m - way.x_m, place.y_m - way.y_m, wrap_angle(-sight.vector.heading_rad)},
         r_m * (fix_error_of_r + fix_error_of_way * way_r),
         fix_heading_error_rad + fix_heading_error_of_way * way_r};
+    if (distance(found.pose.position(), pose.pose().position()) > max_shift_m) continue;
     if (pose.mismatch(found.pose, found.deviation_m, found.deviation_rad) > max_mismatch) continue;
     max_confidence = confidence;
     fix = found;
@@ -241,14 +252,16 @@ void HomeFinder::see(const HomingView& view) {
     test_hypothesis();
     return;
   }
-  const std::optional<Fix> fix = find_fix(by_odometry_, *view_);
+  const std::optional<Fix> fix = find_fix(by_odometry_, *view_, likely_error_m() + searched_m_);
   if (!fix) return;
   if (by_odometry_.deviation_m() <=
       sure_deviation_of_r * static_cast<double>(area_.model().typical_distance_m)) {
     correct_pose(by_odometry_, *fix, since_fix_m_);
     since_fix_m_ = 0.0;
   } else {
-    hypothesis_ = Hypothesis{by_odometry_};
+    const double prior =
+        -0.5 * by_odometry_.mismatch(fix->pose, fix->deviation_m, fix->deviation_rad);
+    hypothesis_ = Hypothesis{.pose = by_odometry_, .prior_log_odds = prior, .log_odds = prior};
     correct_pose(hypothesis_->pose, *fix, fix_spacing_m);
   }
 }
@@ -259,7 +272,7 @@ void HomeFinder::test_hypothesis() {
       test_spacing_of_r * static_cast<double>(area_.model().typical_distance_m);
   if (tested.since_test_m < spacing_m) return;
   tested.since_test_m = 0.0;
-  const std::optional<Fix> fix = find_fix(tested.pose, *view_);
+  const std::optional<Fix> fix = find_fix(tested.pose, *view_, nodes_radius_m_);
   if (fix) {
     correct_pose(tested.pose, *fix, tested.since_fix_m);
     tested.since_fix_m = 0.0;
@@ -268,7 +281,7 @@ void HomeFinder::test_hypothesis() {
     tested.log_odds += std::log((1.0 - agreeing_if_right) / (1.0 - agreeing_by_chance));
   }
   tested.log_odds = std::min(tested.log_odds, max_log_odds);
-  if (tested.log_odds < wrong_log_odds) drop_hypothesis();
+  if (tested.log_odds < tested.prior_log_odds + wrong_log_odds) drop_hypothesis();
 }
 
 void HomeFinder::drop_hypothesis() {
@@ -283,6 +296,36 @@ ChainDecision HomeFinder::move_to(Point2 place) {
   moved_ = {};
   return {state_, 0, std::atan2(ahead.y_m, ahead.x_m),
           std::min(options_.max_step_m, std::hypot(ahead.x_m, ahead.y_m))};
+}
+
+void HomeFinder::begin_detour() {
+  if (area_.nodes().size() == 1) return;
+  detour_node_ = next_detour_;
+  next_detour_ = next_detour_ % (area_.nodes().size() - 1) + 1;
+  steps_without_progress_ = 0;
+}
+
+// Moves towards home. Where that brings the robot no nearer, something is in the way: the robot
+// moves to the place of a snapshot, at which the learning walk was, and tries again from there.
+ChainDecision HomeFinder::move_home() {
+  const auto nodes = area_.nodes();
+  const double home_m = distance(estimate().pose().position(), {});
+  ++steps_without_progress_;
+  if (home_m < min_home_m_ - spiral_point_radius_m) {
+    min_home_m_ = home_m;
+    if (!detour_node_) steps_without_progress_ = 0;
+  }
+  const bool ends_detour =
+      detour_node_ && distance(estimate().pose().position(), nodes[*detour_node_].position) <=
+                          spiral_point_radius_m;
+  if (ends_detour || steps_without_progress_ > max_steps_without_progress) {
+    const bool begins = !detour_node_;
+    detour_node_.reset();
+    if (begins) begin_detour();
+    steps_without_progress_ = 0;
+    min_home_m_ = std::numeric_limits<double>::infinity();
+  }
+  return move_to(detour_node_ ? nodes[*detour_node_].position : Point2{});
 }
 
 // A spiral around home whose turns are as far apart as the area is wide; a second one is twice as
@@ -304,6 +347,7 @@ ChainDecision HomeFinder::search() {
     steps_to_point_ = 0;
     const double slope_m = spiral_turn_m_ / spiral_circle_rad;
     spiral_angle_rad_ += options_.max_step_m / std::hypot(slope_m * spiral_angle_rad_, slope_m);
+    searched_m_ = std::max(searched_m_, slope_m * spiral_angle_rad_);
     if (slope_m * spiral_angle_rad_ <= search_radius_m_) continue;
     if (spiral_turn_m_ < area_radius_m_) {
       state_ = ChainState::lost;
@@ -332,6 +376,7 @@ ChainDecision HomeFinder::approach() {
   }
   follower_.reset();
   drop_hypothesis();
+  begin_detour();
   if (++failed_ends_ >= max_failed_ends) {
     state_ = ChainState::lost;
     return {state_, 0, 0.0, 0.0};
@@ -348,14 +393,15 @@ ChainDecision HomeFinder::decide() {
       hypothesis_ ? hypothesis_->log_odds >= sure_log_odds
                   : by_odometry_.deviation_m() <= reach_m && since_fix_m_ <= max_way_without_fix_m;
   if (is_sure) state_ = ChainState::homing;
-  if (is_sure && view_ && home_m <= std::max(0.5 * reach_m, spiral_point_radius_m)) {
+  if (is_sure && view_ && !detour_node_ &&
+      home_m <= std::max(0.5 * reach_m, spiral_point_radius_m)) {
     follower_ = std::make_unique<ChainFollower>(first_snapshot(area_), ChainDirection::forward);
     moved_ = {};
     return approach();
   }
-  if (hypothesis_ && home_m > spiral_point_radius_m) return move_to({});
+  if (hypothesis_ && home_m > spiral_point_radius_m) return move_home();
   if (search_radius_m_ > 0.0 || home_m <= spiral_point_radius_m) return search();
-  return move_to({});
+  return move_home();
 }
 
 }  // namespace panonav

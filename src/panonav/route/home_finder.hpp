@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -55,13 +56,13 @@ class DriftingPose {
   std::array<double, states * states> covariance_{};
 };
 
-/// Leads a robot home that left it some way ago, by odometry. Where the error of odometry allows
-/// the robot to be in the home area, views are compared with the snapshots there; the one of the
-/// greatest confidence gives the pose. On the way out, such poses show the drift that odometry does
-/// not see. Where odometry is uncertain, a pose is a hypothesis, which views of the area confirm or
-/// refute as long as it is used. Without one the robot searches along a spiral around home, up to
-/// the error of odometry. The last metre is led by a `ChainFollower` of the snapshot at home; the
-/// robot has arrived if that says so and the pose agrees.
+/// Leads a robot home that left it some way ago, by odometry. Where the robot may be in the home
+/// area, views are compared with the snapshots there; the one of the greatest confidence gives the
+/// pose, and on the way out the drift that odometry does not see. Where odometry is uncertain, a
+/// pose is a hypothesis, which views confirm or refute. Without one the robot searches along a
+/// spiral around home, up to the error of odometry. Where the way home is blocked, it tries again
+/// from the places of other snapshots. The last metre is led by a `ChainFollower` of the snapshot
+/// at home; the robot has arrived if that says so and the pose agrees.
 class HomeFinder {
  public:
   /// The robot is at home, at the heading of the learning walk's first view. Throws OptionError;
@@ -97,6 +98,7 @@ class HomeFinder {
   };
   struct Hypothesis {
     DriftingPose pose;
+    double prior_log_odds = 0.0;  // of its first pose, by odometry
     double log_odds = 0.0;
     double since_fix_m = 0.0;
     double since_test_m = 0.0;
@@ -104,8 +106,12 @@ class HomeFinder {
   [[nodiscard]] const DriftingPose& estimate() const {
     return hypothesis_ ? hypothesis_->pose : by_odometry_;
   }
-  [[nodiscard]] std::optional<Fix> find_fix(const DriftingPose& pose, const HomingView& view) const;
+  [[nodiscard]] std::optional<Fix> find_fix(const DriftingPose& pose, const HomingView& view,
+                                            double max_shift_m) const;
   [[nodiscard]] ChainDecision move_to(Point2 place);
+  [[nodiscard]] double likely_error_m() const;
+  void begin_detour();
+  [[nodiscard]] ChainDecision move_home();
   [[nodiscard]] ChainDecision search();
   [[nodiscard]] ChainDecision approach();
   static void correct_pose(DriftingPose& pose, const Fix& fix, double since_m);
@@ -114,7 +120,8 @@ class HomeFinder {
 
   SnapshotChain area_;
   HomeFinderOptions options_;
-  double area_radius_m_ = 0.0;
+  double nodes_radius_m_ = 0.0;  // distance of the farthest snapshot from home
+  double area_radius_m_ = 0.0;   // the same, as far as homing reaches
   DriftingPose by_odometry_;
   double since_fix_m_ = 0.0;
   std::optional<Hypothesis> hypothesis_;
@@ -122,8 +129,14 @@ class HomeFinder {
   ChainState state_ = ChainState::travelling;
   std::unique_ptr<ChainFollower> follower_;  // of the last metre
   Pose2 moved_;                              // since the last decision of the follower
+  // The way home, and the detour where it is blocked.
+  double min_home_m_ = std::numeric_limits<double>::infinity();  // since the last detour
+  int steps_without_progress_ = 0;
+  std::optional<std::size_t> detour_node_;
+  std::size_t next_detour_ = 1;
   // The search.
   double search_radius_m_ = 0.0;
+  double searched_m_ = 0.0;  // radius up to which home was not found
   double spiral_turn_m_ = 0.0;
   double spiral_angle_rad_ = 0.0;
   int steps_to_point_ = 0;
