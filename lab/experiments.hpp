@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <initializer_list>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -116,12 +117,20 @@ struct RouteExperiments : Experiments {
   void reproduce_real_route() const;
 };
 
+/// All runs of all methods along routes.
+struct RouteRuns;
+[[nodiscard]] std::shared_ptr<RouteRuns> make_route_runs();
+
 /// Routes learnt once and driven again, by this library's memories of routes and by rivals on the
 /// same pictures of 144 x 20, with odometry that is 5 % wrong.
 struct RouteMethodExperiments : Experiments {
-  /// Measures `options.runs` routes in `options.scenes` variants of a built-in scene, or in a
-  /// Gazebo world: bytes, time a picture, routes reached, and distance from the route.
-  void compare_routes(const std::string& scene, double length_m) const;
+  std::shared_ptr<RouteRuns> all = make_route_runs();  ///< of `compare_routes`
+
+  /// Measures some routes in `options.scenes` variants of a built-in scene, or in a Gazebo world:
+  /// bytes, time a picture, routes reached, and distance from the route.
+  void compare_routes(const std::string& scene, double length_m, int routes) const;
+  /// Reports the same over all routes so far; nothing if there were none.
+  void report_all_routes() const;
   /// Measures routes learnt in the usual light and driven again in the same light, without lamps
   /// and sun, with those of one side alone, on another day, 0.5 m higher, and tilted by 5 degrees.
   void compare_conditions(const std::string& scene, double length_m) const;

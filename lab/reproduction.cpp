@@ -80,20 +80,31 @@ ReproductionPlan plan_routes(const Experiments& context) {
   const ReproductionOptions& options = context.options;
   require_minima({{"scenes", options.scenes, 1}, {"runs", options.runs, options.scenes}});
   require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
-  const RouteMethodExperiments routes{context};
+  const RouteMethodExperiments scenes{context};
+  const RouteMethodExperiments worlds{context};
+  // Worlds of a few rooms have no room for long routes.
+  const auto is_large = [](const std::string& scene) {
+    return scene == "street" || scene == "industrial_hall" || scene == "garden";
+  };
   ReproductionPlan plan;
   for (const std::string& scene : options.built_in) {
     if (!simulation::has_scene(options.data, scene)) continue;
+    const RouteMethodExperiments routes = is_large(scene) ? scenes : worlds;
+    int count = options.runs;
     for (const double length_m : options.route_lengths_m) {
-      // Places of a few rooms have no room for long routes.
-      if (length_m > 60.0 && scene != "street" && scene != "industrial_hall") continue;
-      plan.push_back({length_m, [=] { routes.compare_routes(scene, length_m); }});
+      if (length_m <= 60.0 || is_large(scene)) {
+        plan.push_back({count * length_m, [=] { routes.compare_routes(scene, length_m, count); }});
+      }
+      count = (count + 1) / 2;
     }
   }
+  plan.push_back({1.0, [=] { scenes.report_all_routes(); }});
   const double length_m = options.route_lengths_m.front();
-  plan.push_back({7.0 * length_m, [=, scene = options.built_in.front()] {
-                    routes.compare_conditions(scene, length_m);
-                  }});
+  for (const std::string& scene : options.built_in) {
+    if (!is_large(scene) && scene != options.built_in.front()) continue;
+    plan.push_back(
+        {7.0 * options.runs * length_m, [=] { scenes.compare_conditions(scene, length_m); }});
+  }
   return plan;
 }
 
@@ -245,8 +256,9 @@ const Paper& find_paper(std::string_view name) {
       {"routes",
        {.seed = 9001,
         .scenes = 2,
-        .runs = 4,
-        .built_in = {"industrial_hall", "street", "garden", "industrial_warehouse"}},
+        .runs = 8,
+        .built_in = {"industrial_hall", "street", "garden", "industrial_warehouse",
+                     "small_warehouse", "small_house"}},
        {.seed = 9001, .scenes = 1, .runs = 1, .built_in = {"hall"}, .route_lengths_m = {15.0}},
        plan_routes},
   }};

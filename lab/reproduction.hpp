@@ -37,10 +37,12 @@ struct ReproductionOptions {
   Optics optics = Optics::panorama;
   std::uint64_t seed = 1;  ///< of the first scene; each next scene adds 1
   int scenes = 20;         ///< variants of a scene; fewer for some experiments
-  int runs = 20;           ///< missions, paths, walks or homing runs in each place
-  int queries = 50;        ///< per variant; also pairs of views per distance range
-  int rows = 80;           ///< of the views
-  int columns = 512;       ///< of the views; half as many outside the main scene of [M03]
+  /// Missions, paths, walks or homing runs in each place; routes of the shortest length, of which
+  /// each next length has half as many.
+  int runs = 20;
+  int queries = 50;   ///< per variant; also pairs of views per distance range
+  int rows = 80;      ///< of the views
+  int columns = 512;  ///< of the views; half as many outside the main scene of [M03]
   /// [M04] figure 17 is repeated with references every 30 cm in every n-th scene; 0 skips it.
   int fine_lattice_every = 4;
   /// [M04] figure 18: kind of scene and grid spacing in metres for each group of missions. The
@@ -57,7 +59,8 @@ struct ReproductionOptions {
   int max_views = 10'000;       ///< [F11]: of the largest map
   int swept = 10;               ///< [Y03]: scenes used in the sweeps, 1 to scenes
   /// Elsewhere: the built-in scenes used, beside all available worlds and recordings. Routes: the
-  /// scenes and worlds used, as far as they are available; the first one also in other light.
+  /// scenes and worlds used, as far as they are available; the first one, `street`, `garden` and
+  /// `industrial_hall` also in other light, the last three also for long routes.
   std::vector<std::string> built_in{"office", "hall", "lab", "loop", "corridor", "garden"};
   bool floors = true;       ///< elsewhere: also arrange whole floors of the worlds
   int days = 30;            ///< elsewhere: simulated days of a changing place

@@ -28,7 +28,7 @@ class ChainMethod final : public RouteMethod {
 
   void learn(std::span<const RoutePicture> pictures) override {
     require_route(pictures);
-    ChainRecorder recorder(shape_);
+    ChainRecorder recorder(shape_, {}, route_odometry);
     for (const RoutePicture& picture : pictures) recorder.add(view(picture), picture.moved);
     const SnapshotChain chain = recorder.finish();
     // Scales that the published layout does not have are not counted.

@@ -6,10 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/panorama/panorama.hpp"
+#include "panonav/route/chain_code.hpp"
 
 namespace panonav::lab {
+
+/// Errors of the odometry of all routes: distances 5 % wrong, and a heading error as of wheels.
+inline constexpr ChainOdometry route_odometry{0.05, radians(0.5), 0.0};
 
 /// A picture on a route, and the motion since the picture before it.
 struct RoutePicture {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -27,12 +29,20 @@
 
 namespace panonav::lab {
 
+// Result of one run along a learnt route.
+struct MethodRun {
+  bool has_reached = false;  // the end; methods that report arrivals have reported it there
+  bool is_wrong = false;     // an arrival was reported elsewhere
+  std::vector<double> offset_m;
+  double length_m = 0.0;  // of the route
+  double bytes_per_100_m = 0.0;
+  double picture_ms = 0.0;
+};
+
 namespace {
 
 constexpr double recorded_spacing_m = 0.1;
 constexpr double end_radius_m = 0.5;
-// The error of distances of the task, and a heading error of the same kind of wheels.
-constexpr ChainOdometry odometry_errors{0.05, radians(0.5), 0.0};
 
 using MakeMethod = std::unique_ptr<RouteMethod> (*)();
 constexpr std::array<MakeMethod, 8> methods{
@@ -139,7 +149,7 @@ std::vector<Pose2> plan_winding_route(const simulation::FreeSpace& space, double
 std::vector<RoutePicture> record_pictures(const RoutePlace& place, const std::vector<Pose2>& route,
                                           std::uint64_t seed, Executor& executor) {
   Random errors(seed, 3);
-  const DriftingOdometry odometry(odometry_errors, errors);
+  const DriftingOdometry odometry(route_odometry, errors);
   return simulation::make_each(executor, route.size(), [&](std::size_t i) {
     return take_picture(place, route[i],
                         i == 0 ? Pose2{} : odometry.measure(route[i - 1], route[i]),
@@ -147,19 +157,10 @@ std::vector<RoutePicture> record_pictures(const RoutePlace& place, const std::ve
   });
 }
 
-// Result of one run along a learnt route.
-struct MethodRun {
-  bool has_reached = false;  // the end; methods that report arrivals have reported it there
-  bool is_wrong = false;     // an arrival was reported elsewhere
-  std::vector<double> offset_m;
-  double bytes_per_100_m = 0.0;
-  double picture_ms = 0.0;
-};
-
 MethodRun follow_route(const RoutePlace& place, RouteMethod& method,
                        const std::vector<Pose2>& route, std::uint64_t seed) {
   Random errors(seed, 5);
-  const DriftingOdometry odometry(odometry_errors, errors);
+  const DriftingOdometry odometry(route_odometry, errors);
   Pose2 start = route.front();
   start.heading_rad = wrap_angle(start.heading_rad + errors.normal(0.0, radians(5.0)));
   simulation::SimulatedRobot robot(*place.free_space, {}, simulation::ObstacleRule::pass, start,
@@ -169,7 +170,7 @@ MethodRun follow_route(const RoutePlace& place, RouteMethod& method,
   constexpr double max_offset_m = 5.0;
   const double max_travel_m = 20.0 + 1.5 * length_m;
   const int max_steps = 200 + static_cast<int>(8.0 * length_m);
-  MethodRun run;
+  MethodRun run{.length_m = length_m};
   run.bytes_per_100_m = 100.0 * method.bytes() / length_m;
   Pose2 moved;
   double travelled_m = 0.0;
@@ -233,18 +234,26 @@ std::string to_id(std::string name) {
   return name;
 }
 
+// Targets of a method over all routes; nullopt: none.
+struct RouteTargets {
+  std::optional<Target> reached;
+  std::optional<Target> elsewhere;
+  std::optional<Target> offset;
+  std::optional<Target> bytes;
+};
+
 // Adds the rows of a method over all routes of one kind.
 void report_method(Reproduction& result, const std::string& id, const std::string& what,
-                   const std::vector<MethodRun>& runs, bool reports_arrival, bool is_target) {
+                   const std::vector<MethodRun>& runs, bool reports_arrival,
+                   const RouteTargets& targets = {}) {
   const auto count = [&](bool MethodRun::*member) {
     return count_where(runs, [&](const MethodRun& run) { return run.*member; });
   };
   add_rate(result, id + ".reached", what + ": reached to 50 cm", count(&MethodRun::has_reached),
-           runs.size(), is_target ? std::optional(at_least(0.95)) : std::nullopt);
+           runs.size(), targets.reached);
   if (reports_arrival) {
     add_rate(result, id + ".elsewhere", what + ": arrivals reported elsewhere",
-             count(&MethodRun::is_wrong), runs.size(),
-             is_target ? std::optional(at_most(0.0)) : std::nullopt);
+             count(&MethodRun::is_wrong), runs.size(), targets.elsewhere);
   }
   std::vector<double> offset_m;
   for (const MethodRun& run : runs) {
@@ -252,19 +261,20 @@ void report_method(Reproduction& result, const std::string& id, const std::strin
   }
   if (offset_m.empty()) return;
   add_row(result, id + ".offset", what + ": median distance from the route, where it is reached",
-          median(offset_m), "m");
+          median(offset_m), "m", targets.offset);
 }
 
 void report_cost(Reproduction& result, const std::string& id, const std::string& what,
-                 const std::vector<MethodRun>& runs, bool is_target) {
-  std::vector<double> bytes;
+                 const std::vector<MethodRun>& runs, const std::optional<Target>& target = {}) {
+  double bytes = 0.0;
+  double length_m = 0.0;
   std::vector<double> picture_ms;
   for (const MethodRun& run : runs) {
-    bytes.push_back(run.bytes_per_100_m);
+    bytes += 0.01 * run.length_m * run.bytes_per_100_m;
+    length_m += run.length_m;
     picture_ms.push_back(run.picture_ms);
   }
-  add_row(result, id + ".bytes", what + ": bytes", mean_figure(bytes), "B/100 m",
-          is_target ? std::optional(at_most(1000.0)) : std::nullopt);
+  add_row(result, id + ".bytes", what + ": bytes", 100.0 * bytes / length_m, "B/100 m", target);
   add_row(result, id + ".time", what + ": time a picture", median_figure(picture_ms), "ms");
 }
 
@@ -294,17 +304,26 @@ simulation::Scene change_day(const simulation::Scene& scene, std::uint64_t seed)
 
 }  // namespace
 
-void RouteMethodExperiments::compare_routes(const std::string& scene, double length_m) const {
-  std::vector<std::vector<MethodRun>> runs(methods.size());
-  for (int variant = 0; variant < options.scenes; ++variant) {
+struct RouteRuns {
+  std::array<std::vector<MethodRun>, methods.size()> by_method;
+};
+
+std::shared_ptr<RouteRuns> make_route_runs() {
+  return std::make_shared<RouteRuns>();
+}
+
+void RouteMethodExperiments::compare_routes(const std::string& scene, double length_m,
+                                            int routes) const {
+  RouteRuns runs;
+  for (int variant = 0; variant < std::min(options.scenes, routes); ++variant) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(variant);
     const std::vector<RoutePlace> places{make_route_place(
         simulation::make_or_read_scene(options.data, scene, {.seed = seed}), executor)};
-    for (int i = variant; i < options.runs; i += options.scenes) {
+    for (int i = variant; i < routes; i += options.scenes) {
       const std::uint64_t route_seed = options.seed + 10 + static_cast<std::uint64_t>(i);
       const auto route = plan_winding_route(*places[0].free_space, length_m, route_seed);
       const auto of_route = compare_methods(places[0], places, route, route_seed, executor);
-      for (std::size_t m = 0; m < methods.size(); ++m) runs[m].push_back(of_route[0][m]);
+      for (std::size_t m = 0; m < methods.size(); ++m) runs.by_method[m].push_back(of_route[0][m]);
     }
   }
   const std::string length = std::to_string(std::lround(length_m));
@@ -313,8 +332,23 @@ void RouteMethodExperiments::compare_routes(const std::string& scene, double len
     const std::string name = method->name();
     const std::string id = "routes." + scene + "." + length + "." + to_id(name);
     const std::string what = name + ", routes of " + length + " m in " + scene;
-    report_method(result, id, what, runs[m], method->reports_arrival(), m == 0);
-    report_cost(result, id, what, runs[m], m == 0);
+    report_method(result, id, what, runs.by_method[m], method->reports_arrival());
+    report_cost(result, id, what, runs.by_method[m]);
+    std::ranges::copy(runs.by_method[m], std::back_inserter(all->by_method[m]));
+  }
+}
+
+void RouteMethodExperiments::report_all_routes() const {
+  if (all->by_method.front().empty()) return;
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    const auto method = methods[m]();
+    const std::string name = method->name();
+    const std::string id = "routes.all." + to_id(name);
+    const std::string what = name + ", all routes";
+    RouteTargets targets;
+    if (m == 0) targets = {at_least(0.95), at_most(0.0), at_most(0.1), at_most(1000.0)};
+    report_method(result, id, what, all->by_method[m], method->reports_arrival(), targets);
+    report_cost(result, id, what, all->by_method[m], targets.bytes);
   }
 }
 
@@ -357,7 +391,7 @@ void RouteMethodExperiments::compare_conditions(const std::string& scene, double
       report_method(result, "routes." + scene + "." + names[p] + "." + to_id(name),
                     name + ", routes of " + std::to_string(std::lround(length_m)) + " m in " +
                         scene + ", " + names[p],
-                    runs[p][m], method->reports_arrival(), false);
+                    runs[p][m], method->reports_arrival());
     }
   }
 }
