@@ -102,6 +102,7 @@ ReproductionPlan plan_routes(const Experiments& context) {
   const double length_m = options.route_lengths_m.front();
   for (const std::string& scene : options.built_in) {
     if (!is_large(scene) && scene != options.built_in.front()) continue;
+    if (!simulation::has_scene(options.data, scene)) continue;
     plan.push_back(
         {7.0 * options.runs * length_m, [=] { scenes.compare_conditions(scene, length_m); }});
   }

@@ -34,7 +34,7 @@ struct MethodRun {
   bool has_reached = false;  // the end; methods that report arrivals have reported it there
   bool is_wrong = false;     // an arrival was reported elsewhere
   std::vector<double> offset_m;
-  double length_m = 0.0;  // of the route
+  double length_m = 0.0;  // length of the route
   double bytes_per_100_m = 0.0;
   double picture_ms = 0.0;
 };

@@ -21,8 +21,8 @@ float read_half(std::span<const std::uint8_t> bytes, std::size_t offset) noexcep
 }
 
 float read_elevation(std::span<const std::uint8_t> bytes, std::size_t offset) noexcept {
-  const auto steps = static_cast<std::int16_t>(read_number(bytes.subspan(offset, 2)));
-  return static_cast<float>(steps * ChainHeader::elevation_step_rad);
+  return ChainHeader::elevation_rad(
+      static_cast<std::int16_t>(read_number(bytes.subspan(offset, 2))));
 }
 
 }  // namespace
@@ -77,7 +77,7 @@ std::optional<ChainStop> ChainCursor::next() noexcept {
   ChainStop stop{position_};
   if (kind == ChainNodeKind::way_point) return stop;
   stop.is_fine = kind == ChainNodeKind::fine_snapshot;
-  const std::size_t snapshot_bytes = (stop.is_fine ? make_fine(shape_) : shape_).bytes();
+  const std::size_t snapshot_bytes = choose_shape(shape_, stop.is_fine).bytes();
   if (rest_.size() < snapshot_bytes) return std::nullopt;
   stop.snapshot = rest_.data();
   rest_ = rest_.subspan(snapshot_bytes);

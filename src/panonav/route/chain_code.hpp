@@ -70,6 +70,10 @@ struct ChainHeader {
   static constexpr std::size_t bytes = 23;        ///< size of the packed header
   /// A step of the packed elevations: 32,767 are a right angle.
   static constexpr double elevation_step_rad = std::numbers::pi / 65'534.0;
+  /// Returns a packed elevation.
+  [[nodiscard]] static constexpr float elevation_rad(std::int16_t steps) noexcept {
+    return static_cast<float>(steps * elevation_step_rad);
+  }
   std::uint32_t magic_found = 0;  ///< the first two bytes
   SnapshotShape shape;            ///< of the snapshots that are not fine
   float bottom_rad = 0.0F;        ///< lowest elevation of the rows; unknown if both are 0

@@ -58,7 +58,7 @@ CoefficientView ChainPilot::snapshot_view(std::size_t node) const noexcept {
   const std::span cosines = workspace_.first(size);
   const std::span sines = workspace_.subspan(size, size);
   const ChainStop& stop = route_.stops[node];
-  const SnapshotShape shape = stop.is_fine ? make_fine(header.shape) : header.shape;
+  const SnapshotShape shape = choose_shape(header.shape, stop.is_fine);
   decode_snapshot({stop.snapshot, shape.bytes()}, shape, cosines, sines);
   return {.rows = header.shape.rows,
           .components = header.shape.components,

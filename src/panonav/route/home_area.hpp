@@ -56,7 +56,7 @@ class HomeAreaLearner {
   void add(const HomingView& view, const Pose2& moved);
 
   /// Learns the area. Throws ContractError if there was no view. Cost: two home vectors for each
-  /// pair of at most 400 views, half a second.
+  /// pair of at most 400 views, half a second; twice that where the bytes run out.
   [[nodiscard]] HomeArea finish(Executor& executor) const;
 
  private:

@@ -198,7 +198,7 @@ bool HomeFinder::may_be_near() const {
          area_radius_m_ + near_deviations * estimate().deviation_m();
 }
 
-// Farther away, places that look alike come into question only after those nearer by were searched.
+// Similar places farther away come into question only after those nearer by were searched.
 double HomeFinder::likely_error_m() const {
   constexpr double likely_deviations = 1.5;  // two of three positions [Rayleigh distribution]
   return std::max(nodes_radius_m_, likely_deviations * by_odometry_.deviation_m());

@@ -98,7 +98,7 @@ class HomeFinder {
   };
   struct Hypothesis {
     DriftingPose pose;
-    double prior_log_odds = 0.0;  // of its first pose, by odometry
+    double prior_log_odds = 0.0;  // odds of its first pose by odometry
     double log_odds = 0.0;
     double since_fix_m = 0.0;
     double since_test_m = 0.0;

@@ -79,8 +79,7 @@ std::optional<ElevationBand> make_band(float bottom_rad, float top_rad) {
 std::optional<ElevationBand> round_band(const std::optional<ElevationBand>& band) {
   if (!band) return std::nullopt;
   const auto round = [](double elevation_rad) {
-    const auto steps = static_cast<std::int16_t>(elevation_bits(elevation_rad));
-    return static_cast<float>(steps * ChainHeader::elevation_step_rad);
+    return ChainHeader::elevation_rad(static_cast<std::int16_t>(elevation_bits(elevation_rad)));
   };
   return make_band(round(band->bottom_rad), round(band->top_rad));
 }
@@ -115,9 +114,9 @@ SnapshotChain::SnapshotChain(const SnapshotShape& shape,
   set_model({});
 }
 
-void SnapshotChain::append(Point2 position, const std::optional<HomingView>& view, bool is_fine) {
-  ChainNode node{.is_fine = view && (is_fine || nodes_.empty())};
-  if (view) node.snapshot = pack_snapshot(*view, shape_of(node.is_fine));
+void SnapshotChain::append(Point2 position, const std::optional<HomingView>& view) {
+  ChainNode node{.is_fine = view && nodes_.empty()};
+  if (view) node.snapshot = pack_snapshot(*view, choose_shape(shape_, node.is_fine));
   if (nodes_.empty()) {
     require(node.has_snapshot(), "snapshots of the first node of a chain", 0.0, "1");
   } else {
@@ -154,7 +153,8 @@ ChainHeader SnapshotChain::header() const noexcept {
 HomingView SnapshotChain::view(std::size_t node) const {
   require(node < nodes_.size() && nodes_[node].has_snapshot(), "node with a snapshot",
           static_cast<double>(node), "a node of the chain with a snapshot");
-  return unpack_snapshot(nodes_[node].snapshot, shape_of(nodes_[node].is_fine), elevations_);
+  return unpack_snapshot(nodes_[node].snapshot, choose_shape(shape_, nodes_[node].is_fine),
+                         elevations_);
 }
 
 std::size_t SnapshotChain::snapshots() const noexcept {
@@ -228,7 +228,7 @@ SnapshotChain SnapshotChain::unpack(std::span<const std::uint8_t> bytes) {
             "direction of a leg without length", cursor.leg().direction, "0");
     ChainNode node{.position = stop->position, .is_fine = stop->is_fine};
     if (stop->has_snapshot()) {
-      const SnapshotShape shape = chain.shape_of(stop->is_fine);
+      const SnapshotShape shape = choose_shape(header.shape, stop->is_fine);
       const std::span snapshot(stop->snapshot, shape.bytes());
       (void)snapshot_steps(snapshot, shape);  // refuses bytes that are not written
       node.snapshot.assign(snapshot.begin(), snapshot.end());

@@ -42,18 +42,17 @@ class SnapshotChain {
                          const ChainOdometry& odometry = {});
 
   /// Appends a node at a position in the frame of the odometry; rounding errors of legs do not add
-  /// up. `view`: at heading 0, reduced to the shape of snapshots; nullopt: a way point. `is_fine`:
-  /// the place must be right, as at the end of a route; the first node always is fine. Throws
+  /// up. `view`: at heading 0, reduced to the shape of snapshots; nullopt: a way point. Throws
   /// ContractError if the leg is longer than `max_leg_m` or not finite, for a first node that is a
   /// way point, and as `pack_snapshot`.
-  void append(Point2 position, const std::optional<HomingView>& view, bool is_fine = false);
+  void append(Point2 position, const std::optional<HomingView>& view);
 
-  /// Replaces the snapshot of the last node by a fine one. Throws ContractError if there is no
-  /// snapshot, and as `pack_snapshot`.
+  /// Replaces the snapshot of the last node by a fine one, as at the end of a route. Throws
+  /// ContractError if there is no snapshot, and as `pack_snapshot`.
   void refine_last(const HomingView& view);
 
-  /// Sets what was learnt, as the packed form says it, to 0.4 %. Throws ContractError on values out
-  /// of range.
+  /// Sets what was learnt, rounded as in the packed form, to 0.4 %. Throws ContractError on a value
+  /// beyond its range.
   void set_model(const ChainModel& model);
 
   /// Size of the snapshots that are not fine.
@@ -89,10 +88,6 @@ class SnapshotChain {
   friend bool operator==(const SnapshotChain&, const SnapshotChain&) = default;
 
  private:
-  [[nodiscard]] SnapshotShape shape_of(bool is_fine) const noexcept {
-    return is_fine ? make_fine(shape_) : shape_;
-  }
-
   SnapshotShape shape_;
   std::optional<ElevationBand> elevations_;
   ChainOdometry odometry_;

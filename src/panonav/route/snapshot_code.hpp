@@ -37,6 +37,11 @@ struct SnapshotShape {
   if (shape.bits < fine_bits) shape.bits = fine_bits;
   return shape;
 }
+/// Returns the shape of a snapshot that is fine or not.
+[[nodiscard]] constexpr SnapshotShape choose_shape(const SnapshotShape& shape,
+                                                   bool is_fine) noexcept {
+  return is_fine ? make_fine(shape) : shape;
+}
 /// Packs a view of this shape into `bytes`, which has the size of a snapshot.
 void encode_snapshot(const CoefficientView& view, const SnapshotShape& shape,
                      std::span<std::uint8_t> bytes) noexcept;
