@@ -83,7 +83,11 @@ struct ChainHeader {
 };
 
 /// The kinds of nodes, as the lowest two bits of a packed leg say them.
-enum class ChainNodeKind : std::uint8_t { way_point = 0, snapshot = 1, fine_snapshot = 2 };
+enum class ChainNodeKind : std::uint8_t {
+  way_point = 0,     ///< a place without a snapshot
+  snapshot = 1,      ///< with a snapshot of the chain's shape
+  fine_snapshot = 2  ///< with a snapshot of at least six bits a coefficient
+};
 
 /// Reads the header. The caller guarantees `ChainHeader::bytes` bytes.
 [[nodiscard]] ChainHeader decode_header(std::span<const std::uint8_t> bytes) noexcept;
