@@ -27,8 +27,8 @@ void nearest_histograms(std::span<const std::uint8_t> a, std::span<const std::ui
                         std::span<std::int32_t> distances_of_a,
                         std::span<std::uint16_t> nearest_of_b, Instructions instructions) {
   const auto check = [](std::size_t values, std::size_t histograms) {
-    require(histograms <= max_descriptors, "histograms", static_cast<double>(histograms),
-            "0 .. 256");
+    require(histograms <= max_histograms, "histograms", static_cast<double>(histograms),
+            "0 .. 1024");
     require(values == histogram_dimensions * histograms, "values of the histograms",
             static_cast<double>(values), "128 for each");
   };

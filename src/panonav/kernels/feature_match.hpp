@@ -19,8 +19,8 @@ void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::
 /// nearest histogram of `b` and the square of their Euclidean distance, and for each of `b` the
 /// index of the nearest of `a`; of equally near ones the first. If `b` is empty, the distances are
 /// the largest number and the indices are not written. All instruction sets give the same numbers.
-/// Throws ContractError on inconsistent sizes and on more than `max_descriptors` histograms. Cost:
-/// about 0.1 ms with AVX2 for 60 and 256.
+/// Throws ContractError on inconsistent sizes and on more than `max_histograms` histograms. Cost:
+/// with AVX2 about 0.04 ms for 57 and 294, 0.6 ms for 412 and 800.
 void nearest_histograms(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b,
                         std::span<std::uint16_t> nearest_of_a,
                         std::span<std::int32_t> distances_of_a,

@@ -141,6 +141,8 @@ inline constexpr int max_descriptors = 256;
 
 /// Values of a histogram in `nearest_histograms`, each 0 .. 15.
 inline constexpr int histogram_dimensions = 128;
+/// Largest number of histograms per view in `nearest_histograms`.
+inline constexpr int max_histograms = 1024;
 
 /// Bearings of matched features of two views, as a structure of arrays. Tangents belong to the
 /// elevations; `sine` and `cosine` to the azimuth in the query minus that in the reference.

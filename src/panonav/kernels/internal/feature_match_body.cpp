@@ -104,32 +104,121 @@ inline int32_t multiply_histograms(const uint8_t* a, const uint8_t* b) {
 
 }  // namespace
 
-template <Instructions set>
-void FeatureMatchBody<set>::nearest_histograms(const uint8_t* a, size_t a_count, const uint8_t* b,
-                                               size_t b_count, uint16_t* nearest_of_a,
-                                               int32_t* distances_of_a, uint16_t* nearest_of_b) {
-  int32_t squares_of_a[max_descriptors];
+namespace {
+
+/// Distance in the high and index in the low half: the minimum is the nearest histogram, and the
+/// first of equal ones.
+constexpr uint32_t no_histogram = ~0U;
+
+inline void find_nearest_histograms_one_by_one(const uint8_t* a, size_t a_count, const uint8_t* b,
+                                               size_t b_count, uint32_t* best_of_a,
+                                               uint32_t* best_of_b) {
+  int32_t squares_of_a[max_histograms];
   for (size_t i = 0; i < a_count; ++i) {
     const uint8_t* const histogram = a + i * histogram_dimensions;
     squares_of_a[i] = multiply_histograms(histogram, histogram);
-    distances_of_a[i] = 0x7FFFFFFF;
   }
   for (size_t j = 0; j < b_count; ++j) {
     const uint8_t* const histogram = b + j * histogram_dimensions;
     const int32_t square_of_b = multiply_histograms(histogram, histogram);
-    int32_t smallest = 0x7FFFFFFF;
     for (size_t i = 0; i < a_count; ++i) {
       const int32_t product = multiply_histograms(a + i * histogram_dimensions, histogram);
-      const int32_t distance = squares_of_a[i] + square_of_b - 2 * product;
-      if (distance < smallest) {
-        smallest = distance;
-        nearest_of_b[j] = static_cast<uint16_t>(i);
-      }
-      if (distance < distances_of_a[i]) {
-        distances_of_a[i] = distance;
-        nearest_of_a[i] = static_cast<uint16_t>(j);
-      }
+      const auto distance = static_cast<uint32_t>(squares_of_a[i] + square_of_b - 2 * product)
+                            << 16U;
+      const uint32_t here = distance | static_cast<uint32_t>(i);
+      const uint32_t there = distance | static_cast<uint32_t>(j);
+      best_of_b[j] = here < best_of_b[j] ? here : best_of_b[j];
+      best_of_a[i] = there < best_of_a[i] ? there : best_of_a[i];
     }
+  }
+}
+
+/// Compares each histogram of `b` with one of `a` in each number of 32 bits of a register. `a` has
+/// at most `block` histograms, the first of which has the index `first`.
+template <class Vector, size_t block>
+void find_nearest_histograms_by_vectors(const uint8_t* a, size_t a_count, size_t first,
+                                        const uint8_t* b, size_t b_count, uint32_t* best_of_a,
+                                        uint32_t* best_of_b) {
+  using Register = typename Vector::Register;
+  constexpr size_t lanes = sizeof(Register) / sizeof(uint32_t);
+  constexpr size_t words = histogram_dimensions / 4;
+  static_assert(block % lanes == 0);
+  uint32_t values[words][block];  // four values of each histogram
+  uint32_t squares[block];
+  uint32_t indices[block];  // of histograms that fill up the last register: above all others
+  uint32_t best[block];
+  const size_t padded = (a_count + lanes - 1) / lanes * lanes;
+  for (size_t i = 0; i < padded; ++i) {
+    const uint8_t* const histogram = a + (i < a_count ? i : 0) * histogram_dimensions;
+    for (size_t w = 0; w < words; ++w) __builtin_memcpy(&values[w][i], histogram + 4 * w, 4);
+    squares[i] = static_cast<uint32_t>(multiply_histograms(histogram, histogram));
+    indices[i] = i < a_count ? static_cast<uint32_t>(first + i) : no_histogram;
+    best[i] = no_histogram;
+  }
+  const auto in_each_number = [](uint64_t number) {
+    return Vector::broadcast(number | number << 32U);
+  };
+  for (size_t j = 0; j < b_count; ++j) {
+    const uint8_t* const histogram = b + j * histogram_dimensions;
+    Register values_of_b[words];
+    for (size_t w = 0; w < words; ++w) {
+      uint32_t four;
+      __builtin_memcpy(&four, histogram + 4 * w, sizeof four);
+      values_of_b[w] = in_each_number(four);
+    }
+    const Register square =
+        in_each_number(static_cast<uint64_t>(multiply_histograms(histogram, histogram)));
+    const Register index = in_each_number(j);
+    Register nearest = in_each_number(no_histogram);
+    for (size_t i = 0; i < padded; i += lanes) {
+      Register product = {};
+      for (size_t w = 0; w < words; ++w) {
+        product = Vector::add_products(product, Vector::load(values[w] + i), values_of_b[w]);
+      }
+      // No number of 32 bits becomes negative or exceeds 16 bits, so that those of 64 serve.
+      const Register distance = (Vector::load(squares + i) + square - product - product) << 16;
+      nearest = Vector::smaller(nearest, distance | Vector::load(indices + i));
+      const Register of_a = Vector::smaller(Vector::load(best + i), distance | index);
+      __builtin_memcpy(best + i, &of_a, sizeof of_a);
+    }
+    uint32_t of_lanes[lanes];
+    __builtin_memcpy(of_lanes, &nearest, sizeof nearest);
+    for (const uint32_t one : of_lanes) best_of_b[j] = one < best_of_b[j] ? one : best_of_b[j];
+  }
+  for (size_t i = 0; i < a_count; ++i) best_of_a[i] = best[i];
+}
+
+}  // namespace
+
+template <Instructions set>
+void FeatureMatchBody<set>::nearest_histograms(const uint8_t* a, size_t a_count, const uint8_t* b,
+                                               size_t b_count, uint16_t* nearest_of_a,
+                                               int32_t* distances_of_a, uint16_t* nearest_of_b) {
+  using Vector = ByteVector<set>;
+  uint32_t best_of_a[max_histograms];
+  uint32_t best_of_b[max_histograms];
+  for (size_t i = 0; i < a_count; ++i) best_of_a[i] = no_histogram;
+  for (size_t j = 0; j < b_count; ++j) best_of_b[j] = no_histogram;
+  if constexpr (requires(typename Vector::Register x) {
+                  Vector::smaller(x, x);
+                  Vector::add_products(x, x, x);
+                }) {
+    constexpr size_t block = 256;  // 32 kB of values stay in the first cache
+    for (size_t first = 0; first < a_count; first += block) {
+      const size_t left = a_count - first;
+      find_nearest_histograms_by_vectors<Vector, block>(a + first * histogram_dimensions,
+                                                        left < block ? left : block, first, b,
+                                                        b_count, best_of_a + first, best_of_b);
+    }
+  } else {
+    find_nearest_histograms_one_by_one(a, a_count, b, b_count, best_of_a, best_of_b);
+  }
+  for (size_t i = 0; i < a_count; ++i) {
+    distances_of_a[i] = b_count > 0 ? static_cast<int32_t>(best_of_a[i] >> 16U) : 0x7FFFFFFF;
+    if (b_count > 0) nearest_of_a[i] = static_cast<uint16_t>(best_of_a[i]);
+  }
+  for (size_t j = 0; j < b_count && a_count > 0; ++j) {
+    nearest_of_b[j] = static_cast<uint16_t>(best_of_b[j]);
   }
 }
 
