@@ -54,6 +54,20 @@ TEST(PinholeModel, AxesOfThePicture) {
   EXPECT_NEAR(unproject(camera, {322.25, 336.5})->elevation_rad(), -radians(45.0), 1e-12);
 }
 
+TEST(PinholeModel, FieldOfView) {
+  Camera camera = pinhole_camera({.focal_length_px = 320.0, .azimuth_rad = 3.0, .roll_rad = 0.4});
+  camera.centre = {320.0, 240.0};
+  EXPECT_NEAR(field_of_view(camera), radians(90.0), 1e-9);
+  // Barrel distortion shows more.
+  camera.distortion = {-0.1, 0.0, 0.0, 0.0, 0.0};
+  camera.rim_radius_px = 500.0;
+  ASSERT_NO_THROW(validate(camera));
+  EXPECT_GT(field_of_view(camera), radians(94.0));
+  camera.rim_radius_px = 200.0;  // nothing is seen beyond
+  EXPECT_NEAR(field_of_view(camera), 2.0 * std::atan(200.0 / 320.0), 0.01);
+  EXPECT_EQ(field_of_view(Camera{}), 0.0);
+}
+
 TEST(PinholeModel, FocalLengths) {
   EXPECT_NEAR(focal_length_from_field_of_view(640, radians(90.0)), 320.0, 1e-9);
   // A picture of 3:2 is film of 36 x 24 mm.
@@ -70,6 +84,11 @@ TEST(PinholeModel, FaultsAreNamed) {
   EXPECT_TRUE(contains(fault({.focal_length_px = 0.0}), "focal_length_px"));
   EXPECT_TRUE(contains(fault({.elevation_rad = 2.0}), "elevation_rad"));
   EXPECT_TRUE(contains(fault({.roll_rad = std::numeric_limits<double>::infinity()}), "roll_rad"));
+  Camera distorted = pinhole_camera({});
+  distorted.distortion = {-0.3, 0.0, 0.0, 0.0, 0.0};
+  EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(distorted); }), "rim_radius_px"));
+  distorted.rim_radius_px = 2000.0;  // folded far within
+  EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(distorted); }), "folds"));
   Camera outside = pinhole_camera({});
   outside.centre.u_px = 700.0;
   EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(outside); }), "centre.u_px"));

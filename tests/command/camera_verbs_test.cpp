@@ -136,8 +136,18 @@ TEST_F(CameraVerbs, ACalibrationOfAnotherProgramIsACameraFile) {
   const auto info = answer_of({"info", out_ / "lens.yaml", "--json"});
   EXPECT_TRUE(contains(info["summary"].get<std::string>(), "Kalibr (pinhole-equi) calibration"));
   write("narrow.yaml", "radtan");
-  expect_refusal({"unwrap", picture(0), "--camera", out_ / "narrow.yaml", "-o", out_ / "no.png"},
-                 "perspective camera, Kalibr (pinhole-radtan)");
+  const std::string narrow = out_ / "narrow.yaml";
+  expect_refusal({"unwrap", picture(0), "--camera", narrow, "-o", out_ / "no.png"},
+                 "narrow.yaml, a pinhole camera");
+  const auto converted = answer_of({"calibrate", narrow, "-o", out_ / "narrow.toml", "--json"});
+  EXPECT_EQ(converted["format"], "Kalibr (pinhole-radtan) calibration");
+  EXPECT_NEAR(converted["field_of_view_rad"].get<double>(),
+              field_of_view(read_camera(out_ / "narrow.toml").camera), 1e-9);
+  expect_refusal({"calibrate", narrow, "-o", out_ / "x.toml", "--mount", "down"}, "looks forward");
+  expect_refusal({"calibrate", out_ / "narrow.toml", "-o", out_ / "x.yaml", "--export", "kalibr"},
+                 "pinhole");
+  EXPECT_EQ(answer_of({"info", narrow, "--json"})["verbs"],
+            json::array({"localise --kind pinhole --camera"}));
 }
 
 TEST_F(CameraVerbs, CalibrateWithoutAMirrorIsNoAnswer) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -263,21 +264,65 @@ TEST_F(Calibrations, OCamCalibRowsAndColumns) {
   }
 }
 
-TEST_F(Calibrations, PerspectiveCamerasAreRefused) {
-  EXPECT_TRUE(contains(
-      refusal("cam0:\n  camera_model: pinhole\n  intrinsics: [458, 457, 367, 248]\n"
-              "  distortion_model: radtan\n  distortion_coeffs: [-0.28, 0.07, 0.0001, 1e-05]\n"
-              "  resolution: [752, 480]\n"),
-      "is the calibration of a perspective camera, Kalibr (pinhole-radtan), which does not see all "
-      "azimuths"));
-  EXPECT_TRUE(contains(
-      refusal(
-          "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n"
-          "  data: [ 500., 0., 320., 0., 500., 240., 0., 0., 1. ]\n"
-          "distortion_coefficients: !!opencv-matrix\n  data: [ -0.1, 0.1, 0., 0., 0. ]\n"),
-      "OpenCV (pinhole, 5 coefficients)"));
-  EXPECT_TRUE(contains(refusal("Camera:\n  model: perspective\n  cols: 640\n  rows: 480\n"),
-                       "stella_vslam (perspective)"));
+/// Pixel of a point in front of a distorted pinhole camera, as OpenCV's documentation defines it.
+PixelPoint project_as_opencv(double x, double y, const std::array<double, 5>& d) {
+  const double r2 = x * x + y * y;
+  const double radial = 1 + d[0] * r2 + d[1] * r2 * r2 + d[4] * r2 * r2 * r2;
+  const double u = x * radial + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x);
+  const double v = y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y;
+  return {458.0 * u + 367.0 + 0.5, 457.0 * v + 248.0 + 0.5};
+}
+
+TEST_F(Calibrations, PerspectiveCamerasOfFourProgramsAgreeWithOpenCv) {
+  const std::string matrix = "[458., 0., 367., 0., 457., 248., 0., 0., 1.]\n";
+  const std::string coefficients = "[-0.28, 0.07, 0.0001, 1e-05, 0.002]\n";
+  struct Written {
+    std::string text;
+    double k3;
+  };
+  const std::vector<Written> files{
+      {"cam0:\n  camera_model: pinhole\n  intrinsics: [458, 457, 367, 248]\n"
+       "  distortion_model: radtan\n  distortion_coeffs: [-0.28, 0.07, 0.0001, 1e-05]\n"
+       "  resolution: [752, 480]\n",
+       0.0},
+      {"%YAML:1.0\n---\nimage_width: 752\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n"
+       "  data: " +
+           matrix + "distortion_coefficients: !!opencv-matrix\n  data: " + coefficients,
+       0.002},
+      {"image_width: 752\nimage_height: 480\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: " +
+           matrix +
+           "distortion_model: plumb_bob\ndistortion_coefficients:\n  data: " + coefficients,
+       0.002},
+      {"Camera:\n  model: perspective\n  cols: 752\n  rows: 480\n  fx: 458.0\n  fy: 457.0\n"
+       "  cx: 367.0\n  cy: 248.0\n  k1: -0.28\n  k2: 0.07\n  p1: 0.0001\n  p2: 1e-05\n"
+       "  k3: 0.002\n",
+       0.002}};
+  for (const auto& [text, k3] : files) {
+    const Camera of_program = read(text).camera;
+    write_camera(folder / "again.toml", {of_program, std::nullopt});
+    const Camera camera = read_camera(folder / "again.toml").camera;
+    EXPECT_EQ(camera, of_program);
+    for (const double x : {-0.7, -0.2, 0.0, 0.4, 0.75}) {  // to the right
+      for (const double y : {-0.5, 0.0, 0.45}) {           // down
+        const auto pixel = project(camera, {1.0, -x, -y});
+        const PixelPoint expected = project_as_opencv(x, y, {-0.28, 0.07, 0.0001, 1e-05, k3});
+        ASSERT_TRUE(pixel) << text;
+        EXPECT_NEAR(pixel->u_px, expected.u_px, 1e-9);
+        EXPECT_NEAR(pixel->v_px, expected.v_px, 1e-9);
+        const auto seen = unproject(camera, *pixel);
+        ASSERT_TRUE(seen);
+        EXPECT_NEAR(-seen->y / seen->x, x, 1e-9);
+        EXPECT_NEAR(-seen->z / seen->x, y, 1e-9);
+      }
+    }
+    // Far off the picture the polynomial turns back into it.
+    EXPECT_FALSE(project(camera, {1.0, -2.2, 0.0}));
+  }
+  EXPECT_TRUE(
+      contains(refusal("image_width: 752\nimage_height: 480\ncamera_matrix:\n  data: " + matrix +
+                       "distortion_model: rational_polynomial\ndistortion_coefficients:\n"
+                       "  data: [0, 0, 0, 0, 0, 0.1, 0, 0]\n"),
+               "further ones must be 0"));
 }
 
 TEST_F(Calibrations, FaultsNameTheField) {

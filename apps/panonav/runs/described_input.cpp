@@ -37,7 +37,7 @@ struct Takers {
   std::string_view verbs;
   std::string_view option = {};
 };
-constexpr std::array<Takers, 11> takers{{
+constexpr std::array<Takers, 12> takers{{
     {InputKind::memory,
      "list show gallery verify rename forget prune undo history copy export localise track home "
      "serve ros2 map scale arrange memorise route_record route_follow merge synchronise navigate "
@@ -57,6 +57,7 @@ constexpr std::array<Takers, 11> takers{{
      "catchment"},
     {InputKind::live, "localise memorise track"},
     {InputKind::camera_file, "unwrap memorise localise map", "--camera"},
+    {InputKind::narrow_camera_file, "localise", "--kind pinhole --camera"},
     {InputKind::trajectory, "evaluate simulate"},
     {InputKind::scene, "simulate navigate"},
 }};
@@ -273,14 +274,21 @@ std::string model_name(const CameraModel& model) {
 DescribedInput describe_camera_file(const std::string& file) {
   const CameraFile camera = read_camera(file);
   const std::string format = camera.format.empty() ? "" : camera.format + " ";
+  const bool is_narrow = std::holds_alternative<PinholeModel>(camera.camera.model);
+  InputUse use{list_verbs_that_take(InputKind::camera_file),
+               {"panonav", "unwrap", "IMAGE", "--camera", file, "-o", "seen.png"}};
+  if (is_narrow) {
+    use = {list_verbs_that_take(InputKind::narrow_camera_file),
+           {"panonav", "localise", "MEMORY", "IMAGE", "--kind", "pinhole", "--camera", file}};
+  }
   return {.type = "camera file",
           .summary = format + "calibration of a camera with images of " +
                      format_size(camera.camera.image_size) + ", model " +
                      model_name(camera.camera.model) + (camera.mask ? ", with a mask" : ""),
           .bytes = find_file_bytes(file),
-          .facts = {"use it as --camera " + quote_for_shell(file)},
-          .use = {list_verbs_that_take(InputKind::camera_file),
-                  {"panonav", "unwrap", "IMAGE", "--camera", file, "-o", "seen.png"}}};
+          .facts = {(is_narrow ? "use it as --kind pinhole --camera " : "use it as --camera ") +
+                    quote_for_shell(file)},
+          .use = std::move(use)};
 }
 
 /// Returns the names of the sections "[NAME]" and the keys before the first section.

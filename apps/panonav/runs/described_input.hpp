@@ -26,6 +26,7 @@ enum class InputKind {
   recording,
   live,
   camera_file,
+  narrow_camera_file,  ///< of a pinhole camera
   trajectory,
   scene
 };

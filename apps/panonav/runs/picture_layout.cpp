@@ -42,6 +42,11 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
   }
   PictureSource source{.kind = PictureKind::mirror};
   auto camera = read_camera(*pictures.camera);
+  if (std::holds_alternative<PinholeModel>(camera.camera.model)) {
+    throw UsageError("--camera is " + *pictures.camera +
+                     ", a pinhole camera, which shows a part of the azimuth; allowed: one that "
+                     "shows all azimuths, or localise with --kind pinhole");
+  }
   if (!camera.format.empty()) {
     session.note(*pictures.camera + ": " + camera.format +
                  " calibration; the camera is taken for a lens that looks up, with its right side "

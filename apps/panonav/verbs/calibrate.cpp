@@ -308,8 +308,28 @@ ExitCode convert_camera(const CalibrateArguments& arguments, Session& session) {
     throw UsageError("--mount is " + mount + "; allowed: nothing, as " + input +
                      " contains the direction of the camera");
   }
+  const bool is_narrow = std::holds_alternative<PinholeModel>(camera.camera.model);
+  if (is_narrow && arguments.mount) {
+    throw UsageError("--mount is " + mount + "; allowed: nothing, as the perspective camera of " +
+                     input + " looks forward");
+  }
   write_result(arguments, camera, session);
   const std::string format = camera.format.empty() ? "camera file" : camera.format + " calibration";
+  if (is_narrow) {
+    const double width_rad = field_of_view(camera.camera);
+    if (session.json()) {
+      session.print(json_line({{"input", input},
+                               {"format", format},
+                               {"field_of_view_rad", width_rad},
+                               {"camera", arguments.out}}));
+      return ExitCode::done;
+    }
+    session.print(input + ": " + format + "; images show " +
+                  format_number(degrees(width_rad), "deg") +
+                  " degrees of the azimuth at the height of the camera");
+    session.print(arguments.out + " is written");
+    return ExitCode::done;
+  }
   const auto [bottom_rad, top_rad] = visible_elevations(camera.camera);
   if (session.json()) {
     session.print(json_line({{"input", input},

@@ -194,6 +194,7 @@ void validate(const Camera& camera) {
     validate_centre(camera);
     require(camera.direction == ColumnDirection::clockwise, "columns", 1.0,
             "clockwise: pictures of a pinhole lens are not mirrored");
+    validate_distortion(camera);
   } else {
     validate_mirror(camera);
   }
@@ -223,10 +224,7 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
     return second && (!first || second->weight > first->weight) ? second->pixel : first->pixel;
   }
   if (const auto* model = std::get_if<PinholeModel>(&camera.model)) {
-    const auto point = panonav::project(*model, direction);
-    if (!point) return std::nullopt;
-    return clamp_to_image(
-        camera, {camera.centre.u_px + point->right_px, camera.centre.v_px - point->up_px});
+    return project_from_lens(camera, *model, find_rotation(*model).lens_from_robot(direction));
   }
   const auto radius_px = radius_at(camera, elevation_rad);
   if (!radius_px) return std::nullopt;
@@ -235,6 +233,29 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
       distort(camera, {*radius_px * std::cos(angle_rad), -*radius_px * std::sin(angle_rad)});
   return clamp_to_image(
       camera, {camera.centre.u_px + offset.right_px, camera.centre.v_px + offset.down_px});
+}
+
+namespace {
+
+/// True if a distorted pinhole lens shows nothing at an offset of the ideal image.
+bool is_beyond_rim(const Camera& camera, const ImageOffset& ideal) {
+  return camera.distortion != Camera{}.distortion &&
+         std::hypot(ideal.right_px, ideal.down_px) > camera.rim_radius_px + tolerance_px(camera);
+}
+
+}  // namespace
+
+std::optional<PixelPoint> project_from_lens(const Camera& camera, const PinholeModel& model,
+                                            const Direction3& in_lens) {
+  const auto offset = project(model, in_lens);
+  if (!offset) return std::nullopt;
+  ImageOffset seen{offset->right_px, -offset->up_px};
+  if (!is_ideal_image(camera)) {
+    if (is_beyond_rim(camera, seen)) return std::nullopt;
+    seen = distort(camera, seen);
+  }
+  return clamp_to_image(camera,
+                        {camera.centre.u_px + seen.right_px, camera.centre.v_px + seen.down_px});
 }
 
 std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
@@ -256,8 +277,10 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
     return FisheyeLens::Rotation(lens).robot_from_lens(*in_lens);
   }
   if (const auto* model = std::get_if<PinholeModel>(&camera.model)) {
-    return panonav::unproject(*model, inside->u_px - camera.centre.u_px,
-                              camera.centre.v_px - inside->v_px);
+    const auto ideal =
+        undistort(camera, {inside->u_px - camera.centre.u_px, inside->v_px - camera.centre.v_px});
+    if (!ideal || is_beyond_rim(camera, *ideal)) return std::nullopt;
+    return panonav::unproject(*model, ideal->right_px, -ideal->down_px);
   }
   const auto ideal =
       undistort(camera, {inside->u_px - camera.centre.u_px, inside->v_px - camera.centre.v_px});
@@ -288,6 +311,20 @@ std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& ca
   if (first) result[0] = Camera::WeightedPixel{first->pixel, share};
   if (second) result[1] = Camera::WeightedPixel{second->pixel, 1.0 - share};
   return result;
+}
+
+double field_of_view(const Camera& camera) {
+  if (!std::holds_alternative<PinholeModel>(camera.model)) return 0.0;
+  const auto find = [&](double u_px) { return unproject(camera, {u_px, camera.centre.v_px}); };
+  double left_px = 0.0;
+  double right_px = camera.image_size.width;
+  while (left_px < camera.centre.u_px && !find(left_px)) left_px += 1.0;
+  while (right_px > camera.centre.u_px && !find(right_px)) right_px -= 1.0;
+  const auto left = find(left_px);
+  const auto right = find(right_px);
+  if (!left || !right) return 0.0;
+  return std::acos(
+      std::clamp(left->x * right->x + left->y * right->y + left->z * right->z, -1.0, 1.0));
 }
 
 ImageCircle image_circle(const Camera& camera, int lens) {

@@ -71,7 +71,7 @@ struct Camera {
   // Mirror cameras and lenses with a vertical axis (all models but equirectangular, dual fisheye
   // and pinhole). Radii are those of the ideal image, which is symmetric about the centre:
   PixelPoint centre;             ///< inside the image; also that of a pinhole lens
-  double rim_radius_px = 0.0;    ///< nothing is seen beyond
+  double rim_radius_px = 0.0;    ///< nothing is seen beyond; pinhole: only if it is distorted
   double inner_radius_px = 0.0;  ///< nothing is visible within (the camera's own reflection)
   /// Sense of rotation of azimuth in the displayed picture (u right, v down). Equirectangular:
   /// clockwise means that columns from left to right follow a right turn; most 360 degree pictures
@@ -88,8 +88,8 @@ struct Camera {
   /// Map from the ideal image to the picture, for pixels that are not square or a tilted sensor: c,
   /// d, e of OCamCalib. Offsets from the centre: right + e down, and c down + d right.
   std::array<double, 3> affine{1.0, 0.0, 0.0};
-  /// Lens distortion of a unified model, before `affine`: k1, k2, p1, p2, k3 of OpenCV, for offsets
-  /// from the centre divided by the focal length.
+  /// Lens distortion of a unified or pinhole model, before `affine`: k1, k2, p1, p2, k3 of OpenCV,
+  /// for offsets from the centre divided by the focal length.
   std::array<double, 5> distortion{};
   /// True if the elevations of the pixels were assumed, not measured, as the mirror's shape is
   /// unknown. Lengths from the image of the ground would be wrong by an unknown factor.
@@ -107,6 +107,12 @@ void validate(const Camera& camera);
 /// trigonometric operations; for a polynomial model about ten evaluations of it in addition.
 [[nodiscard]] std::optional<PixelPoint> project(const Camera& camera, const Direction3& direction);
 
+/// Projects a direction of the lens frame of a pinhole camera (`find_rotation`), as `project`: for
+/// many directions whose rotation was computed once.
+[[nodiscard]] std::optional<PixelPoint> project_from_lens(const Camera& camera,
+                                                          const PinholeModel& model,
+                                                          const Direction3& in_lens);
+
 /// Returns the unit direction that an image point shows; nullopt outside the domain of `project`.
 [[nodiscard]] std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel);
 
@@ -123,6 +129,10 @@ void validate(const Camera& camera);
 [[nodiscard]] inline int lens_at(const Camera& camera, PixelPoint pixel) {
   return lens_count(camera) == 2 && pixel.u_px >= 0.5 * camera.image_size.width ? 1 : 0;
 }
+
+/// Returns the angle between the outermost columns in which a pinhole camera shows anything at the
+/// height of its centre; 0 for any other camera.
+[[nodiscard]] double field_of_view(const Camera& camera);
 
 /// The part of the picture that a mirror or a lens covers.
 struct ImageCircle {

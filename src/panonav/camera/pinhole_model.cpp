@@ -7,17 +7,13 @@
 
 namespace panonav {
 
-namespace {
-
-FisheyeLens::Rotation make_lens_rotation(const PinholeModel& model) {
+FisheyeLens::Rotation find_rotation(const PinholeModel& model) {
   FisheyeLens lens;
   lens.azimuth_rad = model.azimuth_rad;
   lens.elevation_rad = model.elevation_rad;
   lens.roll_rad = model.roll_rad;
   return FisheyeLens::Rotation(lens);
 }
-
-}  // namespace
 
 void validate(const PinholeModel& model) {
   require(std::isfinite(model.focal_length_px) && model.focal_length_px > 0, "focal_length_px",
@@ -28,20 +24,17 @@ void validate(const PinholeModel& model) {
   require(std::isfinite(model.roll_rad), "roll_rad", model.roll_rad, "finite");
 }
 
-std::optional<FisheyeLens::Point> project(const PinholeModel& model, const Direction3& direction) {
-  const Direction3 in_lens = make_lens_rotation(model).lens_from_robot(direction);
-  const double length = std::hypot(in_lens.x, in_lens.y, in_lens.z);
+std::optional<PinholeModel::Offset> project(const PinholeModel& model, const Direction3& in_lens) {
   constexpr double min_cosine = 1e-3;  // beyond, offsets exceed a thousand focal lengths
-  if (!(in_lens.x > min_cosine * length)) return std::nullopt;
+  const double square = in_lens.x * in_lens.x + in_lens.y * in_lens.y + in_lens.z * in_lens.z;
+  if (!(in_lens.x > 0.0 && in_lens.x * in_lens.x > min_cosine * min_cosine * square)) return {};
   const double scale = model.focal_length_px / in_lens.x;
-  return FisheyeLens::Point{
-      -scale * in_lens.y, scale * in_lens.z,
-      std::numbers::pi / 2 - std::atan2(std::hypot(in_lens.y, in_lens.z), in_lens.x)};
+  return PinholeModel::Offset{-scale * in_lens.y, scale * in_lens.z};
 }
 
 Direction3 unproject(const PinholeModel& model, double right_px, double up_px) {
   const double length = std::hypot(model.focal_length_px, right_px, up_px);
-  return make_lens_rotation(model).robot_from_lens(
+  return find_rotation(model).robot_from_lens(
       {model.focal_length_px / length, -right_px / length, up_px / length});
 }
 

@@ -12,6 +12,12 @@ namespace panonav {
 /// direction at the angle theta from the optical axis is imaged at the distance r = f tan(theta)
 /// from the centre. Shows a part of the azimuth only. Valid for theta below a right angle.
 struct PinholeModel {
+  /// Offset of an image point from the centre.
+  struct Offset {
+    double right_px = 0.0;  ///< along u
+    double up_px = 0.0;     ///< against v
+  };
+
   double focal_length_px = 500.0;  ///< above 0
   double azimuth_rad = 0.0;        ///< of the optical axis in the robot frame
   double elevation_rad = 0.0;      ///< of the optical axis above the horizon
@@ -32,9 +38,11 @@ inline constexpr double max_field_of_view_rad = 2.6179938779914944;
 /// Throws ContractError that names the field, its value and its range.
 void validate(const PinholeModel& model);
 
-/// Projects a direction of the robot frame to the offset from the centre; nullopt behind the lens.
-[[nodiscard]] std::optional<FisheyeLens::Point> project(const PinholeModel& model,
-                                                        const Direction3& direction);
+/// Returns the rotation of the lens in the robot frame.
+[[nodiscard]] FisheyeLens::Rotation find_rotation(const PinholeModel& model);
+/// Projects a direction of the lens frame to the offset from the centre; nullopt behind the lens.
+[[nodiscard]] std::optional<PinholeModel::Offset> project(const PinholeModel& model,
+                                                          const Direction3& in_lens);
 /// Returns the unit direction in the robot frame that an offset from the centre shows.
 [[nodiscard]] Direction3 unproject(const PinholeModel& model, double right_px, double up_px);
 

@@ -133,6 +133,9 @@ double write_calibration(const std::filesystem::path& path, const Camera& camera
   if (std::holds_alternative<EquirectangularModel>(camera.model) || lens_count(camera) == 2) {
     throw ContractError("model", model_name(camera.model), "a mirror or a lens with one centre");
   }
+  if (std::holds_alternative<PinholeModel>(camera.model)) {
+    throw ContractError("model", "pinhole", "a mirror or a lens that sees all azimuths");
+  }
   const double max_shear = 1e-4;  // radians by which azimuths change, 0.006 degrees
   require(std::abs(camera.affine[1]) <= max_shear, "affine d", camera.affine[1],
           "-1e-4 .. 1e-4, as camera matrices have no such parameter");

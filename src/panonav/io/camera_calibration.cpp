@@ -162,10 +162,18 @@ double find_max_radius(double alpha, double beta) {
   return domain_share / std::sqrt(beta * (2 * alpha - 1));
 }
 
-[[noreturn]] void reject_perspective(const std::filesystem::path& path, const std::string& format) {
-  throw FileError(path.string(), "is the calibration of a perspective camera, " + format +
-                                     ", which does not see all azimuths; allowed: a fisheye, "
-                                     "omnidirectional or equirectangular camera");
+/// Makes a camera that looks forward. `distortion`: k1, k2, p1, p2 and k3 of the normalised plane;
+/// missing ones are 0.
+Camera make_pinhole(const Intrinsics& k, std::span<const double> distortion) {
+  constexpr double corner_factor = 3.0;  // as distortion may move far points inwards
+  Camera camera = place_camera(k, CameraMount::up);
+  camera.model = PinholeModel{.focal_length_px = k.fx};
+  std::ranges::copy(distortion.first(std::min(distortion.size(), camera.distortion.size())),
+                    camera.distortion.begin());
+  if (camera.distortion != Camera{}.distortion) {
+    camera.rim_radius_px = corner_factor * find_corner_radius(camera);
+  }
+  return camera;
 }
 
 ImageSize to_size(const YamlFields& yaml, const std::string& name, double width, double height) {
@@ -200,14 +208,15 @@ CalibratedCamera read_kalibr(const std::filesystem::path& path, const YamlFields
   const std::string distortion = yaml.text(prefix + "distortion_model").value_or("none");
   const std::string short_name = distortion == "equidistant" ? "equi" : distortion;
   const std::string format = "Kalibr (" + to_readable_line(model + "-" + short_name) + ")";
-  if (model == "pinhole" && short_name != "equi") reject_perspective(path, format);
   const std::size_t before = model == "omni" ? 1 : model == "ds" || model == "eucm" ? 2 : 0;
-  const bool is_known = (model == "pinhole" && short_name == "equi") ||
+  const bool is_pinhole = model == "pinhole" && (short_name == "radtan" || short_name == "none");
+  const bool is_known = is_pinhole || (model == "pinhole" && short_name == "equi") ||
                         (model == "omni" && (short_name == "radtan" || short_name == "none")) ||
                         (before == 2 && short_name == "none");
   if (!is_known) {
     yaml.fail(prefix + "camera_model", model + "-" + short_name,
-              "pinhole-equi, omni-radtan, omni-none, ds-none, eucm-none");
+              "pinhole-radtan, pinhole-none, pinhole-equi, omni-radtan, omni-none, ds-none, "
+              "eucm-none");
   }
   const auto n = yaml.numbers(prefix + "intrinsics", before + 4);
   const auto size = yaml.numbers(prefix + "resolution", 2);
@@ -216,6 +225,7 @@ CalibratedCamera read_kalibr(const std::filesystem::path& path, const YamlFields
   check_focal_lengths(yaml, prefix + "intrinsics", k);
   std::vector<double> coefficients(4, 0.0);
   if (short_name != "none") coefficients = yaml.numbers(prefix + "distortion_coeffs", 4);
+  if (is_pinhole) return {format, make_pinhole(k, coefficients)};
   if (model == "pinhole") return {format, make_fisheye(k, coefficients, mount)};
   if (model == "omni") return {format, make_omni(k, n[0], coefficients, mount)};
   const double beta = model == "eucm" ? n[1] : 1.0;
@@ -232,8 +242,7 @@ CalibratedCamera read_kalibr(const std::filesystem::path& path, const YamlFields
 }
 
 /// Reads OpenCV's FileStorage and the camera_info files of ROS.
-CalibratedCamera read_opencv(const std::filesystem::path& path, const YamlFields& yaml,
-                             CameraMount mount) {
+CalibratedCamera read_opencv(const YamlFields& yaml, CameraMount mount) {
   const auto find = [&yaml](std::vector<std::string> names) {
     std::vector<std::string> all;
     for (const std::string& name : names) {
@@ -269,17 +278,19 @@ CalibratedCamera read_opencv(const std::filesystem::path& path, const YamlFields
   const bool is_named_fisheye = model == "equidistant" || model == "fisheye" ||
                                 yaml.text("fisheye_model").value_or("0") == "1";
   if (!is_named_fisheye && (d.size() != 4 || !model.empty())) {
-    reject_perspective(path, "OpenCV (" + (model.empty() ? "pinhole" : to_readable_line(model)) +
-                                 ", " + std::to_string(d.size()) + " coefficients)");
+    const auto is_zero = [](double value) { return value == 0.0; };
+    if (d.size() > 5 && !std::ranges::all_of(std::span(d).subspan(5), is_zero)) {
+      yaml.fail(coefficients, std::to_string(d.size()) + " numbers",
+                "k1, k2, p1, p2 and k3 (plumb_bob); further ones must be 0");
+    }
+    return {"OpenCV (pinhole)", make_pinhole(k, d)};
   }
   return {"OpenCV (fisheye)", make_fisheye(k, yaml.numbers(coefficients, 4), mount)};
 }
 
-CalibratedCamera read_stella(const std::filesystem::path& path, const YamlFields& yaml,
-                             CameraMount mount) {
+CalibratedCamera read_stella(const YamlFields& yaml, CameraMount mount) {
   const std::string model = yaml.text("Camera.model").value_or("");
   const std::string format = "stella_vslam (" + to_readable_line(model) + ")";
-  if (model == "perspective" || model == "radial_division") reject_perspective(path, format);
   const auto number = [&](const std::string& name) {
     return yaml.numbers("Camera." + name, 1).front();
   };
@@ -290,11 +301,16 @@ CalibratedCamera read_stella(const std::filesystem::path& path, const YamlFields
     camera.image_size = size;
     return {format, camera};
   }
-  if (model != "fisheye") {
-    yaml.fail("Camera.model", model.empty() ? "missing" : model, "fisheye, equirectangular");
+  if (model != "fisheye" && model != "perspective") {
+    yaml.fail("Camera.model", model.empty() ? "missing" : model,
+              "perspective, fisheye, equirectangular");
   }
   const Intrinsics k{size, number("fx"), number("fy"), number("cx"), number("cy")};
   check_focal_lengths(yaml, "Camera.fx", k);
+  if (model == "perspective") {
+    return {format, make_pinhole(k, std::vector{number("k1"), number("k2"), number("p1"),
+                                                number("p2"), number("k3")})};
+  }
   return {
       format,
       make_fisheye(k, std::vector{number("k1"), number("k2"), number("k3"), number("k4")}, mount)};
@@ -400,7 +416,7 @@ CalibratedCamera parse_calibration(const std::filesystem::path& path, std::strin
     if (is_kalibr) {
       result = read_kalibr(path, yaml, mount);
     } else if (yaml.has("Camera.model")) {
-      result = read_stella(path, yaml, mount);
+      result = read_stella(yaml, mount);
     } else {
       const auto has_matrix = [&](const char* name) {
         return std::ranges::find(names, name) != names.end();
@@ -412,7 +428,7 @@ CalibratedCamera parse_calibration(const std::filesystem::path& path, std::strin
                         "of a camera), OpenCV or ROS (camera_matrix or K), stella_vslam "
                         "(Camera.model)");
       }
-      result = read_opencv(path, yaml, mount);
+      result = read_opencv(yaml, mount);
     }
   }
   shrink_rim_until_valid(result.camera, path);

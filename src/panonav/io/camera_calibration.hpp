@@ -36,8 +36,8 @@ struct CalibratedCamera {
 
 /// Reads a calibration file of another program (docs/conventions.md). `path` is for messages.
 /// Models that no model of `Camera` represents exactly (double sphere, extended unified) are fitted
-/// within 0.002 degrees, up to a smaller rim if necessary. Throws FileError that names the field,
-/// and on perspective cameras, which do not see all azimuths.
+/// within 0.002 degrees, up to a smaller rim if necessary. A perspective camera looks forward,
+/// whatever `mount` is. Throws FileError that names the field.
 [[nodiscard]] CalibratedCamera parse_calibration(const std::filesystem::path& path,
                                                  std::string_view text, CalibrationFormat format,
                                                  CameraMount mount);
@@ -51,8 +51,8 @@ enum class ExportFormat {
 /// Writes the camera as a Kalibr camchain or an OpenCV YAML file, as model pinhole-equi or
 /// cv::fisheye (of a `FisheyeModel`) or else as model omni of Mei, whose parameters are fitted if
 /// necessary; completely or not at all. Returns the largest difference of elevations, in radians.
-/// Throws ContractError if it exceeds 0.05 degrees, or for an equirectangular or dual fisheye
-/// camera; FileError.
+/// Throws ContractError if it exceeds 0.05 degrees, or for an equirectangular, dual fisheye or
+/// pinhole camera; FileError.
 double write_calibration(const std::filesystem::path& path, const Camera& camera,
                          ExportFormat format);
 

@@ -96,6 +96,9 @@ CameraFile read_camera(const std::filesystem::path& path, CameraMount mount) {
     camera.forward_column = fields.number("forward_column").value_or(0.5);
   } else if (std::holds_alternative<PinholeModel>(camera.model)) {
     camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
+    camera.rim_radius_px = fields.number("rim_radius_px").value_or(0.0);
+    read_fixed_numbers(fields, "affine", camera.affine);
+    read_fixed_numbers(fields, "distortion", camera.distortion);
   } else if (lens_count(camera) == 1) {
     camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
     camera.rim_radius_px = fields.required_number("rim_radius_px");
@@ -134,6 +137,10 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
       text += (i > 0 ? ", " : "") + to_text(values[i]);
     text += "]\n";
   };
+  const auto write_map = [&] {
+    if (camera.affine != Camera{}.affine) numbers("affine", camera.affine);
+    if (camera.distortion != Camera{}.distortion) numbers("distortion", camera.distortion);
+  };
   text += "model = \"" + std::string(model_name(camera.model)) + "\"\n";
   visit_parameters(camera.model, [&](std::string_view parameter, const auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
@@ -153,14 +160,15 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
   } else if (std::holds_alternative<PinholeModel>(camera.model)) {
     number("centre_u_px", camera.centre.u_px);
     number("centre_v_px", camera.centre.v_px);
+    if (camera.rim_radius_px != 0.0) number("rim_radius_px", camera.rim_radius_px);
+    write_map();
   } else if (lens_count(camera) == 1) {
     number("centre_u_px", camera.centre.u_px);
     number("centre_v_px", camera.centre.v_px);
     number("rim_radius_px", camera.rim_radius_px);
     number("inner_radius_px", camera.inner_radius_px);
     number("forward_angle_deg", to_exact_degrees(camera.forward_angle_rad));
-    if (camera.affine != Camera{}.affine) numbers("affine", camera.affine);
-    if (camera.distortion != Camera{}.distortion) numbers("distortion", camera.distortion);
+    write_map();
   }
   text += "columns = \"" + std::string(to_string(camera.direction)) + "\"\n";
   if (camera.has_assumed_elevations) {

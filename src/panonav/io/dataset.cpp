@@ -75,6 +75,10 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
   if (source.kind == PictureKind::mirror) {
     const std::string file = images.required_text("camera", "the name of a camera file");
     CameraFile camera = read_camera(folder / file);
+    if (std::holds_alternative<PinholeModel>(camera.camera.model)) {
+      images.fail("camera", "\"" + file + "\", a pinhole camera",
+                  "a camera that shows all azimuths, or kind = \"pinhole\"");
+    }
     source.camera = std::move(camera.camera);
     source.mask = std::move(camera.mask);
     source.layout.kept_elevations = band;

@@ -1,7 +1,6 @@
 #include "panonav/panorama/sector_view.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -49,6 +48,50 @@ double find_half_width(const Camera& camera, double middle_rad, const Tilt& tilt
   }
   return half_rad;
 }
+
+/// Directions of points within the solid angle of each value of a sector, in the frame of a lens.
+class LevelGrid {
+ public:
+  /// Number of points along each side of a value.
+  static constexpr int taps = 2;
+
+  LevelGrid(const SectorView& sector, const PinholeModel& lens, const Tilt& tilt) {
+    const FisheyeLens::Rotation rotation = find_rotation(lens);
+    const auto rotate = [&](const Direction3& level) {
+      return rotation.lens_from_robot(tilt_direction(level, tilt));
+    };
+    x_axis_ = rotate({1.0, 0.0, 0.0});
+    y_axis_ = rotate({0.0, 1.0, 0.0});
+    z_axis_ = rotate({0.0, 0.0, 1.0});
+    const auto offset = [](int tap) { return (tap + 0.5) / taps - 0.5; };
+    for (int i = 0; i < taps * sector.columns; ++i) {
+      const double azimuth_rad =
+          sector.first_azimuth_rad + (i / taps + offset(i % taps)) * sector.column_rad();
+      const auto [x, y, z] = Direction3::from_angles(azimuth_rad, 0.0);
+      across_.push_back({x * x_axis_.x + y * y_axis_.x, x * x_axis_.y + y * y_axis_.y,
+                         x * x_axis_.z + y * y_axis_.z});
+    }
+    for (int i = 0; i < taps * sector.panorama.rows; ++i) {
+      const double elevation_rad =
+          sector.elevations.top_rad - (i / taps + 0.5 + offset(i % taps)) * sector.row_rad();
+      cosines_.push_back(std::cos(elevation_rad));
+      sines_.push_back(std::sin(elevation_rad));
+    }
+  }
+  /// Returns the direction of tap `left` of column `x` and tap `down` of row `y`.
+  [[nodiscard]] Direction3 in_lens(int x, int left, int y, int down) const {
+    const Direction3& d = across_[static_cast<std::size_t>(taps * x + left)];
+    const auto row = static_cast<std::size_t>(taps * y + down);
+    const double c = cosines_[row];
+    const double s = sines_[row];
+    return {c * d.x + s * z_axis_.x, c * d.y + s * z_axis_.y, c * d.z + s * z_axis_.z};
+  }
+
+ private:
+  Direction3 x_axis_, y_axis_, z_axis_;  // of the level frame, in the frame of the lens
+  std::vector<Direction3> across_;       // horizontal directions of each tap of the columns
+  std::vector<double> cosines_, sines_;  // of the elevations of each tap of the rows
+};
 
 }  // namespace
 
@@ -103,26 +146,23 @@ SectorView unwarp_sector(ImageView picture, const Camera& camera, PanoramaShape 
   const auto size = static_cast<std::size_t>(shape.rows) * static_cast<std::size_t>(sector.columns);
   sector.values.resize(size);
   sector.visible.resize(size);
-  constexpr std::array<double, 2> taps{-0.25, 0.25};
+  const LevelGrid grid(sector, *lens, tilt);
   bool shows_any = false;
   std::size_t at = 0;
   for (int y = 0; y < shape.rows; ++y) {
     for (int x = 0; x < sector.columns; ++x, ++at) {
       double sum = 0.0;
       int seen = 0;
-      for (const double down : taps) {
-        for (const double left : taps) {
-          const auto level =
-              Direction3::from_angles(sector.first_azimuth_rad + (x + left) * step_rad,
-                                      elevations.top_rad - (y + 0.5 + down) * sector.row_rad());
-          const auto pixel = project(camera, tilt_direction(level, tilt));
+      for (int down = 0; down < LevelGrid::taps; ++down) {
+        for (int left = 0; left < LevelGrid::taps; ++left) {
+          const auto pixel = project_from_lens(camera, *lens, grid.in_lens(x, left, y, down));
           if (!pixel) continue;
           sum += sample_bilinearly(image, scale * pixel->u_px, scale * pixel->v_px);
           ++seen;
         }
       }
-      if (seen < 4) continue;
-      sector.values[at] = static_cast<float>(sum / (4.0 * 255.0));
+      if (seen < LevelGrid::taps * LevelGrid::taps) continue;
+      sector.values[at] = static_cast<float>(sum / (seen * 255.0));
       sector.visible[at] = 1;
       shows_any = true;
     }

@@ -39,8 +39,11 @@ bool is_distorted(const Camera& camera) {
 }
 
 double normalising_length_px(const Camera& camera) {
-  const auto* unified = std::get_if<UnifiedModel>(&camera.model);
-  return unified == nullptr ? 1.0 : unified->focal_length_px;
+  if (const auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
+    return unified->focal_length_px;
+  }
+  const auto* pinhole = std::get_if<PinholeModel>(&camera.model);
+  return pinhole == nullptr ? 1.0 : pinhole->focal_length_px;
 }
 
 }  // namespace
@@ -97,8 +100,11 @@ void validate_distortion(const Camera& camera) {
   const auto [c, d, e] = camera.affine;
   require(c - d * e > 0.1 && c < 10.0, "affine", c, "three numbers c, d, e with c - d e above 0.1");
   if (!is_distorted(camera)) return;
-  require(std::holds_alternative<UnifiedModel>(camera.model), "distortion", camera.distortion[0],
-          "zero, unless the model is unified");
+  require(std::holds_alternative<UnifiedModel>(camera.model) ||
+              std::holds_alternative<PinholeModel>(camera.model),
+          "distortion", camera.distortion[0], "zero, unless the model is unified or pinhole");
+  require(std::isfinite(camera.rim_radius_px) && camera.rim_radius_px > 0, "rim_radius_px",
+          camera.rim_radius_px, "finite and above 0 with a distortion");
   constexpr int radii = 64;
   constexpr int azimuths = 16;
   const double rim = camera.rim_radius_px / normalising_length_px(camera);
