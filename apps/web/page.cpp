@@ -131,7 +131,7 @@ class MemoryMaker {
     const Panorama panorama = encoder_->panorama(observation);
     encoded_ = NewView{.info = {observation.name, {}, {}},
                        .signature = encoder_->packed(panorama),
-                       .features = pack_features(*encoder_, panorama, true)};
+                       .features = feature_encoder_->packed(observation, panorama)};
     thumbnail_ = make_thumbnail(panorama);
     return &thumbnail_;
   }
@@ -155,12 +155,14 @@ class MemoryMaker {
     file_.emplace(MemoryFile::create(path_, header));
     set_narrow_features(*file_);
     encoder_.emplace(header, source);
+    feature_encoder_.emplace(header, source, true);
   }
 
   std::string path_;
   std::deque<Observation> waiting_;
   std::optional<MemoryFile> file_;
   std::optional<ViewEncoder> encoder_;
+  std::optional<FeatureEncoder> feature_encoder_;
   NewView encoded_;
   Image thumbnail_{1, 1};
 };

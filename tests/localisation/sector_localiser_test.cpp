@@ -56,8 +56,8 @@ TEST(SectorLocaliser, FindsTheRoomAndTheHeading) {
       EXPECT_TRUE(place.known);
       EXPECT_GT(place.probability, 0.9);
       ASSERT_TRUE(place.position);
-      EXPECT_NEAR(place.position->x_m, 10.0 * i, 1e-9);
-      EXPECT_NEAR(angle_difference(*place.heading_rad, 0.3 * i + azimuth_rad), 0.0, radians(1.0));
+      EXPECT_NEAR(place.position->x_m, 10.0 * i, 0.05);  // rooms beside it count a little
+      EXPECT_NEAR(angle_difference(*place.heading_rad, 0.3 * i + azimuth_rad), 0.0, radians(1.5));
     }
   }
 }

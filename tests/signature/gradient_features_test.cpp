@@ -34,7 +34,7 @@ SectorMatch match_one(const GradientFeatures& query, const GradientFeatures& ref
 TEST(GradientFeatures, ATurnedViewHasTheTurnedFeatures) {
   const GradientFeatures here = features_of(1);
   EXPECT_GT(here.corners.size(), 100U);
-  EXPECT_LE(here.corners.size(), 256U);
+  EXPECT_LE(here.corners.size(), std::size_t{GradientFeatures::max_count});
   const auto there = extract_gradient_features(rotate_columns(make_patch_view(1), 50)).value();
   ASSERT_EQ(there.corners.size(), here.corners.size());
   std::size_t found = 0;
@@ -46,8 +46,10 @@ TEST(GradientFeatures, ATurnedViewHasTheTurnedFeatures) {
       if (std::abs(turned_rad - 50 * 2.0 * std::numbers::pi / 360) < 1e-5) ++found;
     }
   }
-  // The choice among equally strong weakest corners depends on their columns.
-  EXPECT_GE(found, here.corners.size() - here.corners.size() / 32);
+  EXPECT_EQ(found, here.corners.size());
+  EXPECT_EQ(there.leading, here.leading);
+  EXPECT_GT(here.leading, 50U);
+  EXPECT_LT(here.leading, here.corners.size());
 }
 
 TEST(GradientFeatures, ASectorMatchesItsViewAtItsTurn) {
@@ -68,6 +70,43 @@ TEST(GradientFeatures, ASectorMatchesItsViewAtItsTurn) {
     const SectorMatch other = match_one(query, features_of(3));
     EXPECT_LT(other.score, 0.25 * same.score);
   }
+}
+
+/// Sum of the weights of a query's pairs with a reference among other ones.
+double sum_weights(const GradientFeatures& query, const GradientFeatures& reference) {
+  NearestFeatures nearest(query);
+  nearest.add(reference);
+  for (std::uint64_t seed = 100; seed < 106; ++seed) nearest.add(features_of(seed));
+  double sum = 0.0;
+  const auto pairs = nearest.weigh_pairs();
+  for (const SectorPair& pair : pairs.front()) sum += static_cast<double>(pair.weight);
+  return sum;
+}
+
+/// Returns by which factor patches of three sizes match better than those of one, where all things
+/// appear `enlarged` times as large as in the panorama.
+double gain_of_three_sizes(double enlarged) {
+  const Image picture = take_narrow_picture(make_patch_view(2), 0.0, radians(60.0));
+  Camera camera;
+  camera.image_size = {400, 300};
+  camera.centre = {200.0, 150.0};
+  const double focal_px = focal_length_from_field_of_view(400, radians(60.0));
+  camera.model = PinholeModel{.focal_length_px = focal_px / enlarged};
+  const GradientFeatures three =
+      extract_gradient_features(unwarp_sector(picture.view(), camera, patch_shape, patch_band));
+  std::size_t patches_of_first_size = 1;
+  while (three.corners.at(patches_of_first_size) != three.corners.front()) ++patches_of_first_size;
+  GradientFeatures one = three;
+  one.corners.resize(patches_of_first_size);
+  one.histograms.resize(patches_of_first_size);
+  return sum_weights(three, features_of(2)) / sum_weights(one, features_of(2));
+}
+
+TEST(GradientFeatures, LargerPatchesMatchWhatAppearsLarger) {
+  const double of_same_size = gain_of_three_sizes(1.0);
+  EXPECT_GE(of_same_size, 1.0);
+  EXPECT_GT(gain_of_three_sizes(std::numbers::sqrt2), of_same_size);
+  EXPECT_GT(gain_of_three_sizes(1.0 / std::numbers::sqrt2), of_same_size);
 }
 
 TEST(GradientFeatures, MirroredTwiceIsTheSameAndOnceIsAnother) {
@@ -94,6 +133,11 @@ TEST(GradientFeatures, PackAndJoinAndBack) {
   EXPECT_EQ(bytes.size(), view.corners.size() * GradientFeatures::packed_bytes);
   EXPECT_EQ(pack(unpack_gradient_features(bytes, patch_shape, patch_band), patch_shape, patch_band),
             bytes);
+  EXPECT_EQ(unpack_gradient_features(bytes, patch_shape, patch_band).leading, view.leading);
+  auto disordered = bytes;
+  disordered[disordered.size() - GradientFeatures::packed_bytes + 3] |=
+      0x80U;  // the last one leads
+  EXPECT_THROW((void)unpack_gradient_features(disordered, patch_shape, patch_band), ContractError);
   const std::vector<std::uint8_t> local(72, 7);
   const auto joined = join_feature_bytes({local, bytes});
   const FeatureBytes parts = split_feature_bytes(joined);

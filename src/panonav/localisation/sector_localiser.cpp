@@ -25,6 +25,8 @@ namespace {
 constexpr int sector_candidates = 12;
 /// Number of best views of a place whose mean gives position and heading: the corners of a square.
 constexpr std::size_t averaged_views = 4;
+/// Number of views that leading features preselect, unless more matches are asked for.
+constexpr std::size_t preselected_views = 24;
 /// Distances in spacings within which a view is the same place as the best one, and within which
 /// its position is averaged.
 constexpr double same_place_spacings = 2.0;
@@ -47,12 +49,12 @@ constexpr std::size_t sampled_compared = 100;
 
 double sector_place_probability(double score, double width_rad, std::size_t views) noexcept {
   if (!(score > 0.0)) return 0.0;
-  // Learnt on `ciirc_b670`, `indoor_walk_360`, `lab` and `corridor` (docs/decisions.md), with 31 to
-  // 265 views.
-  constexpr double offset = -17.7;
-  constexpr double per_log_score = 14.0;
-  constexpr double per_log_width = -8.28;  // wider pictures reach larger scores by chance
-  constexpr double per_log_views = 2.37;   // features of many views lie nearer to any
+  // Learnt on `ciirc_b670`, `indoor_walk_360`, `lab` and `corridor` (docs/decisions.md), with 9 to
+  // 117 views.
+  constexpr double offset = -18.8;
+  constexpr double per_log_score = 9.03;
+  constexpr double per_log_width = -4.50;  // wider pictures reach larger scores by chance
+  constexpr double per_log_views = -0.26;  // the largest of many scores by chance is larger
   constexpr double middle_width_rad = radians(70.0);
   constexpr double middle_views = 100.0;
   constexpr double min_views = 8.0;
@@ -94,17 +96,17 @@ SectorLocaliser::SectorLocaliser(const VisualMemory& memory, const GradientSourc
   }
 }
 
-std::vector<SectorLocaliser::Candidate> SectorLocaliser::find_candidates(
-    const GradientFeatures& query, int top, std::span<const std::size_t> compared,
-    bool has_known_tilt) const {
-  NearestFeatures nearest(query);
+std::vector<SectorLocaliser::Ranked> SectorLocaliser::rank(
+    const GradientFeatures& query, NearestFeatures::Part part, std::size_t top,
+    std::span<const std::size_t> compared) const {
+  NearestFeatures nearest(query, part);
   for (const std::size_t i : compared) nearest.add(references_[i].features);
   if (compared.size() < min_background_views) {
     for (const Reference& reference : references_) {
       nearest.add_background(mirror(reference.features));
     }
   }
-  const std::vector<std::vector<SectorPair>> pairs = nearest.weigh_pairs();
+  std::vector<std::vector<SectorPair>> pairs = nearest.weigh_pairs();
   struct Bounded {
     double bound;
     std::size_t number;
@@ -114,30 +116,37 @@ std::vector<SectorLocaliser::Candidate> SectorLocaliser::find_candidates(
     order.push_back({bound_score(query, references_[compared[k]].features, pairs[k]), k});
   }
   std::ranges::stable_sort(order, std::greater<>(), &Bounded::bound);
-  const auto count = static_cast<std::size_t>(std::max(1, top));
-  struct Numbered {
-    std::size_t number;
-    SectorMatch match;
-  };
-  std::vector<Numbered> best;  // descending score
+  std::vector<Ranked> best;  // descending score
   for (const auto& [bound, k] : order) {
-    if (best.size() == count && bound <= best.back().match.score) break;
-    const SectorMatch match =
-        verify_sector(query, references_[compared[k]].features, pairs[k], true);
-    const auto at = std::ranges::upper_bound(best, match.score, std::greater<>(),
-                                             [](const Numbered& b) { return b.match.score; });
-    best.insert(at, {k, match});
-    if (best.size() > count) best.pop_back();
+    if (best.size() == top && bound <= best.back().score) break;
+    const double score =
+        verify_sector(query, references_[compared[k]].features, pairs[k], true).score;
+    const auto at = std::ranges::upper_bound(best, score, std::greater<>(), &Ranked::score);
+    best.insert(at, {compared[k], std::move(pairs[k]), score});
+    if (best.size() > top) best.pop_back();
   }
+  return best;
+}
+
+std::vector<SectorLocaliser::Candidate> SectorLocaliser::find_candidates(
+    const GradientFeatures& query, int top, std::span<const std::size_t> compared,
+    bool has_known_tilt) const {
+  const auto count = static_cast<std::size_t>(std::max(1, top));
+  std::vector<std::size_t> preselected;
+  for (const Ranked& view :
+       rank(query, NearestFeatures::Part::leading, std::max(count, preselected_views), compared)) {
+    preselected.push_back(view.reference);
+  }
+  std::ranges::sort(preselected);
+  const std::vector<Ranked> best = rank(query, NearestFeatures::Part::all, count, preselected);
   const double roll_pitch_step = radians(2.5);
   GradientFeatures level = query;
   if (!has_known_tilt) {
     const auto sum_scores = [&](const Tilt& tilt) {
       const GradientFeatures turned = level_corners(query, tilt);
       double sum = 0.0;
-      for (std::size_t i = 0; i < std::min(tilt_candidates, best.size()); ++i) {
-        const std::size_t k = best[i].number;
-        sum += verify_sector(turned, references_[compared[k]].features, pairs[k], true).score;
+      for (const Ranked& view : std::span(best).first(std::min(tilt_candidates, best.size()))) {
+        sum += verify_sector(turned, references_[view.reference].features, view.pairs, true).score;
       }
       return sum;
     };
@@ -145,9 +154,9 @@ std::vector<SectorLocaliser::Candidate> SectorLocaliser::find_candidates(
     if (tilt != Tilt{}) level = level_corners(query, tilt);
   }
   std::vector<Candidate> candidates;
-  for (const auto& [k, match] : best) {
+  for (const Ranked& view : best) {
     candidates.push_back(
-        {compared[k], verify_sector(level, references_[compared[k]].features, pairs[k])});
+        {view.reference, verify_sector(level, references_[view.reference].features, view.pairs)});
   }
   std::ranges::stable_sort(candidates, std::greater<>(),
                            [](const Candidate& c) { return c.match.score; });

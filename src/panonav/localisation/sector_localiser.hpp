@@ -61,8 +61,7 @@ class SectorLocaliser {
  public:
   /// Loads the features of all views. `model`: one learnt from this memory before; nullopt: it is
   /// learnt now. `memory` must outlive *this. Throws ContractError if no view has gradient
-  /// features. Cost: learning takes about 0.3 ms for each pair of a cut view and one of up to 150
-  /// others, 1 s in all; 35 kB of RAM for each view.
+  /// features. Cost: learning takes about 2 s; 110 kB of RAM for each view.
   SectorLocaliser(const VisualMemory& memory, const GradientSource& features,
                   const std::optional<SectorModel>& model = std::nullopt);
 
@@ -70,15 +69,15 @@ class SectorLocaliser {
   [[nodiscard]] const SectorModel& model() const noexcept { return model_; }
 
   /// Localises one query; lists up to `top` matches:
-  /// 1. Its features are compared with those of all views, and weighted (`NearestFeatures`).
-  /// 2. Views are verified (`verify_sector`) in the order of a bound of their scores, until no
-  /// other
-  ///    view can be among the first `top`: the result is that of verifying all.
+  /// 1. Its leading features are compared with those of all views (`rank`). The first 24 are
+  ///    preselected, which kept the view that is best by all features in 286 of 297 cases of 31 to
+  ///    466 views.
+  /// 2. All features are compared with those of the preselected views.
   /// 3. If the tilt is unknown, the tilt under which the first views agree best is estimated.
   /// 4. The model states if the place is known, and shares the probability among places.
   ///
   /// `Place::matches` are by score; position and heading are means of the best views of the place.
-  /// Cost: 0.1 ms for each view and 0.1 ms for each verified one.
+  /// Cost: 20 ms and 0.05 ms for each view.
   [[nodiscard]] Place localise(const SectorQuery& query, int top,
                                std::span<const ViewId> excluded = {}) const;
 
@@ -97,6 +96,17 @@ class SectorLocaliser {
     double share = 0.0;
   };
 
+  struct Ranked {
+    std::size_t reference = 0;      ///< index of `references_`
+    std::vector<SectorPair> pairs;  ///< of the query with the reference
+    double score = 0.0;
+  };
+  /// Returns the first `top` of the compared views by a part of the features, which are weighted
+  /// (`NearestFeatures`). Views are verified in the order of a bound of their scores until no other
+  /// view can be among the first ones: the result is that of verifying all.
+  [[nodiscard]] std::vector<Ranked> rank(const GradientFeatures& query, NearestFeatures::Part part,
+                                         std::size_t top,
+                                         std::span<const std::size_t> compared) const;
   [[nodiscard]] std::vector<Candidate> find_candidates(const GradientFeatures& query, int top,
                                                        std::span<const std::size_t> compared,
                                                        bool has_known_tilt) const;

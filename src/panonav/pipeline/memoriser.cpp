@@ -108,7 +108,7 @@ Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions optio
     : path_(memory), options_(std::move(options)) {
   if (memory_exists(path_)) {
     file_ = MemoryFile::open(path_, Access::read_write);
-    encoder_.emplace(file_->header(), options_.source.value_or(file_->header().source));
+    make_encoders(options_.source.value_or(file_->header().source));
   } else if (!options_.source) {
     throw ContractError("source of " + mask_passwords(path_.string()), "empty",
                         "the type of images, because the file is new");
@@ -190,15 +190,19 @@ MemoryHeader Memoriser::make_header_from_waiting(Executor& executor) const {
   }
 }
 
+void Memoriser::make_encoders(const PictureSource& source) {
+  encoder_.emplace(file_->header(), source);
+  feature_encoder_.emplace(file_->header(), source, has_narrow_features(*file_));
+}
+
 void Memoriser::make_file(Executor& executor) {
   file_ = MemoryFile::create(path_, make_header_from_waiting(executor));
   if (options_.narrow) set_narrow_features(*file_);
-  encoder_.emplace(file_->header(), *options_.source);
+  make_encoders(*options_.source);
   store(std::exchange(waiting_, {}), executor);
 }
 
 void Memoriser::store(std::span<const Observation> observations, Executor& executor) {
-  const bool is_narrow = has_narrow_features(*file_);
   std::vector<NewView> views(observations.size());
   std::vector<std::exception_ptr> failures(observations.size());
   parallel_for(executor, observations.size(), [&](std::size_t i) {
@@ -210,7 +214,7 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
         const Panorama panorama = encoder_->panorama(observation);
         views[i].signature = encoder_->packed(panorama);
         if (options_.thumbnails) views[i].thumbnail = encode_thumbnail(panorama);
-        if (features) views[i].features = pack_features(*encoder_, panorama, is_narrow);
+        if (features) views[i].features = feature_encoder_->packed(observation, panorama);
       } else {
         views[i].signature = encoder_->packed(observation);
       }

@@ -12,6 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/pipeline/memory_map.hpp"
+#include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -116,6 +117,7 @@ class Memoriser {
  private:
   void convert_large_waiting(Executor& executor);
   void make_file(Executor& executor);
+  void make_encoders(const PictureSource& source);
   [[nodiscard]] MemoryHeader make_header_from_waiting(Executor& executor) const;
   void store(std::span<const Observation> observations, Executor& executor);
   void require_same_view(const Observation& observation, const PackedSignature& signature,
@@ -129,6 +131,7 @@ class Memoriser {
   std::vector<Observation> waiting_;
   std::optional<MemoryFile> file_;
   std::optional<ViewEncoder> encoder_;
+  std::optional<FeatureEncoder> feature_encoder_;
   Counts counts_;
   std::map<std::string, Pose2> odometry_;  // by the name of the view
   std::map<std::string, ViewId> renamed_;  // by the name of the observation

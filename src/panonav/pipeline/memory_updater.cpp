@@ -96,6 +96,7 @@ struct MemoryUpdater::Implementation {
       : file(MemoryFile::open(path, Access::read_write)),
         memory(file.load()),
         encoder(file.header(), file.header().source),
+        feature_encoder(file.header(), file.header().source, has_narrow_features(file)),
         ranking(memory),
         update(ranking, load_or_learn_model(file, ranking),
                parse_memory_use(file.parameter(use_parameter)), options) {}
@@ -103,6 +104,7 @@ struct MemoryUpdater::Implementation {
   MemoryFile file;
   VisualMemory memory;
   ViewEncoder encoder;
+  FeatureEncoder feature_encoder;
   ColumnRanking ranking;
   MemoryUpdate update;
   std::map<std::size_t, NewView> candidate_views;  // by number of the observation in the run
@@ -143,7 +145,7 @@ void MemoryUpdater::observe(const Observation& observation, const Panorama& pano
   if (!self.update.can_become_view(number)) return;
   view.thumbnail = encode_thumbnail(panorama);
   if (self.file.header().elevations) {
-    view.features = pack_features(self.encoder, panorama, has_narrow_features(self.file));
+    view.features = self.feature_encoder.packed(observation, panorama);
   }
   self.candidate_views.emplace(number, std::move(view));
 }

@@ -3,9 +3,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 
 #include "panonav/core/error.hpp"
+#include "panonav/panorama/picture.hpp"
 #include "panonav/signature/gradient_features.hpp"
+#include "panonav/signature/local_features.hpp"
 
 namespace panonav {
 
@@ -13,7 +16,7 @@ namespace {
 
 /// Parameter of memories whose views have gradient features, and its value.
 constexpr std::string_view narrow_parameter = "narrow_features";
-constexpr std::string_view gradient_version = "gradient 1";
+constexpr std::string_view gradient_version = "gradient 2";
 
 }  // namespace
 
@@ -42,22 +45,52 @@ GradientSource make_gradient_source(const MemoryFile& file) {
     const auto parts = split_feature_bytes(*bytes);
     if (parts.gradient.empty()) return std::nullopt;
     try {
-      return unpack_gradient_features(parts.gradient, {header.shape.rows, header.panorama_columns},
-                                      *header.elevations);
+      return unpack_gradient_features(
+          parts.gradient, find_gradient_shape({header.shape.rows, header.panorama_columns}),
+          *header.elevations);
     } catch (const ContractError& error) {
       throw FileError(file.path().string(), "is damaged: " + std::string(error.what()));
     }
   };
 }
 
-std::vector<std::uint8_t> pack_features(const ViewEncoder& encoder, const Panorama& panorama,
-                                        bool narrow) {
-  const auto local = pack(encoder.features(panorama).value());
-  if (!narrow) return local;
-  const MemoryHeader& header = encoder.header();
-  const auto gradient = extract_gradient_features(panorama, header.preprocessing).value();
-  return join_feature_bytes(
-      {local, pack(gradient, {panorama.rows(), panorama.columns()}, *header.elevations)});
+MemoryHeader refine_header(const MemoryHeader& header) {
+  MemoryHeader fine = header;
+  const PanoramaShape shape = find_gradient_shape({header.shape.rows, header.panorama_columns});
+  const int times = shape.rows / header.shape.rows;
+  if (times > 1 && !fine.picture_shape && fine.source.kind == PictureKind::panorama) {
+    fine.picture_shape = PanoramaShape{header.shape.rows, header.panorama_columns};
+  }
+  fine.shape.rows = shape.rows;
+  fine.panorama_columns = shape.columns;
+  fine.preprocessing.masked_rows_top *= times;
+  fine.preprocessing.masked_rows_bottom *= times;
+  return fine;
+}
+
+FeatureEncoder::FeatureEncoder(const MemoryHeader& header, const PictureSource& source, bool narrow)
+    : header_(header) {
+  if (narrow) fine_.emplace(refine_header(header), source);
+}
+
+std::vector<std::uint8_t> FeatureEncoder::packed(const Observation& observation,
+                                                 const Panorama& panorama) const {
+  const auto local = pack(extract_features(panorama, header_.preprocessing).value());
+  if (!fine_) return local;
+  const MemoryHeader& header = fine_->header();
+  const PanoramaShape shape{header.shape.rows, header.panorama_columns};
+  const auto enlarge = [&] {
+    const Image picture = to_picture(panorama);
+    return panorama_from_picture(picture.view(),
+                                 {.forward_column = picture_forward_column(panorama.columns()),
+                                  .elevations = panorama.elevations()},
+                                 shape);
+  };
+  const Panorama fine = std::holds_alternative<Panorama>(observation.picture)
+                            ? enlarge()
+                            : fine_->panorama(observation);
+  const auto gradient = extract_gradient_features(fine, header.preprocessing).value();
+  return join_feature_bytes({local, pack(gradient, shape, *header.elevations)});
 }
 
 }  // namespace panonav

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "panonav/localisation/sector_localiser.hpp"
@@ -21,9 +22,25 @@ void require_narrow_features(const MemoryFile& file);
 /// outlive the function. Throws as `require_narrow_features`.
 [[nodiscard]] GradientSource make_gradient_source(const MemoryFile& file);
 
-/// Returns the packed features of a view for the memory: local features, and gradient features if
-/// `narrow`. Throws ContractError if elevations are unknown.
-[[nodiscard]] std::vector<std::uint8_t> pack_features(const ViewEncoder& encoder,
-                                                      const Panorama& panorama, bool narrow);
+/// Computes the features that a memory stores with its views: local features, and gradient features
+/// if the memory takes narrow pictures. Several threads may use one encoder concurrently.
+class FeatureEncoder {
+ public:
+  /// `source`: layout of the images. `narrow`: also gradient features.
+  FeatureEncoder(const MemoryHeader& header, const PictureSource& source, bool narrow);
+
+  /// Returns the packed features of an observation whose panorama is `panorama`. Gradient features
+  /// come from a finer cylinder of a picture (`find_gradient_shape`); a ready panorama is enlarged.
+  /// Throws ContractError if elevations are unknown.
+  [[nodiscard]] std::vector<std::uint8_t> packed(const Observation& observation,
+                                                 const Panorama& panorama) const;
+
+ private:
+  MemoryHeader header_;
+  std::optional<ViewEncoder> fine_;  // set if narrow
+};
+
+/// Returns the header of a memory whose cylinders are those of gradient features.
+[[nodiscard]] MemoryHeader refine_header(const MemoryHeader& header);
 
 }  // namespace panonav

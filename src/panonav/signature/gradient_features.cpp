@@ -1,23 +1,37 @@
 #include "panonav/signature/gradient_features.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <tuple>
+#include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/kernels/types.hpp"
 
 namespace panonav {
 
 namespace {
 
-/// Half of the side of the patch that a histogram describes. On crops of `ciirc_b670` smaller ones
-/// recognise fewer places (docs/decisions.md).
-constexpr double gradient_patch_rad = radians(8.0);
-/// Half-width of an azimuth window, and the largest number of corners kept in it.
-constexpr double gradient_window_rad = radians(6.0);
-constexpr int max_corners_in_window = 12;
+/// Half of the side of the patch that a histogram of a panorama describes, for cylinders of 1,024
+/// columns (docs/decisions.md).
+constexpr double gradient_patch_rad = radians(4.0);
+/// Sizes of the patches of a narrow picture relative to that: half an octave to each side.
+constexpr std::array<double, 3> sector_patch_scales{1.0, 1.0 / std::numbers::sqrt2,
+                                                    std::numbers::sqrt2};
+/// Half-width of an azimuth window, and the largest number of corners kept in it. Panoramas keep
+/// more, since the picture of another place shows some of them stronger than others.
+constexpr double gradient_window_rad = radians(3.0);
+constexpr int max_corners_of_panorama = 20;
+constexpr int max_corners_of_sector = 12;
+constexpr int max_leading_in_window = 5;
+/// Corners of a narrow picture at most: `kernels::max_histograms` over the number of patches.
+constexpr std::size_t max_sector_corners = kernels::max_histograms / sector_patch_scales.size();
+/// Number of columns of a cylinder for features, to which multiples of a memory's are the nearest.
+constexpr int gradient_columns = 1024;
 /// Strength of a gradient of a third of a grey level per pixel in its weaker direction; factors as
 /// in `LocalFeatures`. Corners of dark rooms count, too: the histogram is normalised.
 constexpr float min_corner_strength = 0.1F * 25.0F * (2.0F * 9.0F) * (2.0F * 9.0F);
@@ -108,12 +122,12 @@ GradientField compute_gradients(const Grid& grid) {
 }
 
 /// Computes the smaller eigenvalue of the structure tensor over 5 x 5 pixels [Shi and Tomasi 1994];
-/// 0 where a gradient is unknown.
+/// 0 where a gradient is unknown. Beside the first and last column, too, where azimuths repeat.
 std::vector<float> compute_strengths(const Grid& grid, const GradientField& field) {
   std::vector<float> strengths(field.along.size());
   const auto stride = static_cast<std::ptrdiff_t>(grid.stride);
   for (int y = 0; y < grid.rows; ++y) {
-    for (int x = 0; x < grid.columns; ++x) {
+    for (int x = -2; x < grid.columns + 2; ++x) {
       const auto at = static_cast<std::ptrdiff_t>(grid.index(y, x));
       float xx = 0.0F;
       float xy = 0.0F;
@@ -139,6 +153,7 @@ std::vector<float> compute_strengths(const Grid& grid, const GradientField& fiel
 struct FoundCorner {
   int column, row;
   float strength;
+  int stronger = 0;  // number of stronger corners in the window around it
 };
 
 bool is_local_maximum(const Grid& grid, const std::vector<float>& strengths, int row, int column) {
@@ -152,25 +167,42 @@ bool is_local_maximum(const Grid& grid, const std::vector<float>& strengths, int
   return true;
 }
 
-/// Keeps the corners that fewer than `max_corners_in_window` stronger ones are near to, and of
-/// these the `max_count` strongest. `period`: columns after which azimuths repeat; 0: they do not.
-std::vector<FoundCorner> spread_corners(const std::vector<FoundCorner>& all, int window,
-                                        int period) {
-  std::vector<FoundCorner> kept;
+/// Counts the stronger corners in the window around each. `period`: columns after which azimuths
+/// repeat; 0: they do not.
+void count_stronger(std::vector<FoundCorner>& all, int columns, int window, int period) {
+  std::vector<std::vector<float>> strengths(static_cast<std::size_t>(columns));
   for (const FoundCorner& corner : all) {
-    const auto stronger = std::ranges::count_if(all, [&](const FoundCorner& other) {
-      const int apart = std::abs(other.column - corner.column);
-      return other.strength > corner.strength &&
-             (period > 0 ? std::min(apart, period - apart) : apart) <= window;
-    });
-    if (stronger < max_corners_in_window) kept.push_back(corner);
+    strengths[static_cast<std::size_t>(corner.column)].push_back(corner.strength);
   }
-  if (kept.size() > GradientFeatures::max_count) {
-    std::ranges::stable_sort(kept, std::greater<>(), &FoundCorner::strength);
-    kept.resize(GradientFeatures::max_count);
-    std::ranges::sort(kept, {}, [](const FoundCorner& c) { return std::pair(c.row, c.column); });
+  for (FoundCorner& corner : all) {
+    for (int x = corner.column - window; x <= corner.column + window; ++x) {
+      const int at = period > 0 ? ((x % period) + period) % period : x;
+      if (at < 0 || at >= columns) continue;
+      corner.stronger += static_cast<int>(
+          std::ranges::count_if(strengths[static_cast<std::size_t>(at)],
+                                [&](float other) { return other > corner.strength; }));
+    }
   }
-  return kept;
+}
+
+/// Number of corners that are kept.
+struct CornerLimits {
+  int in_window;      // around each, that are as strong
+  std::size_t count;  // in all; the strongest ones
+};
+
+/// Keeps the corners within the limits, leading ones first, each by row and column.
+std::vector<FoundCorner> spread_corners(std::vector<FoundCorner> corners,
+                                        const CornerLimits& limits) {
+  std::erase_if(corners, [&](const FoundCorner& c) { return c.stronger >= limits.in_window; });
+  if (corners.size() > limits.count) {
+    std::ranges::stable_sort(corners, std::greater<>(), &FoundCorner::strength);
+    corners.resize(limits.count);
+  }
+  std::ranges::sort(corners, {}, [](const FoundCorner& c) {
+    return std::tuple(c.stronger >= max_leading_in_window, c.row, c.column);
+  });
+  return corners;
 }
 
 /// A sample of a patch and the two by two cells to which it contributes.
@@ -263,13 +295,20 @@ struct GridLayout {
 struct PatchRadii {
   int rows, columns;
 };
-PatchRadii find_patch_radii(double row_rad, double column_rad, int rows) {
+PatchRadii find_patch_radii(const GridLayout& layout, double scale, int rows) {
+  const double patch_rad = scale * gradient_patch_rad;
   return {
-      std::clamp(static_cast<int>(std::lround(gradient_patch_rad / row_rad)), 3, std::max(3, rows)),
-      std::max(3, static_cast<int>(std::lround(gradient_patch_rad / column_rad)))};
+      std::clamp(static_cast<int>(std::lround(patch_rad / layout.row_rad)), 3, std::max(3, rows)),
+      std::max(3, static_cast<int>(std::lround(patch_rad / layout.column_rad)))};
 }
 
-GradientFeatures extract_from(const Grid& grid, const GridLayout& layout, const PatchRadii& radii) {
+/// Radii of the largest of several patches.
+PatchRadii find_margins(const GridLayout& layout, std::span<const double> scales, int rows) {
+  return find_patch_radii(layout, std::ranges::max(scales), rows);
+}
+
+GradientFeatures extract_from(const Grid& grid, const GridLayout& layout,
+                              std::span<const double> scales, const CornerLimits& limits) {
   const GradientField field = compute_gradients(grid);
   const std::vector<float> strengths = compute_strengths(grid, field);
   std::vector<FoundCorner> all;
@@ -282,15 +321,21 @@ GradientFeatures extract_from(const Grid& grid, const GridLayout& layout, const 
     }
   }
   const auto window = static_cast<int>(gradient_window_rad / layout.column_rad);
-  const std::vector<PatchSample> patch = make_patch(radii.columns, radii.rows);
+  count_stronger(all, grid.columns, window, layout.period);
+  const std::vector<FoundCorner> kept = spread_corners(std::move(all), limits);
   GradientFeatures found;
-  for (const FoundCorner& corner : spread_corners(all, window, layout.period)) {
-    const auto histogram = describe_patch(grid, field, patch, corner);
-    if (!histogram) continue;
-    found.corners.push_back(
-        {static_cast<float>(layout.first_azimuth_rad + corner.column * layout.column_rad),
-         static_cast<float>(layout.top_rad - (corner.row + 0.5) * layout.row_rad)});
-    found.histograms.push_back(*histogram);
+  for (const double scale : scales) {
+    const PatchRadii radii = find_patch_radii(layout, scale, grid.rows);
+    const std::vector<PatchSample> patch = make_patch(radii.columns, radii.rows);
+    for (const FoundCorner& corner : kept) {
+      const auto histogram = describe_patch(grid, field, patch, corner);
+      if (!histogram) continue;
+      found.corners.push_back(
+          {static_cast<float>(layout.first_azimuth_rad + corner.column * layout.column_rad),
+           static_cast<float>(layout.top_rad - (corner.row + 0.5) * layout.row_rad)});
+      found.histograms.push_back(*histogram);
+      if (scale == scales.front() && corner.stronger < max_leading_in_window) ++found.leading;
+    }
   }
   return found;
 }
@@ -299,11 +344,15 @@ bool is_masked_row(const PreprocessingOptions& preprocessing, int row, int rows)
   return row < preprocessing.masked_rows_top || row >= rows - preprocessing.masked_rows_bottom;
 }
 
-/// Marks the end of an entry with gradient features: after it comes their number of bytes.
-constexpr std::array<std::uint8_t, 4> gradient_mark{'G', 'R', 'A', '1'};
-constexpr std::size_t trailer_bytes = gradient_mark.size() + 4;
-
 }  // namespace
+
+PanoramaShape find_gradient_shape(PanoramaShape shape) noexcept {
+  constexpr int max_times = 8;
+  const auto times =
+      static_cast<int>(std::lround(gradient_columns / std::max(1.0, 1.0 * shape.columns)));
+  const int used = std::clamp(times, 1, max_times);
+  return {used * shape.rows, used * shape.columns};
+}
 
 std::optional<GradientFeatures> extract_gradient_features(
     const Panorama& panorama, const PreprocessingOptions& preprocessing) {
@@ -314,7 +363,8 @@ std::optional<GradientFeatures> extract_gradient_features(
   const ElevationBand& band = *panorama.elevations();
   const GridLayout layout{0.0, 2.0 * std::numbers::pi / columns, band.top_rad,
                           (band.top_rad - band.bottom_rad) / rows, columns};
-  const PatchRadii radii = find_patch_radii(layout.row_rad, layout.column_rad, rows);
+  constexpr std::array<double, 1> scales{1.0};
+  const PatchRadii radii = find_margins(layout, scales, rows);
   Grid grid(rows, columns, radii.rows + corner_margin, radii.columns + corner_margin);
   for (int y = 0; y < rows; ++y) {
     if (is_masked_row(preprocessing, y, rows)) continue;
@@ -324,7 +374,7 @@ std::optional<GradientFeatures> extract_gradient_features(
       grid.visible[grid.index(y, x)] = 1;
     }
   }
-  return extract_from(grid, layout, radii);
+  return extract_from(grid, layout, scales, {max_corners_of_panorama, GradientFeatures::max_count});
 }
 
 GradientFeatures extract_gradient_features(const SectorView& sector,
@@ -332,7 +382,7 @@ GradientFeatures extract_gradient_features(const SectorView& sector,
   const int rows = sector.panorama.rows;
   const GridLayout layout{sector.first_azimuth_rad, sector.column_rad(), sector.elevations.top_rad,
                           sector.row_rad(), 0};
-  const PatchRadii radii = find_patch_radii(layout.row_rad, layout.column_rad, rows);
+  const PatchRadii radii = find_margins(layout, sector_patch_scales, rows);
   Grid grid(rows, sector.columns, radii.rows + corner_margin, radii.columns + corner_margin);
   for (int y = 0; y < rows; ++y) {
     if (is_masked_row(preprocessing, y, rows)) continue;
@@ -343,13 +393,15 @@ GradientFeatures extract_gradient_features(const SectorView& sector,
       grid.visible[grid.index(y, x)] = 1;
     }
   }
-  return extract_from(grid, layout, radii);
+  return extract_from(grid, layout, sector_patch_scales,
+                      {max_corners_of_sector, max_sector_corners});
 }
 
 GradientFeatures mirror(const GradientFeatures& features) {
   constexpr int cells = GradientFeatures::cells;
   constexpr int directions = GradientFeatures::directions;
   GradientFeatures mirrored;
+  mirrored.leading = features.leading;
   for (const auto& corner : features.corners) {
     mirrored.corners.push_back({-corner.azimuth_rad, corner.elevation_rad});
   }
@@ -379,81 +431,9 @@ GradientFeatures cut_sector(const GradientFeatures& features, double middle_rad,
     }
     cut.corners.push_back({static_cast<float>(turned_rad), elevation_rad});
     cut.histograms.push_back(features.histograms[i]);
+    if (i < features.leading) ++cut.leading;
   }
   return cut;
-}
-
-std::vector<std::uint8_t> pack(const GradientFeatures& features, PanoramaShape shape,
-                               const ElevationBand& elevations) {
-  const double column_rad = 2.0 * std::numbers::pi / shape.columns;
-  const double row_rad = (elevations.top_rad - elevations.bottom_rad) / shape.rows;
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(features.corners.size() * GradientFeatures::packed_bytes);
-  for (std::size_t i = 0; i < features.corners.size(); ++i) {
-    const auto& corner = features.corners[i];
-    const auto column = static_cast<unsigned>(std::lround(corner.azimuth_rad / column_rad));
-    const auto row = static_cast<unsigned>(
-        std::lround((elevations.top_rad - corner.elevation_rad) / row_rad - 0.5));
-    for (const unsigned value : {column, row}) {
-      bytes.push_back(static_cast<std::uint8_t>(value & 255U));
-      bytes.push_back(static_cast<std::uint8_t>(value >> 8U));
-    }
-    const auto& histogram = features.histograms[i];
-    for (std::size_t k = 0; k < histogram.size(); k += 2) {
-      bytes.push_back(static_cast<std::uint8_t>(histogram[k] | histogram[k + 1] << 4U));
-    }
-  }
-  return bytes;
-}
-
-GradientFeatures unpack_gradient_features(std::span<const std::uint8_t> bytes, PanoramaShape shape,
-                                          const ElevationBand& elevations) {
-  constexpr std::size_t size = GradientFeatures::packed_bytes;
-  require(bytes.size() % size == 0 && bytes.size() <= size * GradientFeatures::max_count,
-          "bytes of gradient features", static_cast<double>(bytes.size()),
-          "68 for each, up to 256 of them");
-  const double column_rad = 2.0 * std::numbers::pi / shape.columns;
-  const double row_rad = (elevations.top_rad - elevations.bottom_rad) / shape.rows;
-  GradientFeatures features;
-  for (; !bytes.empty(); bytes = bytes.subspan(size)) {
-    const int column = bytes[0] | bytes[1] << 8;
-    const int row = bytes[2] | bytes[3] << 8;
-    require(column < shape.columns, "column of a gradient feature", column,
-            "one of the panorama's");
-    require(row < shape.rows, "row of a gradient feature", row, "one of the panorama's");
-    features.corners.push_back({static_cast<float>(column * column_rad),
-                                static_cast<float>(elevations.top_rad - (row + 0.5) * row_rad)});
-    auto& histogram = features.histograms.emplace_back();
-    for (std::size_t k = 0; k < histogram.size(); k += 2) {
-      const std::uint8_t both = bytes[4 + k / 2];
-      histogram[k] = both & 15U;
-      histogram[k + 1] = both >> 4U;
-    }
-  }
-  return features;
-}
-
-std::vector<std::uint8_t> join_feature_bytes(const FeatureBytes& parts) {
-  std::vector<std::uint8_t> bytes(parts.local.begin(), parts.local.end());
-  if (parts.gradient.empty()) return bytes;
-  bytes.insert(bytes.end(), parts.gradient.begin(), parts.gradient.end());
-  for (unsigned shift = 0; shift < 32; shift += 8) {
-    bytes.push_back(static_cast<std::uint8_t>(parts.gradient.size() >> shift));
-  }
-  bytes.insert(bytes.end(), gradient_mark.begin(), gradient_mark.end());
-  return bytes;
-}
-
-FeatureBytes split_feature_bytes(std::span<const std::uint8_t> bytes) noexcept {
-  if (bytes.size() < trailer_bytes ||
-      !std::ranges::equal(bytes.last(gradient_mark.size()), gradient_mark)) {
-    return {bytes, {}};
-  }
-  const std::size_t before = bytes.size() - trailer_bytes;
-  std::size_t size = 0;
-  for (std::size_t i = 0; i < 4; ++i) size |= std::size_t{bytes[before + i]} << (8 * i);
-  if (size > before || size % GradientFeatures::packed_bytes != 0) return {bytes, {}};
-  return {bytes.first(before - size), bytes.subspan(before - size, size)};
 }
 
 }  // namespace panonav

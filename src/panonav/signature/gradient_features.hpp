@@ -13,18 +13,19 @@
 
 namespace panonav {
 
-/// Features of a view by which narrow pictures are localised: the strongest corners within 6
-/// degrees of azimuth, each with an upright histogram of gradients of the 16 degrees around it
+/// Features of a view by which narrow pictures are localised: the strongest corners within 3
+/// degrees of azimuth, each with an upright histogram of gradients of the 8 degrees around it
 /// (4 x 4 cells of 8 directions, as SIFT's [Lowe 2004], square roots [Arandjelovic 2012]). They
 /// distinguish places better than `LocalFeatures` where only a part of the azimuth is seen, but
-/// take twice the space.
+/// take ten times the space.
 struct GradientFeatures {
-  static constexpr int max_count = 256;  ///< features kept of a view at most
+  static constexpr int max_count = 800;  ///< features kept of a panorama at most
   static constexpr int directions = 8;   ///< of gradients, counter-clockwise from the right
   static constexpr int cells = 4;        ///< along each side of a patch
   static constexpr int dimensions = cells * cells * directions;  ///< values of a histogram
   static constexpr int max_level = 15;                           ///< largest value of a histogram
-  /// Bytes of a packed feature: column, row (two bytes each, little-endian), two values a byte.
+  /// Bytes of a packed feature: column, row (two bytes each, little-endian; the highest bit of the
+  /// row marks leading features), two values a byte.
   static constexpr std::size_t packed_bytes = 4 + dimensions / 2;
 
   /// Square roots of the shares of a patch's gradients, 0 .. 15: index (cell row * 4 + cell column)
@@ -38,17 +39,26 @@ struct GradientFeatures {
     friend bool operator==(const Corner&, const Corner&) = default;
   };
 
-  std::vector<Corner> corners;        ///< by row, then column
+  std::vector<Corner> corners;        ///< leading ones first; in each part by row, then column
   std::vector<Histogram> histograms;  ///< one for each corner
+  /// Number of leading features, which fewer than five stronger corners are near to. Views are
+  /// preselected by them.
+  std::size_t leading = 0;
   friend bool operator==(const GradientFeatures&, const GradientFeatures&) = default;
 };
 
+/// Returns the shape of the cylinders of which features are extracted: one to eight times a
+/// memory's shape, whichever is nearest to 1,024 columns.
+[[nodiscard]] PanoramaShape find_gradient_shape(PanoramaShape shape) noexcept;
+
 /// Extracts the features of a panorama; nullopt if the elevations of its rows are unknown. Cost:
-/// about 8 ms for 80 x 512.
+/// about 30 ms for 160 x 1024.
 [[nodiscard]] std::optional<GradientFeatures> extract_gradient_features(
     const Panorama& panorama, const PreprocessingOptions& preprocessing = {});
 /// Extracts the features of a sector: corners whose neighbourhood is visible, and of which at least
-/// three fifths of the patch are visible; the rest of it is left out of the histogram.
+/// three fifths of the patch are visible; the rest of it is left out of the histogram. Each corner
+/// has histograms of three patches, which are 0.71, 1 and 1.41 times as large as those of
+/// panoramas: what the robot has approached or left appears larger or smaller.
 [[nodiscard]] GradientFeatures extract_gradient_features(
     const SectorView& sector, const PreprocessingOptions& preprocessing = {});
 

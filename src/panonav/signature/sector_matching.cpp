@@ -22,7 +22,8 @@ constexpr float weight_unit = 2.5F;
 constexpr float max_weight = 1.0F;
 constexpr int sector_rotation_steps = 128;
 constexpr int sector_motion_axes = 16;
-constexpr double sector_tolerance_rad = radians(2.0);
+constexpr double sector_tolerance_rad = radians(3.0);
+constexpr double fine_tolerance_rad = radians(1.0);
 /// Largest accepted ratio of the distance between the views to the distance of a feature.
 constexpr float max_distance_ratio = 2.0F;
 
@@ -145,15 +146,14 @@ double bound_at(const PairBearings& pairs, double turn_rad) {
 constexpr double bound_slack = 1.0 + 1e-5;
 
 /// Refines the heading around the best coarse step: the mean, weighted by excess over nine tenths
-/// of the largest sum, of finer rotations at which half of the tolerance explains most.
+/// of the largest sum, of finer rotations at which a finer tolerance explains most.
 double refine_heading(const PairBearings& pairs, double turn_rad) {
   constexpr int steps = 10;  // to each side
   constexpr double step_rad = radians(0.35);
   const MotionAxes axes(0.0, std::numbers::pi / sector_motion_axes);
   std::array<double, 2 * steps + 1> sums{};
   for (int k = -steps; k <= steps; ++k) {
-    const auto explained =
-        sum_explained(pairs, turn_rad + k * step_rad, axes, 0.5 * sector_tolerance_rad);
+    const auto explained = sum_explained(pairs, turn_rad + k * step_rad, axes, fine_tolerance_rad);
     sums[static_cast<std::size_t>(k + steps)] =
         static_cast<double>(*std::ranges::max_element(explained.weights));
   }
@@ -170,10 +170,16 @@ double refine_heading(const PairBearings& pairs, double turn_rad) {
 
 }  // namespace
 
-NearestFeatures::NearestFeatures(const GradientFeatures& query)
+NearestFeatures::NearestFeatures(const GradientFeatures& query, Part part)
     : query_(&query),
-      count_(std::min<std::size_t>(query.corners.size(), kernels::max_descriptors)),
+      part_(part),
+      count_(count_compared(query)),
       nearest_(count_ * background, std::numeric_limits<float>::infinity()) {}
+
+std::size_t NearestFeatures::count_compared(const GradientFeatures& features) const {
+  return std::min<std::size_t>(part_ == Part::leading ? features.leading : features.corners.size(),
+                               kernels::max_histograms);
+}
 
 void NearestFeatures::add(const GradientFeatures& reference) {
   compare(reference, mutual_.emplace_back());
@@ -185,8 +191,7 @@ void NearestFeatures::add_background(const GradientFeatures& elsewhere) {
 }
 
 void NearestFeatures::compare(const GradientFeatures& reference, std::vector<Mutual>& mutual) {
-  const std::size_t there =
-      std::min<std::size_t>(reference.corners.size(), kernels::max_descriptors);
+  const std::size_t there = count_compared(reference);
   if (there == 0 || count_ == 0) return;
   std::vector<std::uint16_t> nearest_of_query(count_);
   std::vector<std::int32_t> distances(count_);

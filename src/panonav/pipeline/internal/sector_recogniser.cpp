@@ -51,7 +51,7 @@ Camera choose_camera(const Observation& observation, const PictureSource& source
 
 SectorRecogniser::SectorRecogniser(const MemoryFile& file, const VisualMemory& memory,
                                    PictureSource source, const std::optional<SectorModel>& model)
-    : header_(file.header()),
+    : header_(refine_header(file.header())),
       source_(std::move(source)),
       localiser_(memory, make_gradient_source(file), model) {}
 
