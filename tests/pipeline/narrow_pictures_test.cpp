@@ -164,6 +164,23 @@ TEST_F(NarrowPictures, OfRealRoomsAreRecognisedAndOthersAreUnknown) {
   EXPECT_LE(known, 1) << "of 30 pictures of another building";
 }
 
+TEST_F(NarrowPictures, NeedTheElevationsOfTheMemory) {
+  const auto path = folder / "unknown.panonav";
+  Memoriser memoriser(path,
+                      {.source = PictureSource{}, .narrow = true, .map = false, .left_out = {}});
+  Random random(1);
+  const auto memorise = [&] {
+    for (int i = 0; i < 9; ++i) {
+      Observation view(random_panorama(random, 48, 256));
+      view.name = std::to_string(i);
+      memoriser.add(std::move(view));
+    }
+    (void)memoriser.finish();
+  };
+  EXPECT_TRUE(contains(message_of<ContractError>(memorise), "elevation_deg"));
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
 TEST_F(NarrowPictures, ChangeNothingForWholePanoramas) {
   const auto narrow_path = memorise(true);
   const auto plain_path = memorise(false);

@@ -196,7 +196,12 @@ void Memoriser::make_encoders(const PictureSource& source) {
 }
 
 void Memoriser::make_file(Executor& executor) {
-  file_ = MemoryFile::create(path_, make_header_from_waiting(executor));
+  const MemoryHeader header = make_header_from_waiting(executor);
+  if (options_.narrow && !header.elevations) {
+    throw ContractError("option narrow", "set",
+                        "not set, as the elevations of the images are unknown; set elevation_deg");
+  }
+  file_ = MemoryFile::create(path_, header);
   if (options_.narrow) set_narrow_features(*file_);
   make_encoders(*options_.source);
   store(std::exchange(waiting_, {}), executor);
