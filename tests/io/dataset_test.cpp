@@ -203,6 +203,20 @@ TEST_F(DatasetFolder, MirrorPicturesWithTheirCameraAndMask) {
   EXPECT_GT(dark, 16 * 64 / 3);
 }
 
+TEST_F(DatasetFolder, PerspectiveCamerasBelongToNarrowPictures) {
+  const std::string poses = "[poses]\nfile = \"poses.csv\"\n";
+  write("lens.yaml",
+        "cam0:\n  camera_model: pinhole\n  intrinsics: [20, 20, 15.5, 3.5]\n"
+        "  distortion_model: radtan\n  distortion_coeffs: [-0.01, 0, 0, 0]\n"
+        "  resolution: [32, 8]\n");
+  write("dataset.toml", "[images]\nkind = \"pinhole\"\ncamera = \"lens.yaml\"\n" + poses);
+  const PictureSource source = read_dataset(folder).source;
+  EXPECT_EQ(source.kind, PictureKind::pinhole);
+  EXPECT_EQ(source.camera.value().distortion[0], -0.01);
+  write("dataset.toml", "[images]\nkind = \"mirror\"\ncamera = \"lens.yaml\"\n" + poses);
+  expect_error("a pinhole camera");
+}
+
 TEST_F(DatasetFolder, WhatCannotBeReadBackIsNotWritten) {
   Dataset dataset = read_dataset(folder);
   dataset.entries[0].file = "two\nlines.png";
