@@ -315,32 +315,25 @@ ExitCode convert_camera(const CalibrateArguments& arguments, Session& session) {
   }
   write_result(arguments, camera, session);
   const std::string format = camera.format.empty() ? "camera file" : camera.format + " calibration";
+  nlohmann::ordered_json answer{{"input", input}, {"format", format}};
+  std::string shown;
   if (is_narrow) {
     const double width_rad = field_of_view(camera.camera);
-    if (session.json()) {
-      session.print(json_line({{"input", input},
-                               {"format", format},
-                               {"field_of_view_rad", width_rad},
-                               {"camera", arguments.out}}));
-      return ExitCode::done;
-    }
-    session.print(input + ": " + format + "; images show " +
-                  format_number(degrees(width_rad), "deg") +
-                  " degrees of the azimuth at the height of the camera");
-    session.print(arguments.out + " is written");
-    return ExitCode::done;
+    answer["field_of_view_rad"] = width_rad;
+    shown = "images show " + format_number(degrees(width_rad), "deg") +
+            " degrees of the azimuth at the height of the camera";
+  } else {
+    const auto [bottom_rad, top_rad] = visible_elevations(camera.camera);
+    answer["elevations_rad"] = {bottom_rad, top_rad};
+    shown = "all azimuths show the elevations from " + format_number(degrees(bottom_rad), "deg") +
+            " to " + format_number(degrees(top_rad), "deg") + " degrees";
   }
-  const auto [bottom_rad, top_rad] = visible_elevations(camera.camera);
+  answer["camera"] = arguments.out;
   if (session.json()) {
-    session.print(json_line({{"input", input},
-                             {"format", format},
-                             {"elevations_rad", {bottom_rad, top_rad}},
-                             {"camera", arguments.out}}));
+    session.print(json_line(answer));
     return ExitCode::done;
   }
-  session.print(input + ": " + format + "; all azimuths show the elevations from " +
-                format_number(degrees(bottom_rad), "deg") + " to " +
-                format_number(degrees(top_rad), "deg") + " degrees");
+  session.print(input + ": " + format + "; " + shown);
   session.print(arguments.out + " is written");
   return ExitCode::done;
 }

@@ -239,7 +239,7 @@ namespace {
 
 /// True if a distorted pinhole lens shows nothing at an offset of the ideal image.
 bool is_beyond_rim(const Camera& camera, const ImageOffset& ideal) {
-  return camera.distortion != Camera{}.distortion &&
+  return is_distorted(camera) &&
          std::hypot(ideal.right_px, ideal.down_px) > camera.rim_radius_px + tolerance_px(camera);
 }
 

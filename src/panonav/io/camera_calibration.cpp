@@ -102,15 +102,23 @@ Camera make_fisheye(const Intrinsics& k, std::span<const double> coefficients, C
   return camera;
 }
 
-/// `distortion`: k1, k2, p1, p2 of the normalised plane.
+/// Sets the distortion, k1, k2, p1, p2 and k3 of the normalised plane, of which the last ones may
+/// be missing. Returns a radius of the ideal image beyond all that the picture shows: distortion
+/// may move far points inwards.
+double set_distortion(Camera& camera, std::span<const double> distortion) {
+  constexpr double distorted_corner_factor = 3.0;
+  std::ranges::copy(distortion.first(std::min(distortion.size(), camera.distortion.size())),
+                    camera.distortion.begin());
+  const bool is_distorted = camera.distortion != Camera{}.distortion;
+  return find_corner_radius(camera) * (is_distorted ? distorted_corner_factor : 1.0);
+}
+
+/// `distortion`: as `set_distortion`.
 Camera make_omni(const Intrinsics& k, double xi, std::span<const double> distortion,
                  CameraMount mount) {
-  constexpr double corner_factor = 3.0;  // as distortion may move far points inwards
   Camera camera = place_camera(k, mount);
   camera.model = UnifiedModel{xi, k.fx, to_axis(mount)};
-  std::ranges::copy(distortion, camera.distortion.begin());
-  const bool is_distorted = camera.distortion != Camera{}.distortion;
-  camera.rim_radius_px = find_corner_radius(camera) * (is_distorted ? corner_factor : 1.0);
+  camera.rim_radius_px = set_distortion(camera, distortion);
   if (xi > 1.0) {
     camera.rim_radius_px =
         std::min(camera.rim_radius_px, domain_share * k.fx / std::sqrt(xi * xi - 1.0));
@@ -162,17 +170,12 @@ double find_max_radius(double alpha, double beta) {
   return domain_share / std::sqrt(beta * (2 * alpha - 1));
 }
 
-/// Makes a camera that looks forward. `distortion`: k1, k2, p1, p2 and k3 of the normalised plane;
-/// missing ones are 0.
+/// Makes a camera that looks forward. `distortion`: as `set_distortion`.
 Camera make_pinhole(const Intrinsics& k, std::span<const double> distortion) {
-  constexpr double corner_factor = 3.0;  // as distortion may move far points inwards
   Camera camera = place_camera(k, CameraMount::up);
   camera.model = PinholeModel{.focal_length_px = k.fx};
-  std::ranges::copy(distortion.first(std::min(distortion.size(), camera.distortion.size())),
-                    camera.distortion.begin());
-  if (camera.distortion != Camera{}.distortion) {
-    camera.rim_radius_px = corner_factor * find_corner_radius(camera);
-  }
+  const double rim_px = set_distortion(camera, distortion);
+  if (camera.distortion != Camera{}.distortion) camera.rim_radius_px = rim_px;
   return camera;
 }
 

@@ -25,7 +25,7 @@ namespace {
 constexpr int sector_candidates = 12;
 /// Number of best views of a place whose mean gives position and heading: the corners of a square.
 constexpr std::size_t averaged_views = 4;
-/// Number of views that leading features preselect, unless more matches are asked for.
+/// Number of views that leading features preselect, unless more matches are requested.
 constexpr std::size_t preselected_views = 24;
 /// Distances in spacings within which a view is the same place as the best one, and within which
 /// its position is averaged.

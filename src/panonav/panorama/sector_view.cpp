@@ -60,16 +60,12 @@ class LevelGrid {
     const auto rotate = [&](const Direction3& level) {
       return rotation.lens_from_robot(tilt_direction(level, tilt));
     };
-    x_axis_ = rotate({1.0, 0.0, 0.0});
-    y_axis_ = rotate({0.0, 1.0, 0.0});
-    z_axis_ = rotate({0.0, 0.0, 1.0});
+    up_ = rotate({0.0, 0.0, 1.0});
     const auto offset = [](int tap) { return (tap + 0.5) / taps - 0.5; };
     for (int i = 0; i < taps * sector.columns; ++i) {
       const double azimuth_rad =
           sector.first_azimuth_rad + (i / taps + offset(i % taps)) * sector.column_rad();
-      const auto [x, y, z] = Direction3::from_angles(azimuth_rad, 0.0);
-      across_.push_back({x * x_axis_.x + y * y_axis_.x, x * x_axis_.y + y * y_axis_.y,
-                         x * x_axis_.z + y * y_axis_.z});
+      across_.push_back(rotate(Direction3::from_angles(azimuth_rad, 0.0)));
     }
     for (int i = 0; i < taps * sector.panorama.rows; ++i) {
       const double elevation_rad =
@@ -84,13 +80,13 @@ class LevelGrid {
     const auto row = static_cast<std::size_t>(taps * y + down);
     const double c = cosines_[row];
     const double s = sines_[row];
-    return {c * d.x + s * z_axis_.x, c * d.y + s * z_axis_.y, c * d.z + s * z_axis_.z};
+    return {c * d.x + s * up_.x, c * d.y + s * up_.y, c * d.z + s * up_.z};
   }
 
  private:
-  Direction3 x_axis_, y_axis_, z_axis_;  // of the level frame, in the frame of the lens
+  Direction3 up_;                        // up direction of the level frame, in that of the lens
   std::vector<Direction3> across_;       // horizontal directions of each tap of the columns
-  std::vector<double> cosines_, sines_;  // of the elevations of each tap of the rows
+  std::vector<double> cosines_, sines_;  // elevations of each tap of the rows
 };
 
 }  // namespace

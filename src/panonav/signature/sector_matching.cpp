@@ -145,8 +145,8 @@ double bound_at(const PairBearings& pairs, double turn_rad) {
 /// Rounding of sums of floats in another order.
 constexpr double bound_slack = 1.0 + 1e-5;
 
-/// Refines the heading around the best coarse step: the mean, weighted by excess over nine tenths
-/// of the largest sum, of finer rotations at which a finer tolerance explains most.
+/// Refines the heading around the best coarse step: the mean of the rotations at which a finer
+/// tolerance explains most, weighted by the excess over nine tenths of the largest sum.
 double refine_heading(const PairBearings& pairs, double turn_rad) {
   constexpr int steps = 10;  // to each side
   constexpr double step_rad = radians(0.35);

@@ -34,10 +34,6 @@ std::pair<Plane, Jacobian> distort_plane(const std::array<double, 5>& k, Plane p
            radial + slope * p.y * p.y + 6 * p1 * p.y + 2 * p2 * p.x}};
 }
 
-bool is_distorted(const Camera& camera) {
-  return std::ranges::any_of(camera.distortion, [](double k) { return k != 0.0; });
-}
-
 double normalising_length_px(const Camera& camera) {
   if (const auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
     return unified->focal_length_px;
@@ -47,6 +43,10 @@ double normalising_length_px(const Camera& camera) {
 }
 
 }  // namespace
+
+bool is_distorted(const Camera& camera) {
+  return std::ranges::any_of(camera.distortion, [](double k) { return k != 0.0; });
+}
 
 bool is_ideal_image(const Camera& camera) {
   return camera.affine == Camera{}.affine && !is_distorted(camera);

@@ -14,6 +14,8 @@ struct ImageOffset {
 
 /// True if the picture is the ideal image, in which the model is symmetric about the centre.
 [[nodiscard]] bool is_ideal_image(const Camera& camera);
+/// True if `Camera::distortion` moves points.
+[[nodiscard]] bool is_distorted(const Camera& camera);
 /// Maps an offset of the ideal image to the picture, by `Camera::distortion` and `affine`.
 [[nodiscard]] ImageOffset distort(const Camera& camera, ImageOffset ideal);
 /// Inverts `distort` by Newton steps; nullopt if they do not converge within `rim_radius_px`.

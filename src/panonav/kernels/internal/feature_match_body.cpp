@@ -145,7 +145,7 @@ void find_nearest_histograms_by_vectors(const uint8_t* a, size_t a_count, size_t
   static_assert(block % lanes == 0);
   uint32_t values[words][block];  // four values of each histogram
   uint32_t squares[block];
-  uint32_t indices[block];  // of histograms that fill up the last register: above all others
+  uint32_t indices[block];  // those that only fill up the last register are above all others
   uint32_t best[block];
   const size_t padded = (a_count + lanes - 1) / lanes * lanes;
   for (size_t i = 0; i < padded; ++i) {

@@ -27,7 +27,7 @@ class SectorRecogniser {
                                std::span<const ViewId> excluded) const;
 
  private:
-  MemoryHeader header_;  // of the finer cylinders of gradient features
+  MemoryHeader header_;  // its cylinders are those of gradient features
   PictureSource source_;
   SectorLocaliser localiser_;
 };
