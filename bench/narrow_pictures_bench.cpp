@@ -2,7 +2,8 @@
 // DATASET CROPS SEED. Cuts CROPS pictures of 640 x 480 at random azimuths out of each
 // equirectangular picture of the data set, and localises them. Views of the same name are left out.
 // Prints the share whose best view is within 1.5 times the distance of the nearest one, the share
-// that is known, and medians, for three fields of view and with changed pictures.
+// that is known, and medians, for three fields of view and with changed pictures; also for rigs of
+// cameras of 90 degrees and for the whole pictures, once for each.
 
 #include <algorithm>
 #include <chrono>
@@ -17,6 +18,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
@@ -80,7 +82,11 @@ struct Totals {
 class Bench {
  public:
   Bench(const std::string& memory, const std::string& dataset, int crops, std::uint64_t seed)
-      : recogniser_(memory), dataset_(read_dataset(dataset)), crops_(crops), seed_(seed) {}
+      : path_(memory),
+        recogniser_(memory),
+        dataset_(read_dataset(dataset)),
+        crops_(crops),
+        seed_(seed) {}
 
   void run(double width_rad, const Change& change) const {
     Totals totals;
@@ -88,24 +94,86 @@ class Bench {
       const Image sphere = read_grey_picture(dataset_.entries[i]);
       Random random(seed_, i);
       for (int crop = 0; crop < crops_; ++crop) {
-        ask(dataset_.entries[i], sphere, random.uniform(-std::numbers::pi, std::numbers::pi),
-            width_rad, change, totals);
+        const double azimuth_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+        Observation photo(photograph(sphere, azimuth_rad, width_rad, change));
+        photo.narrow_source = PictureSource{
+            .kind = PictureKind::pinhole,
+            .field_of_view_rad =
+                2.0 * std::atan(std::tan(0.5 * width_rad) / change.stated_focal_length)};
+        ask(recogniser_, dataset_.entries[i], photo, azimuth_rad, totals);
       }
     }
+    print(format_number(degrees(width_rad)) + " degrees, " + change.name, totals);
+  }
+
+  /// Asks with the pictures of cameras of 90 degrees around the robot, of which the first `used`
+  /// are used; as a panorama if they cover all azimuths, and as narrow pictures.
+  void run_rig(int used) const {
+    constexpr int around = 4;
+    std::vector<Camera> cameras;
+    for (int i = 0; i < used; ++i) {
+      Camera& camera = cameras.emplace_back();
+      camera.model = PinholeModel{
+          .focal_length_px = focal_length_from_field_of_view(picture_size.width, radians(90.0)),
+          .azimuth_rad = 2.0 * std::numbers::pi * i / around};
+      camera.image_size = picture_size;
+      camera.centre = {0.5 * picture_size.width, 0.5 * picture_size.height};
+    }
+    const Camera rig = make_rig(std::move(cameras));
+    PlaceRecogniserOptions options;
+    if (used == around) {
+      options.source = PictureSource{.kind = PictureKind::mirror, .camera = rig};
+    }
+    const PlaceRecogniser panoramic(path_, options);
+    Totals as_panorama;
+    Totals as_sectors;
+    for (const DatasetEntry& entry : dataset_.entries) {
+      const Image sphere = read_grey_picture(entry);
+      std::vector<Image> images;
+      for (int i = 0; i < used; ++i) {
+        images.push_back(
+            photograph(sphere, 2.0 * std::numbers::pi * i / around, radians(90.0), {}));
+      }
+      const std::vector<ImageView> views = view_all(images);
+      Observation photo(join_pictures(std::get<RigModel>(rig.model), views));
+      if (used == around) ask(panoramic, entry, photo, 0.0, as_panorama);
+      photo.narrow_source = PictureSource{.kind = PictureKind::pinhole, .camera = rig};
+      ask(recogniser_, entry, photo, 0.0, as_sectors);
+    }
+    const std::string name = std::to_string(used) + " cameras of 90 degrees";
+    if (used == around) print(name + " as panorama", as_panorama);
+    print(name + " as narrow ones", as_sectors);
+  }
+
+  /// Asks with the whole pictures.
+  void run_whole() const {
+    Totals totals;
+    for (const DatasetEntry& entry : dataset_.entries) {
+      ask(recogniser_, entry, read_picture(entry), 0.0, totals);
+    }
+    print("whole pictures", totals);
+  }
+
+ private:
+  static std::vector<ImageView> view_all(const std::vector<Image>& images) {
+    std::vector<ImageView> views;
+    for (const Image& image : images) views.push_back(image.view());
+    return views;
+  }
+
+  static void print(const std::string& name, const Totals& totals) {
     const auto percent = [&](int count) { return 100.0 * count / std::max(1, totals.pictures); };
     const auto middle = [](const std::vector<double>& errors) {
       return errors.empty() ? std::numeric_limits<double>::quiet_NaN() : median(errors);
     };
     std::printf(
-        "%2.0f degrees, %-12s %4d pictures: right %.1f %%, of three %.1f %%, known %.1f %%, "
+        "%-38s %4d pictures: right %.1f %%, of three %.1f %%, known %.1f %%, "
         "heading %.2f degrees, position %.2f m, %.1f ms\n",
-        degrees(width_rad), change.name, totals.pictures, percent(totals.right),
-        percent(totals.right_of_three), percent(totals.known),
-        degrees(middle(totals.heading_errors_rad)), middle(totals.position_errors_m),
-        totals.time_ms / std::max(1, totals.pictures));
+        name.c_str(), totals.pictures, percent(totals.right), percent(totals.right_of_three),
+        percent(totals.known), degrees(middle(totals.heading_errors_rad)),
+        middle(totals.position_errors_m), totals.time_ms / std::max(1, totals.pictures));
   }
 
- private:
   [[nodiscard]] double distance_to(const std::string& view, const ReferencePose& truth) const {
     const VisualMemory& memory = recogniser_.memory();
     const auto& pose = memory.info(memory.find(view).value()).pose;
@@ -113,16 +181,12 @@ class Bench {
                 : std::numeric_limits<double>::infinity();
   }
 
-  void ask(const DatasetEntry& entry, const Image& sphere, double azimuth_rad, double width_rad,
-           const Change& change, Totals& totals) const {
-    Observation photo(photograph(sphere, azimuth_rad, width_rad, change));
-    photo.narrow_source.emplace();
-    photo.narrow_source->kind = PictureKind::pinhole;
-    photo.narrow_source->field_of_view_rad =
-        2.0 * std::atan(std::tan(0.5 * width_rad) / change.stated_focal_length);
+  /// `azimuth_rad`: the direction in which the camera looks, which is the robot's forward one.
+  void ask(const PlaceRecogniser& recogniser, const DatasetEntry& entry, const Observation& photo,
+           double azimuth_rad, Totals& totals) const {
     const std::vector<std::string> own{entry.file};
     const auto start = std::chrono::steady_clock::now();
-    const Place place = recogniser_.localise(photo, own);
+    const Place place = recogniser.localise(photo, own);
     totals.time_ms +=
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     ++totals.pictures;
@@ -149,6 +213,7 @@ class Bench {
         std::hypot(place.position->x_m - entry.pose->x_m, place.position->y_m - entry.pose->y_m));
   }
 
+  std::string path_;
   PlaceRecogniser recogniser_;
   Dataset dataset_;
   int crops_;
@@ -167,6 +232,8 @@ void run_all(const Bench& bench) {
                                .tilt_rad = tilt_rad}}) {
     bench.run(radians(70.0), change);
   }
+  for (const int used : {2, 3, 4}) bench.run_rig(used);
+  bench.run_whole();
 }
 
 }  // namespace

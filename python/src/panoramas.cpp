@@ -18,6 +18,9 @@ ColumnDirection parse_direction(const std::string& name) {
 CameraModel make_camera_model(const std::string& name, const py::dict& parameters) {
   auto model = make_default_model(name);
   if (!model) throw ContractError("model", "'" + name + "'", "a name of `camera_models`");
+  if (std::holds_alternative<RigModel>(*model)) {
+    throw ContractError("model", "'rig'", "another; `make_rig` makes a rig of cameras");
+  }
   py::dict unused = parameters.attr("copy")();
   visit_parameters(*model, [&](const auto& parameter, auto& value) {
     const py::str key{std::string(parameter)};
@@ -125,6 +128,25 @@ void bind_cameras(py::module_& m) {
                     std::to_string(c.image_size.height) + "))";
            })
       .attr("__hash__") = py::none();
+  m.def(
+      "make_rig", &make_rig, py::arg("cameras"),
+      "Makes the camera of a rig of pinhole cameras. Its pictures are theirs side by side, in the "
+      "order of the list, which `join_pictures` makes.");
+  m.def(
+      "join_pictures",
+      [](const Camera& rig, const std::vector<py::object>& pictures) {
+        const auto* const model = std::get_if<RigModel>(&rig.model);
+        if (model == nullptr) throw ContractError("model", model_name(rig.model), "rig");
+        std::vector<Image> images;
+        std::vector<ImageView> views;
+        for (const py::object& picture : pictures) {
+          images.push_back(PictureArray(picture, "pictures").image());
+        }
+        for (const Image& image : images) views.push_back(image.view());
+        return to_array(join_pictures(*model, views));
+      },
+      py::arg("rig"), py::arg("pictures"),
+      "Joins pictures (uint8 arrays) that the cameras of a rig took at the same time.");
   m.attr("camera_models") = py::tuple(
       py::cast(std::vector<std::string>(camera_model_names.begin(), camera_model_names.end())));
   m.def(

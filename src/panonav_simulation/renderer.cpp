@@ -337,8 +337,11 @@ class CameraRays {
 
   // Returns the approximate angle between neighbouring pixels. One value serves for the whole
   // image, because the angle varies little. For a mirror it is the angle at two thirds of the rim
-  // radius, which is near the horizon.
+  // radius, which is near the horizon; for a rig that in the middle of its first camera.
   [[nodiscard]] double pixel_rad() const {
+    if (const auto* rig = std::get_if<RigModel>(&camera_.model)) {
+      return 1.0 / std::get<PinholeModel>(rig->cameras.front().model).focal_length_px;
+    }
     const bool flat = std::holds_alternative<EquirectangularModel>(camera_.model);
     const double around_px = flat    ? camera_.image_size.width
                              : dual_ ? 2.0 * std::numbers::pi * dual_->lenses[0].focal_length_px

@@ -75,6 +75,32 @@ TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
   EXPECT_EQ(read_camera(path).camera, dual.camera);
 }
 
+TEST_F(CameraFiles, SeveralCamerasMakeARig) {
+  const fs::path path = folder / "rig.toml";
+  const CameraFile rig{rig_camera(3), Image(480, 120)};
+  write_camera(path, rig);
+  EXPECT_EQ(read_camera(path).camera, rig.camera);
+  EXPECT_TRUE(read_camera(path).mask.has_value());
+  std::ifstream in(path);
+  const std::string good((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.rfind(from), from.size(), to);
+    std::ofstream(path) << text;
+    return error_of(path);
+  };
+  EXPECT_TRUE(contains(with("\"pinhole\"", "\"rig\""), "[camera 3] model is \"rig\""));
+  EXPECT_TRUE(contains(with("focal_length_px", "focal_px"), "[camera 3] focal_length_px"));
+  EXPECT_TRUE(contains(with("[[camera]]", "[camera]"), "camera"));
+  EXPECT_TRUE(
+      contains(with("width_px = 160", "width_px = 160\nwidth = 2"), "width is not a known"));
+  EXPECT_TRUE(contains(with("centre_u_px = 80", "centre_u_px = 900"), "camera 2 of the rig"));
+  std::ofstream(path) << good.substr(0, good.find("[[camera]]", good.find("[[camera]]") + 2));
+  EXPECT_TRUE(contains(error_of(path), "cameras of a rig"));
+  std::ofstream(path) << "camera = 3\n";
+  EXPECT_TRUE(contains(error_of(path), "camera is 3; allowed"));
+}
+
 TEST_F(CameraFiles, WithoutAnAxisTheUnifiedModelLooksDown) {
   const fs::path path = folder / "camera.toml";
   write_camera(path, {mirror_camera(UnifiedModel{0.9, 280.0}), std::nullopt});

@@ -11,9 +11,11 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "support/temporary_folder.hpp"
+#include "support/test_cameras.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -214,7 +216,46 @@ TEST_F(DatasetFolder, PerspectiveCamerasBelongToNarrowPictures) {
   EXPECT_EQ(source.kind, PictureKind::pinhole);
   EXPECT_EQ(source.camera.value().distortion[0], -0.01);
   write("dataset.toml", "[images]\nkind = \"mirror\"\ncamera = \"lens.yaml\"\n" + poses);
-  expect_error("a pinhole camera");
+  expect_error("shows a part of the azimuth");
+}
+
+TEST_F(DatasetFolder, CamerasOfARigHaveFoldersOfTheirOwn) {
+  const Camera rig = rig_camera(3);
+  write_camera(folder / "rig.toml", {rig, {}});
+  Image image(160, 120);
+  for (const char* name : {"left", "middle", "right"}) {
+    fs::create_directory(folder / name);
+    image.at(0, 0) = static_cast<std::uint8_t>(image.at(0, 0) + 50);
+    for (const char* file : {"a.png", "b.png"}) write_png(folder / name / file, image.view());
+  }
+  write("list.csv", "file\nleft/a.png\nleft/b.png\n");
+  const auto with = [&](const std::string& fields, const std::string& camera) {
+    write("dataset.toml", "[images]\nkind = \"pinhole\"\n" + fields + "camera = \"" + camera +
+                              "\"\n[list]\nfile = \"list.csv\"\n");
+  };
+  with("folders = [\"left\", \"middle\", \"right\"]\n", "rig.toml");
+  const Dataset dataset = read_dataset(folder);
+  ASSERT_EQ(dataset.entries.size(), 2U);
+  const Image joined = read_picture(dataset.entries[1]);
+  ASSERT_EQ(joined.size(), rig.image_size);
+  EXPECT_EQ(joined.at(0, 0), 50);
+  EXPECT_EQ(joined.at(160, 0), 100);
+  EXPECT_EQ(joined.at(320, 0), 150);
+
+  with("folders = [\"left\", \"right\"]\n", "rig.toml");
+  expect_error("a list of 2");
+  with("folders = [\"left\", \"middle\", 3]\n", "rig.toml");
+  expect_error("folders is 3");
+  with("folders = [\"left\", \"middle\", \"../right\"]\n", "rig.toml");
+  expect_error("../right");
+  with("folders = [\"middle\", \"left\", \"right\"]\n", "rig.toml");
+  expect_error("not in the folder of the rig's first camera");
+  with("folders = [\"left\", \"middle\", \"right\"]\n", "rig.toml");
+  fs::remove(folder / "middle" / "b.png");
+  expect_error("middle/b.png");
+  write_camera(folder / "one.toml", {std::get<RigModel>(rig.model).cameras[0], {}});
+  with("folders = [\"left\"]\n", "one.toml");
+  expect_error("only for a rig");
 }
 
 TEST_F(DatasetFolder, WhatCannotBeReadBackIsNotWritten) {

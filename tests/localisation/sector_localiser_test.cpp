@@ -39,8 +39,9 @@ SectorQuery look_into_room(std::uint64_t seed, double azimuth_rad, bool has_know
   camera.centre = {200.0, 150.0};
   camera.model = PinholeModel{.focal_length_px = focal_length_from_field_of_view(400, width_rad)};
   const Image picture = take_narrow_picture(make_patch_view(seed), azimuth_rad, width_rad);
-  const SectorView sector = unwarp_sector(picture.view(), camera, {80, 360}, patch_band);
-  return {extract_gradient_features(sector), 0.0, sector.width_rad(), has_known_tilt};
+  const SectorView sector = unwarp_sector(picture.view(), camera, {80, 360}, patch_band).value();
+  return {extract_gradient_features(sector), 0.0, shown_width(std::span(&sector, 1)),
+          has_known_tilt};
 }
 
 TEST(SectorLocaliser, FindsTheRoomAndTheHeading) {

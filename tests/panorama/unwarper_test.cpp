@@ -308,6 +308,28 @@ TEST(Unwarper, TwoLensesAreOnePictureWithoutASeam) {
   }
 }
 
+TEST(Unwarper, PicturesOfARigAreOnePictureWithoutASeam) {
+  const Camera camera = rig_camera(4);
+  const Image image = render(camera, smooth_world);
+  for (const UnwarperOptions& options :
+       {UnwarperOptions{.rows = 20, .columns = 128}, UnwarperOptions{.rows = 100, .columns = 900},
+        UnwarperOptions{.rows = 30, .columns = 255, .elevations = ElevationBand{-0.4, 0.3}}}) {
+    const Unwarper unwarper(camera, options);
+    const Panorama view = unwarper.unwrap(image.view());
+    double worst = 0.0;
+    for (int y = 0; y < view.rows(); ++y) {
+      for (int c = 0; c < view.columns(); ++c) {
+        EXPECT_TRUE(unwarper.is_visible(y, c));
+        const double expected = smooth_world(view.azimuth_rad(c), view.elevation_rad(y));
+        worst = std::max(worst, std::abs(view.at(y, c) - expected));
+      }
+    }
+    EXPECT_LT(worst, 0.02) << options.rows << " rows";
+  }
+  EXPECT_THROW(Unwarper(rig_camera(3), {.elevations = ElevationBand{-0.2, 0.2}}), ContractError)
+      << "a part of the azimuth is not seen";
+}
+
 TEST(Unwarper, RefusesBadInput) {
   const Camera camera = mirror_camera();
   const Unwarper unwarper(camera, {.rows = 4, .columns = 16});

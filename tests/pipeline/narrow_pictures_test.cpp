@@ -65,6 +65,54 @@ TEST_F(NarrowPictures, AreLocalisedInAMemoryOfPanoramas) {
       recogniser.localise(take_narrow_picture(make_patch_view(77), 1.5, radians(70.0))).known);
 }
 
+/// Pictures of these cameras of the middle of a panorama, joined.
+Image take_rig_picture(const Panorama& view, const Camera& rig) {
+  const auto& model = std::get<RigModel>(rig.model);
+  std::vector<Image> images;
+  std::vector<ImageView> views;
+  for (const Camera& camera : model.cameras) {
+    images.push_back(take_narrow_picture(view, std::get<PinholeModel>(camera.model).azimuth_rad,
+                                         radians(90.0), camera.image_size));
+  }
+  for (const Image& image : images) views.push_back(image.view());
+  return join_pictures(model, views);
+}
+
+Camera make_test_rig(int used) {
+  std::vector<Camera> cameras;
+  for (int i = 0; i < used; ++i) {
+    Camera& camera = cameras.emplace_back();
+    camera.model = PinholeModel{.focal_length_px = 200.0, .azimuth_rad = radians(90.0) * i};
+    camera.image_size = {400, 300};
+    camera.centre = {200.0, 150.0};
+  }
+  return make_rig(std::move(cameras));
+}
+
+TEST_F(NarrowPictures, OfARigAreOneQuestion) {
+  const auto path = memorise(true);
+  for (const int used : {2, 3, 4}) {
+    const Camera rig = make_test_rig(used);
+    PlaceRecogniserOptions options;
+    options.source = PictureSource{.kind = PictureKind::pinhole, .camera = rig};
+    const PlaceRecogniser recogniser(path, options);
+    const Place place = recogniser.localise(take_rig_picture(make_patch_view(5), rig));
+    ASSERT_TRUE(place.known) << used;
+    EXPECT_EQ(place.matches.front().name, "room 5");
+    EXPECT_NEAR(angle_difference(*place.heading_rad, 1.0), 0.0, radians(2.0));
+    EXPECT_FALSE(recogniser.localise(take_rig_picture(make_patch_view(77), rig)).known) << used;
+    EXPECT_THROW((void)recogniser.localise(Image(400, 300)), ContractError);
+  }
+  const Camera around = make_test_rig(4);
+  PlaceRecogniserOptions panoramic;
+  panoramic.source = PictureSource{.kind = PictureKind::mirror, .camera = around};
+  const PlaceRecogniser recogniser(path, panoramic);
+  const Place place = recogniser.localise(take_rig_picture(make_patch_view(5), around));
+  EXPECT_EQ(place.matches.front().name, "room 5");
+  ASSERT_TRUE(place.known);
+  EXPECT_NEAR(angle_difference(*place.heading_rad, 1.0), 0.0, radians(2.0));
+}
+
 TEST_F(NarrowPictures, AreLocalisedAmongPanoramas) {
   const auto path = memorise(true);
   const PlaceRecogniser narrow(path, narrow_options());

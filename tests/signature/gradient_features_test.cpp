@@ -61,8 +61,8 @@ TEST(GradientFeatures, ASectorMatchesItsViewAtItsTurn) {
     camera.centre = {200.0, 150.0};
     camera.model = PinholeModel{.focal_length_px = focal_length_from_field_of_view(400, width_rad)};
     const Image picture = take_narrow_picture(make_patch_view(2), azimuth_rad, width_rad);
-    const GradientFeatures query =
-        extract_gradient_features(unwarp_sector(picture.view(), camera, patch_shape, patch_band));
+    const GradientFeatures query = extract_gradient_features(
+        unwarp_sector(picture.view(), camera, patch_shape, patch_band).value());
     ASSERT_GT(query.corners.size(), 10U);
     const SectorMatch same = match_one(query, view);
     EXPECT_GT(same.verified, 10);
@@ -92,8 +92,8 @@ double gain_of_three_sizes(double enlarged) {
   camera.centre = {200.0, 150.0};
   const double focal_px = focal_length_from_field_of_view(400, radians(60.0));
   camera.model = PinholeModel{.focal_length_px = focal_px / enlarged};
-  const GradientFeatures three =
-      extract_gradient_features(unwarp_sector(picture.view(), camera, patch_shape, patch_band));
+  const GradientFeatures three = extract_gradient_features(
+      unwarp_sector(picture.view(), camera, patch_shape, patch_band).value());
   std::size_t patches_of_first_size = 1;
   while (three.corners.at(patches_of_first_size) != three.corners.front()) ++patches_of_first_size;
   GradientFeatures one = three;

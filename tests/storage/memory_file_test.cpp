@@ -50,6 +50,8 @@ TEST_F(MemoryFileContent, HeadersComeBack) {
   headers.push_back(mirror_header());
   headers.back().source.camera = dual_fisheye_camera();
   headers.back().source.mask.reset();
+  headers.push_back(headers.back());
+  headers.back().source.camera = rig_camera(4);
   int number = 0;
   for (const MemoryHeader& header : headers) {
     const auto path = memory("m" + std::to_string(number++) + ".panonav");

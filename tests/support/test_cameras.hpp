@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "panonav/camera/camera.hpp"
@@ -33,6 +34,18 @@ inline Camera dual_fisheye_camera() {
        FisheyeLens{482.1, 158.4, 87.0, 0.0, 0.001, radians(99), 3.13, -0.02, -1.55, 0.85}},
       0.0};
   return camera;
+}
+
+/// The first `used` of four cameras of 90 degrees around the robot, of 160 x 120 pixels each.
+inline Camera rig_camera(int used) {
+  std::vector<Camera> cameras;
+  for (int i = 0; i < used; ++i) {
+    Camera& camera = cameras.emplace_back();
+    camera.model = PinholeModel{.focal_length_px = 80.0, .azimuth_rad = i * std::numbers::pi / 2};
+    camera.image_size = {160, 120};
+    camera.centre = {80.0, 60.0};
+  }
+  return make_rig(std::move(cameras));
 }
 
 /// The image of a world whose grey level (0 .. 1) depends on the direction; black where the mirror

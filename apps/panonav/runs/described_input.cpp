@@ -264,9 +264,9 @@ DescribedInput describe_picture(const std::string& file, const std::string& desc
 }
 
 std::string model_name(const CameraModel& model) {
-  constexpr std::array<std::string_view, 8> names{
-      "hyperboloidal",   "polynomial",   "unified", "equiangular",
-      "equirectangular", "dual fisheye", "fisheye", "pinhole"};
+  constexpr std::array<std::string_view, 9> names{
+      "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular",
+      "dual fisheye",  "fisheye",    "pinhole", "rig"};
   static_assert(std::variant_size_v<CameraModel> == names.size());
   return std::string(names[model.index()]);
 }
@@ -274,7 +274,7 @@ std::string model_name(const CameraModel& model) {
 DescribedInput describe_camera_file(const std::string& file) {
   const CameraFile camera = read_camera(file);
   const std::string format = camera.format.empty() ? "" : camera.format + " ";
-  const bool is_narrow = std::holds_alternative<PinholeModel>(camera.camera.model);
+  const bool is_narrow = !shows_all_azimuths(camera.camera);
   InputUse use{list_verbs_that_take(InputKind::camera_file),
                {"panonav", "unwrap", "IMAGE", "--camera", file, "-o", "seen.png"}};
   if (is_narrow) {
@@ -315,7 +315,7 @@ std::pair<std::set<std::string>, std::set<std::string>> list_sections_and_keys(
 
 DescribedInput describe_toml(const std::string& file) {
   const auto [sections, keys] = list_sections_and_keys(file);
-  if (keys.contains("model")) return describe_camera_file(file);
+  if (keys.contains("model") || sections.contains("[camera")) return describe_camera_file(file);
   if (sections.contains("images")) {
     const fs::path folder = fs::path(file).parent_path();
     return describe_dataset(folder.empty() ? "." : folder.string());

@@ -42,10 +42,11 @@ PictureSource make_mirror_source(const PictureArguments& pictures,
   }
   PictureSource source{.kind = PictureKind::mirror};
   auto camera = read_camera(*pictures.camera);
-  if (std::holds_alternative<PinholeModel>(camera.camera.model)) {
-    throw UsageError("--camera is " + *pictures.camera +
-                     ", a pinhole camera, which shows a part of the azimuth; allowed: one that "
-                     "shows all azimuths, or localise with --kind pinhole");
+  if (!shows_all_azimuths(camera.camera)) {
+    throw UsageError("--camera is " + *pictures.camera + ", of the model " +
+                     std::string(model_name(camera.camera.model)) +
+                     ", which shows a part of the azimuth; allowed: one that shows all azimuths, "
+                     "or localise with --kind pinhole");
   }
   if (!camera.format.empty()) {
     session.note(*pictures.camera + ": " + camera.format +
@@ -71,10 +72,10 @@ PictureSource make_pinhole_source(const PictureArguments& pictures) {
       throw UsageError("--field-of-view cannot be used with --camera, which contains it");
     }
     source.camera = read_camera(*pictures.camera).camera;
-    if (!std::holds_alternative<PinholeModel>(source.camera->model)) {
+    if (!has_pinhole_lenses(*source.camera)) {
       throw UsageError("--camera is " + *pictures.camera + ", a camera file of the model " +
                        std::string(model_name(source.camera->model)) +
-                       "; allowed with --kind pinhole: pinhole");
+                       "; allowed with --kind pinhole: pinhole, or several cameras");
     }
   }
   if (const auto width_deg = pictures.field_of_view_deg) {

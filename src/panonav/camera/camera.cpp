@@ -55,6 +55,7 @@ std::optional<double> elevation_at(const Camera& camera, double radius_px) {
                  [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
                  [](const DualFisheyeModel&) -> std::optional<double> { return std::nullopt; },
                  [](const PinholeModel&) -> std::optional<double> { return std::nullopt; },
+                 [](const RigModel&) -> std::optional<double> { return std::nullopt; },
                  [&](const auto& model) { return panonav::elevation_at(model, *r); }},
       camera.model);
 }
@@ -71,6 +72,7 @@ std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
                  [](const EquirectangularModel&) -> std::optional<double> { return std::nullopt; },
                  [](const DualFisheyeModel&) -> std::optional<double> { return std::nullopt; },
                  [](const PinholeModel&) -> std::optional<double> { return std::nullopt; },
+                 [](const RigModel&) -> std::optional<double> { return std::nullopt; },
                  [&](const PolynomialModel& model) {
                    return panonav::radius_at(model, elevation_rad,
                                              std::max(0.0, inner_px - slack_px), rim_px + slack_px);
@@ -159,7 +161,10 @@ ElevationBand visible_elevations_of_lenses(const Camera& camera) {
     return true;
   };
   require(is_visible_all_around(0), "elevation seen at every azimuth", 0.0,
-          "seen by one of the lenses; max_angle_rad is too small or the frame cuts the circles");
+          std::holds_alternative<RigModel>(camera.model)
+              ? "seen by one of the cameras"
+              : "seen by one of the lenses; max_angle_rad is too small or the frame cuts the "
+                "circles");
   const double step = std::numbers::pi / 2 / elevations;
   ElevationBand band;
   for (int i = 1; i <= elevations && is_visible_all_around(i * step); ++i) band.top_rad = i * step;
@@ -167,6 +172,17 @@ ElevationBand visible_elevations_of_lenses(const Camera& camera) {
     band.bottom_rad = -i * step;
   require(band.top_rad > band.bottom_rad, "elevations seen at every azimuth", 0.0, "a band");
   return band;
+}
+
+void validate_rig(const Camera& camera, const RigModel& model) {
+  validate(model);
+  const ImageSize size = find_picture_size(model);
+  require(camera.image_size.width == size.width, "image_size.width", camera.image_size.width,
+          to_text(size.width) + ", the sum of its cameras'");
+  require(camera.image_size.height == size.height, "image_size.height", camera.image_size.height,
+          to_text(size.height) + ", the largest of its cameras'");
+  require(camera.direction == ColumnDirection::clockwise, "columns", 1.0,
+          "clockwise: pictures of a rig are not mirrored");
 }
 
 void validate_equirectangular(const Camera& camera, const EquirectangularModel& model) {
@@ -195,6 +211,8 @@ void validate(const Camera& camera) {
     require(camera.direction == ColumnDirection::clockwise, "columns", 1.0,
             "clockwise: pictures of a pinhole lens are not mirrored");
     validate_distortion(camera);
+  } else if (const auto* rig = std::get_if<RigModel>(&camera.model)) {
+    validate_rig(camera, *rig);
   } else {
     validate_mirror(camera);
   }
@@ -223,6 +241,7 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
     if (!first && !second) return std::nullopt;
     return second && (!first || second->weight > first->weight) ? second->pixel : first->pixel;
   }
+  if (const auto* rig = std::get_if<RigModel>(&camera.model)) return project(*rig, direction);
   if (const auto* model = std::get_if<PinholeModel>(&camera.model)) {
     return project_from_lens(camera, *model, find_rotation(*model).lens_from_robot(direction));
   }
@@ -276,6 +295,9 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
     if (!in_lens) return std::nullopt;
     return FisheyeLens::Rotation(lens).robot_from_lens(*in_lens);
   }
+  if (const auto* rig = std::get_if<RigModel>(&camera.model)) {
+    return panonav::unproject(*rig, *inside);
+  }
   if (const auto* model = std::get_if<PinholeModel>(&camera.model)) {
     const auto ideal =
         undistort(camera, {inside->u_px - camera.centre.u_px, inside->v_px - camera.centre.v_px});
@@ -313,7 +335,41 @@ std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& ca
   return result;
 }
 
+bool has_vertical_axis(const Camera& camera) {
+  return !std::holds_alternative<EquirectangularModel>(camera.model) &&
+         !std::holds_alternative<DualFisheyeModel>(camera.model) &&
+         !std::holds_alternative<PinholeModel>(camera.model) &&
+         !std::holds_alternative<RigModel>(camera.model);
+}
+
+namespace {
+
+/// Returns the number of degrees of azimuth at which a rig shows the horizon.
+int count_seen_degrees(const Camera& camera) {
+  int seen = 0;
+  for (int i = 0; i < 360; ++i) {
+    if (project(camera, Direction3::from_angles(i * std::numbers::pi / 180, 0.0))) ++seen;
+  }
+  return seen;
+}
+
+}  // namespace
+
+bool has_pinhole_lenses(const Camera& camera) {
+  return std::holds_alternative<PinholeModel>(camera.model) ||
+         std::holds_alternative<RigModel>(camera.model);
+}
+
+bool shows_all_azimuths(const Camera& camera) {
+  return std::holds_alternative<RigModel>(camera.model)
+             ? count_seen_degrees(camera) == 360
+             : !std::holds_alternative<PinholeModel>(camera.model);
+}
+
 double field_of_view(const Camera& camera) {
+  if (std::holds_alternative<RigModel>(camera.model)) {
+    return count_seen_degrees(camera) * std::numbers::pi / 180;
+  }
   if (!std::holds_alternative<PinholeModel>(camera.model)) return 0.0;
   const auto find = [&](double u_px) { return unproject(camera, {u_px, camera.centre.v_px}); };
   double left_px = 0.0;
@@ -328,15 +384,12 @@ double field_of_view(const Camera& camera) {
 }
 
 ImageCircle image_circle(const Camera& camera, int lens) {
-  if (std::holds_alternative<EquirectangularModel>(camera.model) ||
-      std::holds_alternative<PinholeModel>(camera.model)) {
-    return {};
-  }
   if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
     const FisheyeLens& fisheye = model->lenses[lens];
     return {
         {fisheye.centre_u_px, fisheye.centre_v_px}, 0.0, radius_at(fisheye, fisheye.max_angle_rad)};
   }
+  if (!has_vertical_axis(camera)) return {};
   if (is_ideal_image(camera)) return {camera.centre, camera.inner_radius_px, camera.rim_radius_px};
   ImageCircle circle{camera.centre, camera.inner_radius_px, 0.0};
   constexpr int azimuths = 64;
@@ -389,7 +442,9 @@ ElevationBand visible_elevations(const Camera& camera) {
   if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
     return {model->elevation_bottom_rad, model->elevation_top_rad};
   }
-  if (lens_count(camera) == 2) return visible_elevations_of_lenses(camera);
+  if (lens_count(camera) == 2 || std::holds_alternative<RigModel>(camera.model)) {
+    return visible_elevations_of_lenses(camera);
+  }
   if (std::holds_alternative<PinholeModel>(camera.model)) {
     throw ContractError("model", "pinhole", "one that shows all azimuths");
   }

@@ -11,6 +11,7 @@
 #include "panonav/camera/hyperboloidal_model.hpp"
 #include "panonav/camera/pinhole_model.hpp"
 #include "panonav/camera/polynomial_model.hpp"
+#include "panonav/camera/rig_model.hpp"
 #include "panonav/camera/unified_model.hpp"
 #include "panonav/core/image.hpp"
 #include "panonav/geometry/pose2.hpp"
@@ -36,7 +37,7 @@ struct EquirectangularModel {
 /// uses this list.
 using CameraModel =
     std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel, EquiangularModel,
-                 EquirectangularModel, DualFisheyeModel, FisheyeModel, PinholeModel>;
+                 EquirectangularModel, DualFisheyeModel, FisheyeModel, PinholeModel, RigModel>;
 
 /// Sense of rotation in which azimuths run in a picture; `Camera::direction` gives its exact
 /// meaning for each model.
@@ -68,8 +69,8 @@ struct Camera {
 
   CameraModel model;     ///< mapping between directions (or elevations) and image positions
   ImageSize image_size;  ///< of every picture of this camera, in pixels
-  // Mirror cameras and lenses with a vertical axis (all models but equirectangular, dual fisheye
-  // and pinhole). Radii are those of the ideal image, which is symmetric about the centre:
+  // Mirror cameras and lenses with a vertical axis (`has_vertical_axis`). Radii are those of the
+  // ideal image, which is symmetric about the centre:
   PixelPoint centre;             ///< inside the image; also that of a pinhole lens
   double rim_radius_px = 0.0;    ///< nothing is seen beyond; pinhole: only if it is distorted
   double inner_radius_px = 0.0;  ///< nothing is visible within (the camera's own reflection)
@@ -124,14 +125,23 @@ void validate(const Camera& camera);
 [[nodiscard]] inline int lens_count(const Camera& camera) {
   return std::holds_alternative<DualFisheyeModel>(camera.model) ? 2 : 1;
 }
+/// True for mirrors and lenses whose axis is vertical, so that azimuths are image angles: all
+/// models but equirectangular, dual fisheye, pinhole and rig.
+[[nodiscard]] bool has_vertical_axis(const Camera& camera);
 /// Returns the index of the lens of a dual fisheye camera in whose half of the image a point is; 0
 /// for any other camera.
 [[nodiscard]] inline int lens_at(const Camera& camera, PixelPoint pixel) {
   return lens_count(camera) == 2 && pixel.u_px >= 0.5 * camera.image_size.width ? 1 : 0;
 }
 
+/// True for cameras whose pictures may be narrow ones (`PictureKind::pinhole`): pinhole and rig.
+[[nodiscard]] bool has_pinhole_lenses(const Camera& camera);
+/// False for a pinhole camera and for a rig whose cameras leave out a part of the horizon.
+[[nodiscard]] bool shows_all_azimuths(const Camera& camera);
+
 /// Returns the angle between the outermost columns in which a pinhole camera shows anything at the
-/// height of its centre; 0 for any other camera.
+/// height of its centre; of a rig, the azimuth at which its cameras show the horizon, in steps of
+/// one degree; 0 for any other camera.
 [[nodiscard]] double field_of_view(const Camera& camera);
 
 /// The part of the picture that a mirror or a lens covers.
@@ -141,7 +151,7 @@ struct ImageCircle {
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
 };
 /// Returns the circle around the mirror, or of lens `lens` of a dual fisheye camera; all zero for
-/// an equirectangular or pinhole camera.
+/// an equirectangular or pinhole camera and a rig.
 [[nodiscard]] ImageCircle image_circle(const Camera& camera, int lens);
 
 /// A band of elevations, in radians.
@@ -151,9 +161,9 @@ struct ElevationBand {
   friend bool operator==(const ElevationBand&, const ElevationBand&) = default;
 };
 /// Finds the band of elevations visible at every azimuth. Where the image frame cuts the mirror,
-/// the band ends at the cut. For a dual fisheye camera: the band around the horizon, in steps of
-/// one degree. Throws ContractError when no elevation is seen at every azimuth (a pinhole lens, a
-/// frame that cuts even the inner radius, or a gap between lenses at the horizon).
+/// the band ends at the cut. For a dual fisheye camera and a rig: the band around the horizon, in
+/// steps of one degree. Throws ContractError when no elevation is seen at every azimuth (a pinhole
+/// lens, a frame that cuts even the inner radius, or a gap between lenses at the horizon).
 [[nodiscard]] ElevationBand visible_elevations(const Camera& camera);
 
 }  // namespace panonav

@@ -15,8 +15,8 @@ namespace panonav {
 
 /// Names of the models in files, in the order of the alternatives of CameraModel.
 inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> camera_model_names{
-    "hyperboloidal",   "polynomial",   "unified", "equiangular",
-    "equirectangular", "dual-fisheye", "fisheye", "pinhole"};
+    "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular",
+    "dual-fisheye",  "fisheye",    "pinhole", "rig"};
 
 /// Returns the axis of a unified or fisheye model; null for others. `Model` is CameraModel, const
 /// or not.
@@ -47,8 +47,8 @@ inline constexpr std::array<std::string_view, 2> view_axis_names{"down", "up"};
 }
 
 /// Calls `visit(name, value)` for each parameter of the model; `value` is a double or, for the
-/// coefficients of the polynomial, a vector of doubles. All readers and writers of files use this
-/// list. `Model` is CameraModel, const or not.
+/// coefficients of the polynomial, a vector of doubles; not for a rig, whose cameras have models of
+/// their own. All readers and writers of files use this list. `Model` is CameraModel, const or not.
 template <class Model, class Visit>
 void visit_parameters(Model& model, Visit&& visit) {
   std::visit(
@@ -81,8 +81,7 @@ void visit_parameters(Model& model, Visit&& visit) {
         } else if constexpr (std::is_same_v<Kind, EquirectangularModel>) {
           visit("elevation_bottom_rad", m.elevation_bottom_rad);
           visit("elevation_top_rad", m.elevation_top_rad);
-        } else {
-          static_assert(std::is_same_v<Kind, DualFisheyeModel>);
+        } else if constexpr (std::is_same_v<Kind, DualFisheyeModel>) {
           for (std::size_t i = 0; i < m.lenses.size(); ++i) {
             auto& lens = m.lenses[i];
             const std::string name = "lens" + std::to_string(i) + "_";
@@ -98,6 +97,8 @@ void visit_parameters(Model& model, Visit&& visit) {
             visit(name + "gain", lens.gain);
           }
           visit("baseline_m", m.baseline_m);
+        } else {
+          static_assert(std::is_same_v<Kind, RigModel>);
         }
       },
       model);

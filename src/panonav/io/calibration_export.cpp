@@ -130,11 +130,9 @@ std::string format_kalibr(const Camera& camera, const ExportedModel& model,
 double write_calibration(const std::filesystem::path& path, const Camera& camera,
                          ExportFormat format) {
   validate(camera);
-  if (std::holds_alternative<EquirectangularModel>(camera.model) || lens_count(camera) == 2) {
-    throw ContractError("model", model_name(camera.model), "a mirror or a lens with one centre");
-  }
-  if (std::holds_alternative<PinholeModel>(camera.model)) {
-    throw ContractError("model", "pinhole", "a mirror or a lens that sees all azimuths");
+  if (!has_vertical_axis(camera)) {
+    throw ContractError("model", model_name(camera.model),
+                        "a mirror or a lens with one centre that sees all azimuths");
   }
   const double max_shear = 1e-4;  // radians by which azimuths change, 0.006 degrees
   require(std::abs(camera.affine[1]) <= max_shear, "affine d", camera.affine[1],

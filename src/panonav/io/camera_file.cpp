@@ -6,8 +6,12 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
 
 #include "panonav/camera/model_parameters.hpp"
+#include "panonav/camera/rig_model.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -53,13 +57,16 @@ Image read_mask(const std::filesystem::path& path, ImageSize size) {
   return to_grey(image.view());
 }
 
+/// Index of the rig, the last model; its file has no `model` but several `[[camera]]`.
+constexpr std::size_t rig_model_index = std::variant_size_v<CameraModel> - 1;
+
 CameraModel read_model(TomlFields& fields) {
   std::string known;
-  for (const auto name : camera_model_names)
+  for (const auto name : std::span(camera_model_names).first(rig_model_index))
     known += (known.empty() ? "" : ", ") + std::string(name);
-  const std::string name = fields.required_text("model", known);
+  const std::string name = fields.required_text("model", known + ", or several [[camera]]");
   auto model = make_default_model(name);
-  if (!model) fields.fail("model", "\"" + name + "\"", known);
+  if (!model || model->index() == rig_model_index) fields.fail("model", "\"" + name + "\"", known);
   visit_parameters(*model, [&](std::string_view parameter, auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
       value = fields.required_number(parameter);
@@ -75,6 +82,35 @@ CameraModel read_model(TomlFields& fields) {
   return *model;
 }
 
+/// Reads the fields of one camera, except its mask; does not validate it.
+Camera read_one_camera(TomlFields& fields) {
+  Camera camera;
+  camera.model = read_model(fields);
+  camera.image_size = {read_whole_number(fields, "width_px"),
+                       read_whole_number(fields, "height_px")};
+  if (std::holds_alternative<EquirectangularModel>(camera.model)) {
+    camera.forward_column = fields.number("forward_column").value_or(0.5);
+  } else if (std::holds_alternative<PinholeModel>(camera.model)) {
+    camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
+    camera.rim_radius_px = fields.number("rim_radius_px").value_or(0.0);
+    read_fixed_numbers(fields, "affine", camera.affine);
+    read_fixed_numbers(fields, "distortion", camera.distortion);
+  } else if (has_vertical_axis(camera)) {
+    camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
+    camera.rim_radius_px = fields.required_number("rim_radius_px");
+    camera.inner_radius_px = fields.required_number("inner_radius_px");
+    camera.forward_angle_rad = radians(fields.number("forward_angle_deg").value_or(0.0));
+    read_fixed_numbers(fields, "affine", camera.affine);
+    read_fixed_numbers(fields, "distortion", camera.distortion);
+  }
+  if (const auto direction = fields.choice("columns", column_direction_names)) {
+    camera.direction =
+        *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
+  }
+  camera.has_assumed_elevations = fields.choice("elevations", elevation_origins).value_or(0) == 1;
+  return camera;
+}
+
 }  // namespace
 
 CameraFile read_camera(const std::filesystem::path& path, CameraMount mount) {
@@ -88,46 +124,27 @@ CameraFile read_camera(const std::filesystem::path& path, CameraMount mount) {
   const TomlTable table = read_toml(path);
   TomlFields fields(path, "", table);
   CameraFile result;
-  Camera& camera = result.camera;
-  camera.model = read_model(fields);
-  camera.image_size = {read_whole_number(fields, "width_px"),
-                       read_whole_number(fields, "height_px")};
-  if (std::holds_alternative<EquirectangularModel>(camera.model)) {
-    camera.forward_column = fields.number("forward_column").value_or(0.5);
-  } else if (std::holds_alternative<PinholeModel>(camera.model)) {
-    camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
-    camera.rim_radius_px = fields.number("rim_radius_px").value_or(0.0);
-    read_fixed_numbers(fields, "affine", camera.affine);
-    read_fixed_numbers(fields, "distortion", camera.distortion);
-  } else if (lens_count(camera) == 1) {
-    camera.centre = {fields.required_number("centre_u_px"), fields.required_number("centre_v_px")};
-    camera.rim_radius_px = fields.required_number("rim_radius_px");
-    camera.inner_radius_px = fields.required_number("inner_radius_px");
-    camera.forward_angle_rad = radians(fields.number("forward_angle_deg").value_or(0.0));
-    read_fixed_numbers(fields, "affine", camera.affine);
-    read_fixed_numbers(fields, "distortion", camera.distortion);
-  }
-  if (const auto direction = fields.choice("columns", column_direction_names)) {
-    camera.direction =
-        *direction == 0 ? ColumnDirection::clockwise : ColumnDirection::counter_clockwise;
-  }
-  camera.has_assumed_elevations = fields.choice("elevations", elevation_origins).value_or(0) == 1;
-  const auto mask = fields.text("mask");
-  fields.finish();
   try {
-    validate(camera);
+    std::vector<Camera> cameras;
+    for (TomlFields& camera : fields.sections("camera")) {
+      cameras.push_back(read_one_camera(camera));
+      camera.finish();
+    }
+    result.camera = cameras.empty() ? read_one_camera(fields) : make_rig(std::move(cameras));
+    const auto mask = fields.text("mask");
+    fields.finish();
+    validate(result.camera);
+    if (mask) result.mask = read_mask(path.parent_path() / *mask, result.camera.image_size);
   } catch (const ContractError& error) {
     throw FileError(path.string(), error.what());
   }
-  if (mask) result.mask = read_mask(path.parent_path() / *mask, camera.image_size);
   return result;
 }
 
-void write_camera(const std::filesystem::path& path, const CameraFile& file) {
-  const Camera& camera = file.camera;
-  validate(camera);
-  std::string text =
-      "# How the pixels of a camera and the directions around the robot belong together.\n";
+namespace {
+
+/// Appends the fields of one camera, except its mask.
+void append_camera(const Camera& camera, std::string& text) {
   const auto number = [&text](std::string_view field, double value) {
     text += std::string(field) + " = " + to_text(value) + "\n";
   };
@@ -162,7 +179,7 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
     number("centre_v_px", camera.centre.v_px);
     if (camera.rim_radius_px != 0.0) number("rim_radius_px", camera.rim_radius_px);
     write_map();
-  } else if (lens_count(camera) == 1) {
+  } else if (has_vertical_axis(camera)) {
     number("centre_u_px", camera.centre.u_px);
     number("centre_v_px", camera.centre.v_px);
     number("rim_radius_px", camera.rim_radius_px);
@@ -176,10 +193,27 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
         "# The shape of the mirror was assumed, so lengths must not be computed from the ground.\n"
         "elevations = \"assumed\"\n";
   }
+}
+
+}  // namespace
+
+void write_camera(const std::filesystem::path& path, const CameraFile& file) {
+  validate(file.camera);
+  std::string text =
+      "# How the pixels of a camera and the directions around the robot belong together.\n";
   if (file.mask) {
     const std::string name = path.stem().string() + "_mask.png";
     write_png(path.parent_path() / name, file.mask->view());
     text += "mask = " + quote_for_toml(name) + "\n";
+  }
+  if (const auto* rig = std::get_if<RigModel>(&file.camera.model)) {
+    text += "# The pictures of these cameras stand side by side, from left to right.\n";
+    for (const Camera& camera : rig->cameras) {
+      text += "\n[[camera]]\n";
+      append_camera(camera, text);
+    }
+  } else {
+    append_camera(file.camera, text);
   }
   write_file(path, text);
 }

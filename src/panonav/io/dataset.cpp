@@ -17,6 +17,7 @@
 #include "panonav/io/internal/csv_table.hpp"
 #include "panonav/io/internal/toml_fields.hpp"
 #include "panonav/io/media_kind.hpp"
+#include "panonav/io/rig_pictures.hpp"
 
 namespace panonav {
 
@@ -46,8 +47,9 @@ PictureSource read_pinhole_source(TomlFields& images, const fs::path& folder) {
   source.kind = PictureKind::pinhole;
   if (const auto file = images.text("camera")) {
     source.camera = read_camera(folder / *file).camera;
-    if (!std::holds_alternative<PinholeModel>(source.camera->model)) {
-      images.fail("camera", "\"" + *file + "\"", "a camera file of the model pinhole");
+    if (!has_pinhole_lenses(*source.camera)) {
+      images.fail("camera", "\"" + *file + "\"",
+                  "a camera file of the model pinhole, or of several such cameras");
     }
     return source;
   }
@@ -75,8 +77,8 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
   if (source.kind == PictureKind::mirror) {
     const std::string file = images.required_text("camera", "the name of a camera file");
     CameraFile camera = read_camera(folder / file);
-    if (std::holds_alternative<PinholeModel>(camera.camera.model)) {
-      images.fail("camera", "\"" + file + "\", a pinhole camera",
+    if (!shows_all_azimuths(camera.camera)) {
+      images.fail("camera", "\"" + file + "\", which shows a part of the azimuth",
                   "a camera that shows all azimuths, or kind = \"pinhole\"");
     }
     source.camera = std::move(camera.camera);
@@ -256,6 +258,26 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
   return dataset;
 }
 
+/// Joins the pictures that the cameras of a rig have in folders of their own.
+void join_rig(Dataset& dataset, const TomlFields& images, const std::vector<std::string>& folders) {
+  const auto& camera = dataset.source.camera;
+  const auto* const rig = camera ? std::get_if<RigModel>(&camera->model) : nullptr;
+  if (rig == nullptr) {
+    images.fail("folders", "given", "only for a rig (a camera file of several cameras)");
+  }
+  if (folders.size() != rig->cameras.size()) {
+    images.fail("folders", "a list of " + std::to_string(folders.size()),
+                "a folder for each of the rig's " + std::to_string(rig->cameras.size()) +
+                    " cameras, in their order");
+  }
+  for (const std::string& name : folders) {
+    if (!is_inside_folder(name)) {
+      images.fail("folders", "\"" + name + "\"", "folders in that of the data set");
+    }
+  }
+  join_folders(dataset, *rig, folders);
+}
+
 /// A value that entries may have, and its name in warnings.
 struct EntryField {
   std::string_view name;
@@ -306,6 +328,7 @@ Dataset read_dataset(const fs::path& folder) {
     entries.fail("file", "\"" + file + "\"", "a table in the data set's folder");
   }
   dataset.entries = read_entries(folder, folder / file, poses.has_value());
+  if (const auto folders = images->texts("folders")) join_rig(dataset, *images, *folders);
   add_warnings_of_partial_fields(dataset);
   images->finish();
   entries.finish();

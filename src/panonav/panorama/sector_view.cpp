@@ -97,20 +97,25 @@ double SectorView::column_rad() const noexcept {
 double SectorView::row_rad() const noexcept {
   return (elevations.top_rad - elevations.bottom_rad) / panorama.rows;
 }
-double SectorView::width_rad() const noexcept {
-  int count = 0;
-  for (int x = 0; x < columns; ++x) {
-    for (int y = 0; y < panorama.rows; ++y) {
-      if (visible[static_cast<std::size_t>(y) * columns + x] == 0) continue;
-      ++count;
-      break;
+double shown_width(std::span<const SectorView> sectors) {
+  if (sectors.empty()) return 0.0;
+  const int columns = sectors.front().panorama.columns;
+  std::vector<std::uint8_t> shown(static_cast<std::size_t>(columns));
+  for (const SectorView& sector : sectors) {
+    const auto first =
+        static_cast<int>(std::lround(sector.first_azimuth_rad / sector.column_rad()));
+    for (std::size_t i = 0; i < sector.visible.size(); ++i) {
+      if (sector.visible[i] == 0) continue;
+      const int column = first + static_cast<int>(i % static_cast<std::size_t>(sector.columns));
+      shown[static_cast<std::size_t>((column % columns + columns) % columns)] = 1;
     }
   }
-  return count * column_rad();
+  return static_cast<double>(std::ranges::count(shown, 1)) * sectors.front().column_rad();
 }
 
-SectorView unwarp_sector(ImageView picture, const Camera& camera, PanoramaShape shape,
-                         const ElevationBand& elevations, const Tilt& tilt) {
+std::optional<SectorView> unwarp_sector(ImageView picture, const Camera& camera,
+                                        PanoramaShape shape, const ElevationBand& elevations,
+                                        const Tilt& tilt) {
   validate(camera);
   validate(tilt);
   const auto* const lens = std::get_if<PinholeModel>(&camera.model);
@@ -163,7 +168,7 @@ SectorView unwarp_sector(ImageView picture, const Camera& camera, PanoramaShape 
       shows_any = true;
     }
   }
-  require(shows_any, "elevations of the picture", 0.0, "some of those of the memory");
+  if (!shows_any) return std::nullopt;
   return sector;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "panonav/camera/camera.hpp"
@@ -25,16 +27,19 @@ struct SectorView {
 
   [[nodiscard]] double column_rad() const noexcept;  ///< Azimuth from column to column.
   [[nodiscard]] double row_rad() const noexcept;     ///< Elevation from row to row.
-  /// Returns the azimuth covered by columns in which anything is visible.
-  [[nodiscard]] double width_rad() const noexcept;
 };
+
+/// Returns the azimuth of the columns in which any of these sectors of one cylinder shows anything.
+[[nodiscard]] double shown_width(std::span<const SectorView> sectors);
 
 /// Brings a picture of a pinhole camera to the cylinder of a memory: each value is the mean of four
 /// points of its solid angle, sampled bilinearly from the picture, which is halved first until its
 /// pixels are about as far apart. `tilt`: of the robot with the camera; the sector is level. Colour
-/// becomes grey. Throws ContractError on another model or size, on a tilt out of range and if the
-/// picture shows nothing of the elevations. Cost: about 3 ms for 640 x 480.
-[[nodiscard]] SectorView unwarp_sector(ImageView picture, const Camera& camera, PanoramaShape shape,
-                                       const ElevationBand& elevations, const Tilt& tilt = {});
+/// becomes grey. nullopt if the picture shows nothing of the elevations. Throws ContractError on
+/// another model or size, and on a tilt out of range. Cost: about 3 ms for 640 x 480.
+[[nodiscard]] std::optional<SectorView> unwarp_sector(ImageView picture, const Camera& camera,
+                                                      PanoramaShape shape,
+                                                      const ElevationBand& elevations,
+                                                      const Tilt& tilt = {});
 
 }  // namespace panonav

@@ -19,6 +19,8 @@ ElevationBand validated_band(const Camera& camera, const UnwarperOptions& option
   validate(camera);
   validate(options);
   constexpr double zenith = std::numbers::pi / 2.0;
+  // Refuses a rig that leaves out some azimuths, whatever the band is.
+  if (std::holds_alternative<RigModel>(camera.model)) (void)visible_elevations(camera);
   const ElevationBand band = options.elevations ? *options.elevations : visible_elevations(camera);
   double bottom = -zenith;
   double top = zenith;

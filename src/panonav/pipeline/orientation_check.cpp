@@ -358,11 +358,11 @@ std::optional<PictureSource> correct_orientation(PictureSource source,
     return source;
   }
   Camera& camera = *source.camera;
-  if (lens_count(camera) == 2) return std::nullopt;
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
     correct_columns(fault, camera.direction, camera.forward_column);
     return source;
   }
+  if (!has_vertical_axis(camera)) return std::nullopt;
   if (fault.is_mirrored) camera.direction = opposite(camera.direction);
   camera.forward_angle_rad =
       wrap_angle(camera.forward_angle_rad - azimuth_sign(camera.direction) * fault.turn_rad);

@@ -378,7 +378,8 @@ std::optional<GradientFeatures> extract_gradient_features(
 }
 
 GradientFeatures extract_gradient_features(const SectorView& sector,
-                                           const PreprocessingOptions& preprocessing) {
+                                           const PreprocessingOptions& preprocessing,
+                                           double share) {
   const int rows = sector.panorama.rows;
   const GridLayout layout{sector.first_azimuth_rad, sector.column_rad(), sector.elevations.top_rad,
                           sector.row_rad(), 0};
@@ -393,8 +394,9 @@ GradientFeatures extract_gradient_features(const SectorView& sector,
       grid.visible[grid.index(y, x)] = 1;
     }
   }
-  return extract_from(grid, layout, sector_patch_scales,
-                      {max_corners_of_sector, max_sector_corners});
+  return extract_from(
+      grid, layout, sector_patch_scales,
+      {max_corners_of_sector, static_cast<std::size_t>(share * max_sector_corners)});
 }
 
 GradientFeatures mirror(const GradientFeatures& features) {

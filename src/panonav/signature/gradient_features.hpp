@@ -58,9 +58,10 @@ struct GradientFeatures {
 /// Extracts the features of a sector: corners whose neighbourhood is visible, and of which at least
 /// three fifths of the patch are visible; the rest of it is left out of the histogram. Each corner
 /// has histograms of three patches, which are 0.71, 1 and 1.41 times as large as those of
-/// panoramas: what the robot has approached or left appears larger or smaller.
+/// panoramas: what the robot has approached or left appears larger or smaller. `share`: that of the
+/// features of a narrow picture which this sector may have, 1 unless it is one of several.
 [[nodiscard]] GradientFeatures extract_gradient_features(
-    const SectorView& sector, const PreprocessingOptions& preprocessing = {});
+    const SectorView& sector, const PreprocessingOptions& preprocessing = {}, double share = 1.0);
 
 /// Mirrors features left to right: those of a place that does not exist.
 [[nodiscard]] GradientFeatures mirror(const GradientFeatures& features);

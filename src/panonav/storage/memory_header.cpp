@@ -251,15 +251,27 @@ class SettingsReader final : public OptionFields<SettingsReader> {
   std::set<std::string> used_;
 };
 
+const std::string camera_prefix = "source.camera.";
+
 // Lists the settings of a camera once for writing and reading: `Fields` is a SettingsWriter with a
 // const camera, or a SettingsReader.
 template <class Fields, class AnyCamera>
-void visit_camera(Fields& fields, AnyCamera& camera) {
-  const std::string prefix = "source.camera.";
+void visit_camera(Fields& fields, AnyCamera& camera, const std::string& prefix) {
   fields.model(prefix + "model", camera.model);
   visit_parameters(camera.model, [&](const std::string& name, auto& value) {
     fields.field(prefix + name, value);
   });
+  if (auto* rig = std::get_if<RigModel>(&camera.model)) {
+    auto count = static_cast<int>(rig->cameras.size());
+    fields.field(prefix + "cameras", count);
+    require(count >= 0 && count <= static_cast<int>(RigModel::max_cameras), prefix + "cameras",
+            count, "2 .. " + std::to_string(RigModel::max_cameras));
+    if constexpr (!std::is_const_v<AnyCamera>) rig->cameras.resize(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i) {
+      visit_camera(fields, rig->cameras[static_cast<std::size_t>(i)],
+                   prefix + "camera" + std::to_string(i) + ".");
+    }
+  }
   if (auto* axis = find_view_axis(camera.model)) {
     fields.visit_choice_with_default(prefix + "axis", view_axis_names, *axis,
                                      UnifiedModel::Axis::down);
@@ -352,7 +364,7 @@ Settings to_settings(const MemoryHeader& header) {
   SettingsWriter writer;
   visit_header(writer, header);
   const PictureSource& source = header.source;
-  if (source.camera) visit_camera(writer, *source.camera);
+  if (source.camera) visit_camera(writer, *source.camera, camera_prefix);
   if (source.mask) writer.put("source.mask", to_bits(*source.mask));
   return std::move(writer.settings);
 }
@@ -363,7 +375,7 @@ MemoryHeader to_header(const Settings& settings) {
   visit_header(reader, header);
   PictureSource& source = header.source;
   if (source.kind == PictureKind::mirror) {
-    visit_camera(reader, source.camera.emplace());
+    visit_camera(reader, source.camera.emplace(), camera_prefix);
     require_camera(*source.camera);
     if (const auto* mask = reader.find<std::vector<std::uint8_t>>("source.mask")) {
       source.mask = to_mask(*mask, source.camera->image_size);

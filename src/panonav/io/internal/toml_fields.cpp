@@ -170,12 +170,35 @@ std::optional<std::vector<double>> TomlFields::numbers(std::string_view field) {
   return numbers;
 }
 
+std::optional<std::vector<std::string>> TomlFields::texts(std::string_view field) {
+  const auto* list = get<std::vector<TomlValue>>(field, "a list of texts in quotation marks");
+  if (list == nullptr) return std::nullopt;
+  std::vector<std::string> texts;
+  for (const TomlValue& element : *list) {
+    const auto* text = std::get_if<std::string>(&element.content);
+    if (text == nullptr) fail(field, element.shown, "a list of texts in quotation marks");
+    texts.push_back(*text);
+  }
+  return texts;
+}
+
 std::optional<TomlFields> TomlFields::section(std::string_view field) {
   const auto* table = get<TomlTable>(field, "a section in square brackets");
   if (table == nullptr) return std::nullopt;
   std::string name = section_.empty() ? "" : section_ + ".";
   name += field;
   return TomlFields(path_, std::move(name), *table);
+}
+
+std::vector<TomlFields> TomlFields::sections(std::string_view field) {
+  const auto* list = get<std::vector<TomlValue>>(field, "sections in double square brackets");
+  std::vector<TomlFields> found;
+  for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+    const auto* table = std::get_if<TomlTable>(&(*list)[i].content);
+    if (table == nullptr) fail(field, (*list)[i].shown, "sections in double square brackets");
+    found.push_back(TomlFields(path_, std::string(field) + " " + std::to_string(i + 1), *table));
+  }
+  return found;
 }
 
 double TomlFields::required_number(std::string_view field) {

@@ -52,8 +52,13 @@ class TomlFields {
   std::optional<std::string> text(std::string_view field);  ///< A text in quotation marks.
   /// Returns a list of finite numbers; whole numbers are converted to reals.
   std::optional<std::vector<double>> numbers(std::string_view field);
+  /// Returns a list of texts.
+  std::optional<std::vector<std::string>> texts(std::string_view field);
   /// Returns a table within this one; the caller must call its `finish`.
   std::optional<TomlFields> section(std::string_view field);
+  /// Returns the tables of a list of tables; none if it is absent. The caller must call the
+  /// `finish` of each.
+  std::vector<TomlFields> sections(std::string_view field);
   /// Returns the number; throws FileError if it is absent.
   double required_number(std::string_view field);
   /// Returns the text; throws FileError with `allowed` if it is absent.

@@ -66,7 +66,8 @@ class RowSampler {
         top_rad_(band.top_rad),
         column_rad_(2.0 * std::numbers::pi / columns),
         row_rad_((band.top_rad - band.bottom_rad) / rows),
-        lens_count_(lens_count(camera)) {
+        lens_count_(lens_count(camera)),
+        rig_(std::get_if<RigModel>(&camera.model)) {
     if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
       // Scales the brighter lens down to the darker one, so that no weight exceeds
       // `tap_weight_sum`.
@@ -78,7 +79,12 @@ class RowSampler {
   [[nodiscard]] Taps make_row_taps(int row) const {
     const double elevation_rad = top_rad_ - row_rad_ * (row + 0.5);
     const Spacing spacing = measure_spacing(elevation_rad);
-    const int smaller_side = std::min(camera_.image_size.width, camera_.image_size.height);
+    int smaller_side = std::min(camera_.image_size.width, camera_.image_size.height);
+    if (rig_) {
+      for (const Camera& camera : rig_->cameras) {
+        smaller_side = std::min({smaller_side, camera.image_size.width, camera.image_size.height});
+      }
+    }
     int level = static_cast<int>(
         std::lround(std::log2(std::max(1.0, std::min(spacing.across_px, spacing.down_px)))));
     while (level > 0 && (smaller_side >> level) < 4) --level;
@@ -131,18 +137,25 @@ class RowSampler {
       const double azimuth_rad = 2.0 * std::numbers::pi * probe / probes;
       const auto centre = project_direction(azimuth_rad, elevation_rad);
       if (!centre) continue;
-      if (const auto neighbour = project_direction(azimuth_rad + column_rad_ / 2, elevation_rad)) {
+      const auto neighbour = project_direction(azimuth_rad + column_rad_ / 2, elevation_rad);
+      if (neighbour && are_in_one_picture(*centre, *neighbour)) {
         sum.across_px += 2.0 * distance_px(*centre, *neighbour);
         ++across_count;
       }
       for (const double half_rad : {row_rad_ / 2, -row_rad_ / 2}) {
-        if (const auto below = project_direction(azimuth_rad, elevation_rad - half_rad)) {
+        const auto below = project_direction(azimuth_rad, elevation_rad - half_rad);
+        if (below && are_in_one_picture(*centre, *below)) {
           sum.down_px += 2.0 * distance_px(*centre, *below);
           ++down_count;
         }
       }
     }
     return {sum.across_px / std::max(1, across_count), sum.down_px / std::max(1, down_count)};
+  }
+
+  /// True if one camera of a rig took both points; always for other cameras.
+  [[nodiscard]] bool are_in_one_picture(const PixelPoint& a, const PixelPoint& b) const {
+    return !rig_ || tile_at(*rig_, a.u_px).camera == tile_at(*rig_, b.u_px).camera;
   }
 
   [[nodiscard]] Placement place_taps(double elevation_rad, const Spacing& spacing,
@@ -191,26 +204,33 @@ class RowSampler {
     return placement;
   }
 
-  [[nodiscard]] Tap make_tap(PixelPoint point, int sum, const ImageCircle& circle, int level,
-                             bool& crosses_border) const {
-    const double pixel = 1 << level;
-    const int width = camera_.image_size.width >> level;
-    const int height = camera_.image_size.height >> level;
+  /// Moves a point radially to where all pixels of its tap show the mirror; true if it was moved.
+  static bool move_into_ring(PixelPoint& point, const ImageCircle& circle, double pixel) {
     const RadiusRange range = compute_usable_radii(circle, pixel);
     const double radius_px = distance_px(point, circle.centre);
     const double usable_px = std::clamp(radius_px, range.low_px, range.high_px);
-    crosses_border |= usable_px != radius_px;
-    if (usable_px != radius_px) {
-      const double inward = usable_px / radius_px;
-      point.u_px = circle.centre.u_px + inward * (point.u_px - circle.centre.u_px);
-      point.v_px = circle.centre.v_px + inward * (point.v_px - circle.centre.v_px);
-    }
-    const double u = std::clamp(point.u_px / pixel - 0.5, 0.0, width - 1.0);
-    const double v = std::clamp(point.v_px / pixel - 0.5, 0.0, height - 1.0);
+    if (usable_px == radius_px) return false;
+    const double inward = usable_px / radius_px;
+    point.u_px = circle.centre.u_px + inward * (point.u_px - circle.centre.u_px);
+    point.v_px = circle.centre.v_px + inward * (point.v_px - circle.centre.v_px);
+    return true;
+  }
+
+  [[nodiscard]] Tap make_tap(PixelPoint point, int sum, const ImageCircle& circle, int level,
+                             bool& crosses_border) const {
+    const double pixel = 1 << level;
+    const auto tile = rig_ ? tile_at(*rig_, point.u_px) : RigModel::Tile{0, 0, camera_.image_size};
+    // Pixels of the halved image that only show this tile.
+    const int left = (tile.left_px + (1 << level) - 1) >> level;
+    const int right = (tile.left_px + tile.size.width) >> level;
+    const int bottom = tile.size.height >> level;
+    if (!rig_) crosses_border |= move_into_ring(point, circle, pixel);
+    const double u = std::clamp(point.u_px / pixel - 0.5, 1.0 * left, right - 1.0);
+    const double v = std::clamp(point.v_px / pixel - 0.5, 0.0, bottom - 1.0);
     Tap tap;
     tap.level = level;
-    tap.u = std::min(static_cast<int>(u), width - 2);
-    tap.v = std::min(static_cast<int>(v), height - 2);
+    tap.u = std::min(static_cast<int>(u), right - 2);
+    tap.v = std::min(static_cast<int>(v), bottom - 2);
     tap.weights = pack_weights(u - tap.u, v - tap.v, sum);
     return tap;
   }
@@ -219,6 +239,7 @@ class RowSampler {
   int columns_;
   double top_rad_, column_rad_, row_rad_;
   int lens_count_;
+  const RigModel* rig_;  // null for other cameras
   std::array<double, 2> brightness_factors_{1.0, 1.0};
 };
 

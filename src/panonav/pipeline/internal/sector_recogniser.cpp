@@ -1,8 +1,11 @@
 #include "panonav/pipeline/internal/sector_recogniser.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/exif.hpp"
@@ -47,6 +50,39 @@ Camera choose_camera(const Observation& observation, const PictureSource& source
   return make_pinhole_camera(size, focal_length_from_35mm(size, *focal_length_mm));
 }
 
+/// A picture of one pinhole camera.
+struct LensPicture {
+  ImageView picture;
+  const Camera* camera;
+};
+
+/// Returns the pictures of the cameras of a rig, which are parts of one, or that of a single
+/// camera.
+std::vector<LensPicture> split_picture(ImageView picture, const Camera& camera) {
+  const auto* const rig = std::get_if<RigModel>(&camera.model);
+  if (rig == nullptr) return {{picture, &camera}};
+  std::vector<LensPicture> parts;
+  for (const auto& [index, left_px, size] : list_tiles(*rig)) {
+    parts.push_back({{picture.data + static_cast<std::ptrdiff_t>(left_px) * picture.channels,
+                      size.width, size.height, picture.channels, picture.stride},
+                     &rig->cameras[index]});
+  }
+  return parts;
+}
+
+/// Appends the features of a sector whose corners `keep` accepts: leading ones to `leading`, the
+/// others to `others`.
+template <class Keep>
+void append_features(const GradientFeatures& from, const Keep& keep, GradientFeatures& leading,
+                     GradientFeatures& others) {
+  for (std::size_t i = 0; i < from.corners.size(); ++i) {
+    if (!keep(from.corners[i])) continue;
+    GradientFeatures& to = i < from.leading ? leading : others;
+    to.corners.push_back(from.corners[i]);
+    to.histograms.push_back(from.histograms[i]);
+  }
+}
+
 }  // namespace
 
 SectorRecogniser::SectorRecogniser(const MemoryFile& file, const VisualMemory& memory,
@@ -62,18 +98,50 @@ Place SectorRecogniser::localise(const Observation& observation, int top,
     if (image == nullptr) throw ContractError("picture", "a panorama", "an image");
     const Camera camera =
         choose_camera(observation, observation.narrow_source.value_or(source_), image->size());
-    const SectorView sector =
-        unwarp_sector(image->view(), camera, {header_.shape.rows, header_.panorama_columns},
-                      *header_.elevations, observation.tilt.value_or(Tilt{}));
-    SectorQuery query{.features = extract_gradient_features(sector, header_.preprocessing),
-                      .azimuth_rad = std::get<PinholeModel>(camera.model).azimuth_rad,
-                      .width_rad = std::max(sector.width_rad(), min_field_of_view_rad),
-                      .has_known_tilt = observation.tilt.has_value()};
-    for (auto& corner : query.features.corners) {
-      corner.azimuth_rad -= static_cast<float>(query.azimuth_rad);
-    }
+    SectorQuery query = make_query(image->view(), camera, observation.tilt.value_or(Tilt{}));
+    query.has_known_tilt = observation.tilt.has_value();
     return localiser_.localise(query, top, excluded);
   });
+}
+
+SectorQuery SectorRecogniser::make_query(ImageView image, const Camera& camera,
+                                         const Tilt& tilt) const {
+  const auto* const rig = std::get_if<RigModel>(&camera.model);
+  const std::vector<LensPicture> parts = split_picture(image, camera);
+  const PanoramaShape shape{header_.shape.rows, header_.panorama_columns};
+  GradientFeatures leading;
+  GradientFeatures others;
+  std::vector<SectorView> sectors;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    auto sector =
+        unwarp_sector(parts[i].picture, *parts[i].camera, shape, *header_.elevations, tilt);
+    if (!sector) continue;
+    const double share = 1.0 / static_cast<double>(parts.size());
+    // Of what several cameras see, the features of the camera that looks there count.
+    append_features(
+        extract_gradient_features(*sector, header_.preprocessing, share),
+        [&](const GradientFeatures::Corner& corner) {
+          if (rig == nullptr) return true;
+          const auto pixel = project(
+              *rig, tilt_direction(
+                        Direction3::from_angles(corner.azimuth_rad, corner.elevation_rad), tilt));
+          return pixel && tile_at(*rig, pixel->u_px).camera == i;
+        },
+        leading, others);
+    sectors.push_back(*std::move(sector));
+  }
+  require(!sectors.empty(), "elevations of the picture", 0.0, "some of those of the memory");
+  SectorQuery query;
+  query.features = std::move(leading);
+  query.features.leading = query.features.corners.size();
+  append_features(
+      others, [](const auto&) { return true; }, query.features, query.features);
+  if (rig == nullptr) query.azimuth_rad = std::get<PinholeModel>(camera.model).azimuth_rad;
+  query.width_rad = std::max(shown_width(sectors), min_field_of_view_rad);
+  for (auto& corner : query.features.corners) {
+    corner.azimuth_rad -= static_cast<float>(query.azimuth_rad);
+  }
+  return query;
 }
 
 }  // namespace panonav

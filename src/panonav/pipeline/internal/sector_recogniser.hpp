@@ -27,6 +27,11 @@ class SectorRecogniser {
                                std::span<const ViewId> excluded) const;
 
  private:
+  /// Returns the features of a picture, or of those of a rig's cameras together. Throws
+  /// ContractError if they show nothing of the memory's elevations.
+  [[nodiscard]] SectorQuery make_query(ImageView image, const Camera& camera,
+                                       const Tilt& tilt) const;
+
   MemoryHeader header_;  // its cylinders are those of gradient features
   PictureSource source_;
   SectorLocaliser localiser_;
