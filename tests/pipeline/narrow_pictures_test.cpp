@@ -14,6 +14,7 @@
 #include "panonav/pipeline/memory_merge.hpp"
 #include "panonav/pipeline/narrow_features.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/tracker.hpp"
 #include "panonav/signature/gradient_features.hpp"
 #include "support/patch_views.hpp"
 #include "support/skips.hpp"
@@ -111,6 +112,38 @@ TEST_F(NarrowPictures, OfARigAreOneQuestion) {
   EXPECT_EQ(place.matches.front().name, "room 5");
   ASSERT_TRUE(place.known);
   EXPECT_NEAR(angle_difference(*place.heading_rad, 1.0), 0.0, radians(2.0));
+}
+
+TEST_F(NarrowPictures, AreTrackedByOdometry) {
+  const auto path = memorise(true);
+  TrackerOptions options;
+  options.source = narrow_options().source;
+  const auto drive = [&](Tracker& tracker, int from, int to) {
+    MonteCarloEstimate estimate;
+    for (int room = from; room <= to; ++room) {
+      Observation photo(take_narrow_picture(make_patch_view(static_cast<std::uint64_t>(room)),
+                                            0.3 - 0.2 * room, radians(70.0)));
+      photo.odometry = Pose2{10.0 * (room - from), 0.0, 0.0};  // the robot does not turn
+      estimate = tracker.observe(photo);
+    }
+    return estimate;
+  };
+  Tracker tracker(path, options);
+  ASSERT_TRUE(tracker.takes_narrow_pictures());
+  const MonteCarloEstimate estimate = drive(tracker, 2, 6);
+  ASSERT_TRUE(estimate.position);
+  EXPECT_LT(distance(*estimate.position, {60.0, 0.0}), 10.0) << "as far as the next room";
+  EXPECT_GT(estimate.p_inside, 0.9);
+  EXPECT_EQ(tracker.visual_odometry(), nullptr);
+  Tracker again(path, options);
+  EXPECT_EQ(drive(again, 2, 6).modes.front().mean, estimate.modes.front().mean) << "same bits";
+  // Pictures of rooms that were not memorised.
+  Tracker outside(path, options);
+  EXPECT_EQ(drive(outside, 20, 26).state, LocalisationState::lost);
+
+  EXPECT_THROW((void)Tracker(memorise(false), options), FileError);
+  EXPECT_THROW((void)Tracker(path).localise(take_narrow_picture(make_patch_view(1), 0.0, 1.2)),
+               ContractError);
 }
 
 TEST_F(NarrowPictures, AreLocalisedAmongPanoramas) {

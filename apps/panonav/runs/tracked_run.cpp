@@ -75,6 +75,14 @@ std::string explain_never_localised(const TrackSummary& summary, const std::stri
          "--start-heading-deg)";
 }
 
+std::string describe_unknown_motion(const std::string& run, const std::string& memory,
+                                    bool has_odometry) {
+  return "panonav track: " + to_readable_line(run) + " has no odometry" +
+         (has_odometry ? " in the unit of the memory" : "") +
+         ", and narrow images show no motion; each image may be one spacing of the views of " +
+         memory + " from the last";
+}
+
 TrackSummary summarise_track(const std::vector<TrackedImage>& images) {
   TrackSummary summary;
   for (const TrackedImage& image : images) add(summary, image);
@@ -136,6 +144,7 @@ struct EncodedImage {
   };
   std::vector<Step> steps;  ///< of the images since then and of this one
   PackedSignature view;
+  std::optional<Place> place;  ///< instead of the view of a narrow picture
   std::optional<recordings::RunMoment> moment;
 };
 
@@ -151,6 +160,10 @@ void encode_observed(const std::vector<DatasetEntry>& entries, std::size_t index
   StageClock clock;
   const Observation observation = read_observation(entries[index]);
   clock.stage("reading");
+  if (tracker.takes_narrow_pictures()) {
+    image.place = tracker.localise(observation);
+    return;
+  }
   std::optional<FourierSignature> signature;
   if (settings.thumbnail_file == nullptr) {
     signature = encoder.signature(observation);
@@ -213,6 +226,18 @@ void move(Tracker& tracker, const Dataset& run, std::size_t index, EncodedImage&
 
 }  // namespace
 
+namespace {
+
+TrackedImage track_place(Tracker& tracker, const Place& place, const TrackSettings& settings) {
+  TrackedImage image;
+  image.estimate = tracker.observe(place);
+  image.particles =
+      recordings::resample_systematically(tracker.particles(), settings.particles_per_image);
+  return image;
+}
+
+}  // namespace
+
 void track(Tracker& tracker, const Dataset& recorded, const TrackSettings& settings,
            Session& session, const std::function<void(TrackedImage&&)>& report) {
   Dataset run = recorded;
@@ -233,8 +258,9 @@ void track(Tracker& tracker, const Dataset& recorded, const TrackSettings& setti
       move(tracker, run, index, images[i], skipped);
       if (images[i].steps.back().failure) continue;
       const DatasetEntry& entry = entries[index];
-      TrackedImage image =
-          track_image(tracker, images[i].view, settings, std::move(images[i].moment));
+      TrackedImage image = images[i].place ? track_place(tracker, *images[i].place, settings)
+                                           : track_image(tracker, images[i].view, settings,
+                                                         std::move(images[i].moment));
       if (image.moment && has_viewer_input) record_viewer_pose(*image.moment);
       image.index = index;
       image.file = entry.file;

@@ -58,6 +58,10 @@ void add(TrackSummary& summary, const TrackedImage& image);
 /// Explains for people why the position was never known, and what to check; empty if it was.
 [[nodiscard]] std::string explain_never_localised(const TrackSummary& summary,
                                                   const std::string& memory);
+/// Says that the motion of a run of narrow images is not known, as its odometry is missing or in
+/// metres where the memory's positions are not.
+[[nodiscard]] std::string describe_unknown_motion(const std::string& run, const std::string& memory,
+                                                  bool has_odometry);
 [[nodiscard]] TrackSummary summarise_track(const std::vector<TrackedImage>& images);
 
 struct TrackSettings {

@@ -355,9 +355,13 @@ void write_localised_poses(const std::string& path, const std::vector<TrackedIma
 }
 
 /// Prints a note if the motion is computed from the images.
-void note_motion_from_images(const TrackArguments& arguments, bool has_odometry, bool is_metric,
-                             Session& session) {
-  if (has_odometry && !is_metric) {
+void note_motion_from_images(const TrackArguments& arguments, const Tracker& tracker,
+                             bool has_odometry, Session& session) {
+  const bool is_metric = session.length_unit() == LengthUnit::metres;
+  if (tracker.takes_narrow_pictures()) {
+    if (has_odometry && is_metric) return;
+    session.note(describe_unknown_motion(arguments.dataset, arguments.memory, has_odometry));
+  } else if (has_odometry && !is_metric) {
     session.note("panonav track: the positions of " + arguments.memory +
                  " are in view steps, so the odometry in metres is not used; motion is computed "
                  "from the images (panonav scale)");
@@ -376,6 +380,9 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   if (recordings::is_live(arguments.dataset)) return track_live(declared, arguments, file, session);
   reject_live_options(declared, arguments.dataset, true);
   Dataset run = open_run(arguments.dataset, arguments.run, file, session);
+  if (run.source.kind == PictureKind::pinhole) {
+    declared.reject_options({"--report", "--record", "--view"}, "with narrow images (pinhole)");
+  }
   std::vector<double> seconds;
   if (arguments.tum)
     seconds = trajectory_stamps(run, "track", arguments.dataset, *arguments.tum, session);
@@ -386,7 +393,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
     for (DatasetEntry& entry : run.entries) entry.pose.reset();
   }
   TrackSettings settings{.every = arguments.every};
-  note_motion_from_images(arguments, has_odometry(run), is_metric, session);
+  note_motion_from_images(arguments, tracker, has_odometry(run), session);
   if (arguments.report) {
     prepare_report_folder(*arguments.report, "track");
     settings.particles_per_image = count_shown_particles(run.entries.size());
@@ -480,7 +487,8 @@ Verb track_verb() {
           "places look similar, all of them are tracked until an image shows which one is correct. "
           "A robot that was moved without odometry (kidnapped) is localised again. With a live "
           "source, tracking continues until you press Ctrl-C. If only its position is "
-          "known, no heading is printed. The exit code is 1 if its position was never known.",
+          "known, no heading is printed. Narrow images (a data set with kind = \"pinhole\") need a "
+          "memory made with memorise --narrow. The exit code is 1 if its position was never known.",
           "  panonav track office.panonav run\n"
           "  panonav track office.panonav run --every 10 --report report\n"
           "  panonav track office.panonav run --tum estimate.tum --json\n"

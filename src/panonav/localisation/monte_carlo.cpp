@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <set>
 #include <span>
 #include <utility>
 
@@ -12,8 +11,10 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/alternative_places.hpp"
 #include "panonav/localisation/internal/explained_injection.hpp"
+#include "panonav/localisation/internal/inside_belief.hpp"
 #include "panonav/localisation/internal/particle_motion.hpp"
 #include "panonav/localisation/internal/particle_weighing.hpp"
+#include "panonav/localisation/internal/place_likelihood.hpp"
 #include "panonav/localisation/internal/pose_sampler.hpp"
 #include "panonav/localisation/internal/position_error.hpp"
 #include "panonav/localisation/internal/resampling.hpp"
@@ -38,21 +39,10 @@ constexpr double min_followed_weight = 1e-3;
 
 // Probabilities from one image to the next (docs/decisions.md, particle injection).
 constexpr double p_kidnap = 0.01;  ///< that the robot is carried elsewhere
-constexpr double p_leave = 0.02;   ///< that it leaves the memorised area
-constexpr double p_return = 0.1;   ///< that it comes back
 /// Probability at the first image that the robot is not near any particle.
 constexpr double p_elsewhere_at_start = 0.9;
-/// Probability of being inside the memorised area before the first image: undecided.
-constexpr double p_inside_at_start = 0.5;
-
-/// Log-likelihood ratio that 1 % of the views of other places reach by chance (docs/decisions.md,
-/// "Lost is a second belief"). Limits the evidence of one image against being in the memorised
-/// area.
-constexpr double chance_log_ratio = 1.0;
-// Limits of the evidence of one image for being in the memorised area: by its likelihood (odds of
-// 150) and by its difference alone (odds of 7). A few images can refute them
-// (tests/localisation/monte_carlo_test.cpp).
-constexpr double max_log_ratio = 5.0;
+/// Limit of the evidence of one image for being in the memorised area by its difference alone: odds
+/// of 7, which a few images can refute (tests/localisation/monte_carlo_test.cpp).
 constexpr double max_log_ratio_of_difference = 2.0;
 /// Log-likelihood ratio of an explained difference against an unrelated one (the same tests).
 constexpr double log_ratio_per_margin = 4.0;
@@ -86,8 +76,8 @@ struct MonteCarloLocaliser::Implementation {
   Particles particles;
   double travelled_m = 0.0;  // since the last image
   PositionError error;
-  bool is_uninformed = true;            // no image since a start without a known pose
-  double p_inside = p_inside_at_start;  // probability that the robot is in the memorised area
+  bool is_uninformed = true;  // no image since a start without a known pose
+  InsideBelief inside;
   // Probability by the last image that the robot is at the heaviest mode, not carried elsewhere.
   double p_explained_here = 1.0;
   std::size_t counted_sites = 0;  // number of references when `places` was counted
@@ -116,22 +106,16 @@ struct MonteCarloLocaliser::Implementation {
   }
   [[nodiscard]] ParticleModes modes() const { return find_modes(particles, bins()); }
 
-  /// Number of memorised places of the size of a mode. Cost: O(references) where their number has
-  /// changed.
+  /// Number of memorised places of the size of a mode. Cost: linear in new references.
   [[nodiscard]] std::size_t count_places() {
     if (counted_sites == likelihood.sites().size()) return places;
-    const double side_m = (2.0 * mode_reach + 1.0) * bins().cell_m;
-    std::set<std::pair<double, double>> cells;
-    for (const ViewLikelihood::Site& site : likelihood.sites()) {
-      cells.emplace(std::floor(site.position.x_m / side_m), std::floor(site.position.y_m / side_m));
-    }
     counted_sites = likelihood.sites().size();
-    return places = std::max<std::size_t>(1, cells.size());
+    return places = likelihood.count_cells((2.0 * mode_reach + 1.0) * bins().cell_m);
   }
 
   void restart(bool is_known) {
     error = {};
-    p_inside = is_known ? 1.0 - p_leave : p_inside_at_start;
+    inside.restart(is_known);
     p_explained_here = 1.0;
     is_uninformed = !is_known;
     latest = {};
@@ -144,24 +128,52 @@ struct MonteCarloLocaliser::Implementation {
     likelihood.reorder_by_cell(particles);
     compare_views(view, was_localised);  // [M03 section 4]: similarities at the references
     inject_by_rule(view);                // [M03 section 4.1]
+    const auto inject = [&] {
+      inject_explained();  // Bayes' rule for a kidnapped robot
+      update_inside();     // Bayes' rule for the memorised area
+    };
+    weigh(likelihood, inject, [&](const ParticleModes& found) { update_explained_here(found); });
+    likelihood.release();
+    return latest;
+  }
+
+  /// Monte-Carlo localisation by the answer of a localiser to one image.
+  MonteCarloEstimate observe(const Place& place) {
+    PlaceLikelihood answer(place, likelihood.sites().size(), model.spacing_m, options.compass);
+    latest = {};
+    const auto inject = [&] {
+      inside.update(std::log(place.known_probability / (1.0 - place.known_probability)));
+      if (options.injection == MonteCarloOptions::Injection::none || !answer.is_informed()) return;
+      // The mean likelihood over all places is 1, as the answer is a probability.
+      const double elsewhere = kidnap_probability(prior_elsewhere(), 0.0, latest.log_ratio_here);
+      latest.injected = inject_samples(particles, elsewhere, [&] { return answer.sample(random); });
+    };
+    weigh(answer, inject, [&](const ParticleModes& found) {
+      if (found.modes.empty()) return;
+      const double log_ratio = answer.log_ratio(found.modes.front().mean);
+      p_explained_here =
+          std::min(1.0, (1.0 - kidnap_probability(p_kidnap, 0.0, log_ratio)) / (1.0 - p_kidnap));
+    });
+    return latest;
+  }
+
+  /// Weighs the particles by an image and fills the latest estimate.
+  template <class Inject, class UpdateExplained>
+  void weigh(PoseLikelihood& by_image, const Inject& inject, const UpdateExplained& explain) {
     const double correlation = correlation_with_last_view();
     const double exponent = is_uninformed ? 1.0 : std::max(min_view_exponent, 1.0 - correlation);
     const ParticleModes before = is_uninformed ? ParticleModes{} : modes();
-    latest.log_ratio_here =
-        weighing.update_weights(particles, likelihood, exponent, bins(), random);
-    inject_explained();  // Bayes' rule for a kidnapped robot
-    update_inside();     // Bayes' rule for the memorised area
+    latest.log_ratio_here = weighing.update_weights(particles, by_image, exponent, bins(), random);
+    inject();
     is_uninformed = false;
     travelled_m = 0.0;
     const ParticleModes after = modes();
     latest.particles = static_cast<int>(particles.size());
     latest.effective_particles = effective_sample_size(particles.weight);
     update_error(before, after, exponent, correlation);
-    update_explained_here(after);
+    explain(after);
     fill_estimate(latest, after);
     resample_if_needed(after.occupied_bins);  // [Fox 2003]
-    likelihood.release();
-    return latest;
   }
 
   /// Views from nearly the same place have the same errors, so a view's weight falls with its
@@ -214,29 +226,21 @@ struct MonteCarloLocaliser::Implementation {
   /// Replaces random particles by new ones according to the caller's rule.
   void inject_by_rule(const PackedSignature& view) {
     if (!injection_rule) return;
-    const std::size_t size = particles.size();
-    const InjectedParticles injected = injection_rule(view, size);
+    const InjectedParticles injected = injection_rule(view, particles.size());
     std::vector<std::uint32_t> sites;
     for (const ViewId around : injected.around) {
       if (const auto site = likelihood.site_of(around)) sites.push_back(*site);
     }
     if (injected.count == 0 || (sites.empty() && !injected.around.empty())) return;
-    for (std::size_t n = 0; n < injected.count; ++n) {
-      const std::size_t replaced = random.index(size);
-      Pose2 pose;
-      if (sites.empty()) {
-        pose = sampler.sample_anywhere(particles, random);
-      } else {
-        const std::uint32_t site = sites[random.index(sites.size())];
-        likelihood.compare(std::span(&site, 1));
-        pose = sampler.sample_around({site, false}, particles, random);
-      }
-      particles.set(replaced, pose, 1.0 / static_cast<double>(size));
-    }
-    double sum = 0.0;
-    for (const double weight : particles.weight) sum += weight;
-    for (double& weight : particles.weight) weight /= sum;
+    inject_around(particles, injected.count, sites, likelihood, sampler, random);
     latest.injected = static_cast<int>(injected.count);
+  }
+
+  /// Probability before an image that the robot is not where the particles are: one that was
+  /// outside the memorised area may return anywhere.
+  [[nodiscard]] double prior_elsewhere() const {
+    return is_uninformed ? p_elsewhere_at_start
+                         : p_kidnap + (1.0 - inside.probability()) * InsideBelief::p_return;
   }
 
   void inject_explained() {
@@ -244,11 +248,8 @@ struct MonteCarloLocaliser::Implementation {
     ExplainedInjection injection(likelihood, sampler, model, options.compass);
     if (!injection.collect_candidates(particles, random)) return;
     latest.log_ratio_anywhere = injection.log_evidence();
-    // A robot that was outside the memorised area may return anywhere.
-    const double prior =
-        is_uninformed ? p_elsewhere_at_start : p_kidnap + (1.0 - p_inside) * p_return;
     const double elsewhere =
-        kidnap_probability(prior, latest.log_ratio_anywhere, latest.log_ratio_here);
+        kidnap_probability(prior_elsewhere(), latest.log_ratio_anywhere, latest.log_ratio_here);
     latest.injected = injection.inject(particles, elsewhere, random);
   }
 
@@ -267,12 +268,9 @@ struct MonteCarloLocaliser::Implementation {
       const double margin = (model.explained_difference - *latest.difference_anywhere) / unit;
       evidence =
           std::max(evidence, std::min(max_log_ratio_of_difference, log_ratio_per_margin * margin) +
-                                 chance_log_ratio);
+                                 InsideBelief::chance_log_ratio);
     }
-    p_inside = p_inside * (1.0 - p_leave) + (1.0 - p_inside) * p_return;
-    const double ratio =
-        std::exp(std::clamp(evidence - chance_log_ratio, -chance_log_ratio, max_log_ratio));
-    p_inside = p_inside * ratio / (p_inside * ratio + 1.0 - p_inside);
+    inside.update(evidence - InsideBelief::chance_log_ratio);
   }
 
   /// A carried robot keeps its particles until views at the new place outweigh them. Meanwhile the
@@ -326,11 +324,11 @@ struct MonteCarloLocaliser::Implementation {
   void fill_estimate(MonteCarloEstimate& estimate, const ParticleModes& found) const {
     estimate.modes = correct_modes(found.modes);
     estimate.spread_m = position_spread_m(particles);
-    estimate.p_inside = p_inside;
-    const double p_here = p_inside * p_explained_here;
+    estimate.p_inside = inside.probability();
+    const double p_here = estimate.p_inside * p_explained_here;
     estimate.probability = found.modes.empty() ? 0.0 : p_here * found.modes.front().weight;
     estimate.state = LocalisationState::lost;
-    if (p_inside < min_p_inside) return;
+    if (estimate.p_inside < min_p_inside) return;
     if (!found.modes.empty() && !is_in_memorised_area(found.modes.front().mean.position())) return;
     estimate.state = LocalisationState::ambiguous;
     if (found.modes.empty()) return;
@@ -361,11 +359,9 @@ struct MonteCarloLocaliser::Implementation {
 
   /// True if a reference is near enough to be compared at this position.
   [[nodiscard]] bool is_in_memorised_area(Point2 position) const {
-    if (!likelihood.sites_near(position).empty()) return true;
-    const double reach_m = memorised_reach_factor * std::max(model.spacing_m, model.range_m);
-    return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
-      return distance(site.position, position) <= reach_m;
-    });
+    return !likelihood.sites_near(position).empty() ||
+           likelihood.has_site_within(
+               position, memorised_reach_factor * std::max(model.spacing_m, model.range_m));
   }
 };
 
@@ -481,6 +477,10 @@ MonteCarloEstimate MonteCarloLocaliser::observe(const PackedSignature& view) {
     own.latest = before;
     throw;
   }
+}
+
+MonteCarloEstimate MonteCarloLocaliser::observe(const Place& place) {
+  return implementation_->observe(place);
 }
 
 MonteCarloEstimate MonteCarloLocaliser::estimate() const {

@@ -12,6 +12,7 @@
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/localisation/particles.hpp"
+#include "panonav/localisation/place.hpp"
 #include "panonav/memory/view_index.hpp"
 #include "panonav/motion/odometry.hpp"
 
@@ -148,6 +149,10 @@ class MonteCarloLocaliser {
   /// signature of another shape than the memory's; FileError, with the estimate unchanged, if views
   /// cannot be read.
   MonteCarloEstimate observe(const PackedSignature& view);
+  /// Weighs the particles by the answer of a localiser to an image (`SectorLocaliser`): its places
+  /// with their probabilities, positions and headings. Answers from nearly one position count less,
+  /// as views do. Differences of the estimate are those of views, so they stay empty.
+  MonteCarloEstimate observe(const Place& place);
   /// Returns the present estimate, without a new image.
   [[nodiscard]] MonteCarloEstimate estimate() const;
 

@@ -14,6 +14,7 @@
 #include "panonav/memory/floors.hpp"
 #include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
+#include "panonav/pipeline/internal/sector_recogniser.hpp"
 #include "panonav/pipeline/memory_map.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
@@ -100,24 +101,45 @@ MonteCarloLocaliser make_localiser(const MemoryFile& file, const IndexedMemory& 
 
 }  // namespace
 
+namespace {
+
+bool is_narrow(const TrackerOptions& options) {
+  return options.source && options.source->kind == PictureKind::pinhole;
+}
+
+/// Returns the layout of the pictures that the encoder takes, which narrow ones are not.
+PictureSource choose_encoded_source(const MemoryFile& file, const TrackerOptions& options) {
+  return is_narrow(options) ? file.header().source : options.source.value_or(file.header().source);
+}
+
+}  // namespace
+
 struct Tracker::Implementation {
   Implementation(const MemoryFile& file, const TrackerOptions& options)
       : memory(file.load()),
-        encoder(file.header(), options.source.value_or(file.header().source)),
+        encoder(file.header(), choose_encoded_source(file, options)),
         localiser(make_localiser(file, *memory, options)),
         noise(options.odometry),
         max_learnt_views(options.max_learnt_views),
         unit(read_length_unit(file)),
         plane(make_floor_plane(*memory)),
-        floor(plane.to_floor(HeldViewIndex(*memory).posed_views().front().pose.position()).floor) {}
+        floor(plane.to_floor(HeldViewIndex(*memory).posed_views().front().pose.position()).floor) {
+    if (!is_narrow(options)) return;
+    const auto models = load_stored_models(file, *memory);
+    narrow.emplace(file, *memory, *options.source, models ? models->sector : std::nullopt);
+  }
   Implementation(std::unique_ptr<IndexedMemory> index, const MemoryFile& file,
                  const TrackerOptions& options)
       : indexed(std::move(index)),
-        encoder(file.header(), options.source.value_or(file.header().source)),
+        encoder(file.header(), choose_encoded_source(file, options)),
         localiser(make_localiser(file, *indexed, options)),
         noise(options.odometry),
         max_learnt_views(options.max_learnt_views),
-        unit(read_length_unit(file)) {}
+        unit(read_length_unit(file)) {
+    if (is_narrow(options)) {
+      throw ContractError("narrow pictures", "in a memory not held", "in a memory that is held");
+    }
+  }
   /// Holds the memory if it is a file or small enough.
   static std::unique_ptr<Implementation> make(const std::filesystem::path& memory,
                                               const TrackerOptions& options) {
@@ -137,6 +159,7 @@ struct Tracker::Implementation {
   std::optional<VisualMemory> memory;      // nullopt: not held
   std::unique_ptr<IndexedMemory> indexed;  // null: held
   ViewEncoder encoder;
+  std::optional<SectorRecogniser> narrow;  // nullopt: pictures show all azimuths
   MonteCarloLocaliser localiser;
   std::optional<OdometryNoise> noise;  // of the options
   std::size_t max_learnt_views;
@@ -269,6 +292,11 @@ void Tracker::start_at(const Pose2& pose, double deviation_m, double heading_dev
 }
 
 MonteCarloEstimate Tracker::observe(const Observation& observation) {
+  if (takes_narrow_pictures()) {
+    const Place place = localise(observation);
+    if (observation.odometry || !implementation_->is_moved) move(observation.odometry, nullptr);
+    return observe(place);
+  }
   const ViewEncoder& encoder = implementation_->encoder;
   const FourierSignature view = encoder.signature(observation);
   Implementation& own = *implementation_;
@@ -286,8 +314,42 @@ MonteCarloEstimate Tracker::observe(const PackedSignature& view) {
   return implementation_->to_floors(implementation_->localiser.observe(view));
 }
 
+bool Tracker::takes_narrow_pictures() const noexcept {
+  return implementation_->narrow.has_value();
+}
+
+Place Tracker::localise(const Observation& observation) const {
+  if (!takes_narrow_pictures()) {
+    throw ContractError("pictures", "panoramic", "narrow ones (kind pinhole)");
+  }
+  return implementation_->narrow->localise(observation, 1, {});
+}
+
+MonteCarloEstimate Tracker::observe(const Place& place) {
+  Implementation& own = *implementation_;
+  own.is_moved = false;
+  Place in_plane = place;
+  const auto convert = [&](std::optional<PositionEstimate>& position, std::string_view floor) {
+    if (!position) return;
+    const Point2 point = own.plane.to_plane({position->position(), std::string(floor)});
+    position->x_m = point.x_m;
+    position->y_m = point.y_m;
+  };
+  convert(in_plane.position, place.floor());
+  for (AlternativePlace& other : in_plane.alternatives) {
+    convert(other.position, floor_of(other.match.name));
+  }
+  return own.to_floors(own.localiser.observe(in_plane));
+}
+
 void Tracker::move(const std::optional<Pose2>& odometry, const FourierSignature* view) {
   if (odometry && implementation_->unit == LengthUnit::metres) return move_to(*odometry, view);
+  if (takes_narrow_pictures()) {
+    Implementation& own = *implementation_;
+    own.localiser.spread(own.localiser.model().spacing_m, unknown_turn_deviation_rad);
+    own.is_moved = true;
+    return;
+  }
   if (view == nullptr) throw ContractError("view", "unknown", "known for images without odometry");
   move_by_image(*view);
 }
@@ -295,13 +357,16 @@ void Tracker::move(const std::optional<Pose2>& odometry, const FourierSignature*
 void Tracker::bridge_pauses(Dataset& run, Executor& executor) const {
   const std::span<DatasetEntry> part = find_odometry_part(run);
   const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
-  if (implementation_->unit != LengthUnit::metres || std::ranges::all_of(part, has_odometry))
+  if (implementation_->unit != LengthUnit::metres || takes_narrow_pictures() ||
+      std::ranges::all_of(part, has_odometry)) {
     return;
+  }
   bridge_odometry_pauses(part, implementation_->make_visual_odometry(), implementation_->encoder,
                          executor);
 }
 
 bool Tracker::needs_view(std::span<const DatasetEntry> entries, std::size_t index) const {
+  if (takes_narrow_pictures()) return false;
   const auto next = entries.subspan(index, std::min(gap_scale_images, entries.size() - index));
   return implementation_->unit != LengthUnit::metres || is_motion_by_images(entries, index) ||
          std::ranges::any_of(next, [](const DatasetEntry& entry) { return !entry.odometry; });

@@ -22,7 +22,8 @@ struct TrackerOptions {
   /// Errors of the motion; nullopt: `OdometryNoise{}` for odometry of wheels, and
   /// `visual_odometry_noise()` for motion that is read from the pictures.
   std::optional<OdometryNoise> odometry;
-  /// Layout of the pictures; nullopt: that of the memory.
+  /// Layout of the pictures; nullopt: that of the memory. Narrow ones (`PictureKind::pinhole`) need
+  /// a memory that is held and stores features for them.
   std::optional<PictureSource> source;
   /// Largest number of views of a memory on a server that is held in RAM; a larger one is searched
   /// on the server for each image. Files are always held.
@@ -37,7 +38,9 @@ struct TrackerOptions {
 ///   const auto estimate = tracker.observe(observation);
 ///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
 /// The motion to an observation without odometry is read from the pictures (`VisualOdometry`); the
-/// next odometry, which is a cumulative pose, corrects it.
+/// next odometry, which is a cumulative pose, corrects it. It is not read from narrow pictures,
+/// each of which is localised by itself: without odometry they are taken one spacing of the
+/// memory's views apart, in any direction.
 /// Uses the settings of the memory for signatures, and its stored observation model
 /// (`learn_and_store_models`), or learns a new one if the views have changed since. Holds the whole
 /// memory in RAM, unless it is on a server and larger than `max_held_views`; a file is not read
@@ -69,6 +72,13 @@ class Tracker {
   /// Updates the estimate by an image, without motion. Another thread may have encoded the image
   /// with `encoder()`.
   MonteCarloEstimate observe(const PackedSignature& view);
+  /// True if the pictures are narrow ones (`TrackerOptions::source`).
+  [[nodiscard]] bool takes_narrow_pictures() const noexcept;
+  /// Localises a narrow picture by itself. Several threads may call at a time. Throws as
+  /// `PlaceRecogniser::localise`; ContractError unless pictures are narrow.
+  [[nodiscard]] Place localise(const Observation& observation) const;
+  /// Updates the estimate by the answer to a narrow picture (`localise`), without motion.
+  MonteCarloEstimate observe(const Place& place);
   /// Moves the particles to the next image: by its odometry (`move_to`), or, without it or if
   /// positions are in view steps, by its view (`move_by_image`). Throws like these, and
   /// ContractError if the view is needed (`needs_view`) but null.

@@ -90,12 +90,18 @@ Particles ExplainedInjection::sample_particles(const Particles& particles, std::
   return fresh;
 }
 
-int ExplainedInjection::inject(Particles& particles, double probability, Random& random) const {
+namespace {
+
+/// Number of new particles that together get the weight `probability`; 0: fewer than half a one.
+std::size_t count_injected(const Particles& particles, double probability) {
   const auto size = static_cast<double>(particles.size());
   if (probability * size < min_injected_particles) return 0;
   const double replaced = std::max(min_replaced_share, replaced_share_factor * probability) * size;
-  const auto count = static_cast<std::size_t>(std::max(1L, std::lround(replaced)));
-  const Particles fresh = sample_particles(particles, count, random);
+  return static_cast<std::size_t>(std::max(1L, std::lround(replaced)));
+}
+
+/// Replaces the lightest particles by these, which together get the weight `probability`.
+void replace_lightest(Particles& particles, const Particles& fresh, double probability) {
   const std::vector<std::size_t> lightest = find_lightest(particles, fresh.size());
   for (std::size_t n = 0; n < fresh.size(); ++n) particles.set(lightest[n], fresh.pose(n), 0.0);
   const double kept = sum_values(particles.weight);
@@ -105,7 +111,42 @@ int ExplainedInjection::inject(Particles& particles, double probability, Random&
   for (std::size_t n = 0; n < fresh.size(); ++n) {
     particles.weight[lightest[n]] = fresh_share * fresh.weight[n] / fresh_sum;
   }
-  return static_cast<int>(fresh.size());
+}
+
+}  // namespace
+
+int ExplainedInjection::inject(Particles& particles, double probability, Random& random) const {
+  const std::size_t count = count_injected(particles, probability);
+  if (count == 0) return 0;
+  replace_lightest(particles, sample_particles(particles, count, random), probability);
+  return static_cast<int>(count);
+}
+
+void inject_around(Particles& particles, std::size_t count, std::span<const std::uint32_t> sites,
+                   ViewLikelihood& likelihood, const PoseSampler& sampler, Random& random) {
+  const std::size_t size = particles.size();
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t replaced = random.index(size);
+    Pose2 pose;
+    if (sites.empty()) {
+      pose = sampler.sample_anywhere(particles, random);
+    } else {
+      const std::uint32_t site = sites[random.index(sites.size())];
+      likelihood.compare(std::span(&site, 1));
+      pose = sampler.sample_around({site, false}, particles, random);
+    }
+    particles.set(replaced, pose, 1.0 / static_cast<double>(size));
+  }
+  const double sum = sum_values(particles.weight);
+  for (double& weight : particles.weight) weight /= sum;
+}
+
+int inject_samples(Particles& particles, double probability, const std::function<Pose2()>& sample) {
+  const std::size_t count = std::min(count_injected(particles, probability), particles.size());
+  Particles fresh;
+  for (std::size_t n = 0; n < count; ++n) fresh.add(sample(), 1.0);
+  if (count > 0) replace_lightest(particles, fresh, probability);
+  return static_cast<int>(count);
 }
 
 double kidnap_probability(double prior, double log_ratio_elsewhere, double log_ratio_here) {

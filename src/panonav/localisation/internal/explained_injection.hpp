@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "panonav/core/random.hpp"
@@ -43,6 +44,16 @@ class ExplainedInjection {
   double log_largest_ = 0.0;
   double log_evidence_ = 0.0;
 };
+
+/// Replaces `count` random particles by new ones around these sites, anywhere if there are none,
+/// and normalises the weights.
+void inject_around(Particles& particles, std::size_t count, std::span<const std::uint32_t> sites,
+                   ViewLikelihood& likelihood, const PoseSampler& sampler, Random& random);
+
+/// Replaces the lightest particles by poses that `sample` draws, which together get the weight
+/// `probability`, in equal shares. Returns their number; 0 if `probability` corresponds to less
+/// than half a particle.
+int inject_samples(Particles& particles, double probability, const std::function<Pose2()>& sample);
 
 /// Returns the probability that the robot was kidnapped, from its prior and the logarithms of the
 /// view's likelihood elsewhere and here.

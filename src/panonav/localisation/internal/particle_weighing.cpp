@@ -34,7 +34,7 @@ constexpr double min_evidence_exponent = 0.2;
 
 }  // namespace
 
-double ParticleWeighing::update_log_ratios(const Particles& particles, ViewLikelihood& likelihood) {
+double ParticleWeighing::update_log_ratios(const Particles& particles, PoseLikelihood& likelihood) {
   log_ratios_.resize(particles.size());
   likelihood.compute_log_ratios(particles, log_ratios_);
   const double largest = *std::ranges::max_element(log_ratios_);
@@ -78,7 +78,7 @@ ParticleWeighing::WeightSums ParticleWeighing::temper_to_min_effective_sample_si
   return update_factors(particles, exponent);
 }
 
-double ParticleWeighing::update_weights(Particles& particles, ViewLikelihood& likelihood,
+double ParticleWeighing::update_weights(Particles& particles, PoseLikelihood& likelihood,
                                         double exponent, const PoseBins& bins, Random& random) {
   double evidence = 0.0;
   double evidence_of_first = 0.0;
@@ -104,7 +104,7 @@ double ParticleWeighing::update_weights(Particles& particles, ViewLikelihood& li
     left -= part;
     if (!(left > exponent_tolerance)) break;
     resample_and_spread(particles, bins, random);
-    likelihood.reorder_by_cell(particles);
+    likelihood.reorder(particles);
   }
   return exponent >= min_evidence_exponent ? std::max(evidence_of_first, evidence / exponent)
                                            : evidence_of_first;

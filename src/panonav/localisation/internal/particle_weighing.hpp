@@ -4,7 +4,7 @@
 
 #include "panonav/core/random.hpp"
 #include "panonav/localisation/internal/particle_modes.hpp"
-#include "panonav/localisation/internal/view_likelihood.hpp"
+#include "panonav/localisation/internal/pose_likelihood.hpp"
 
 namespace panonav {
 
@@ -14,12 +14,12 @@ namespace panonav {
 /// view.
 class ParticleWeighing {
  public:
-  /// Multiplies the weights by the likelihood of the view of `likelihood`, to the power of
+  /// Multiplies the weights by the likelihood of an image, to the power of
   /// `exponent`, > 0 and <= 1, and normalises them. Returns the logarithm of the mean likelihood
-  /// relative to an unexplained view. The particles must be ordered by
-  /// `ViewLikelihood::arrange`. `bins`: grid of the modes within which particles are
+  /// relative to an image that says nothing. The particles must be in the order of
+  /// `PoseLikelihood::reorder`. `bins`: grid of the modes within which particles are
   /// spread.
-  double update_weights(Particles& particles, ViewLikelihood& likelihood, double exponent,
+  double update_weights(Particles& particles, PoseLikelihood& likelihood, double exponent,
                         const PoseBins& bins, Random& random);
 
  private:
@@ -29,7 +29,7 @@ class ParticleWeighing {
     double squares = 0.0;
   };
   /// Computes the log-likelihoods at the particles; returns the largest one.
-  double update_log_ratios(const Particles& particles, ViewLikelihood& likelihood);
+  double update_log_ratios(const Particles& particles, PoseLikelihood& likelihood);
   /// Computes the factors by which the likelihood to the power of `exponent` multiplies the
   /// weights.
   WeightSums update_factors(const Particles& particles, double exponent);

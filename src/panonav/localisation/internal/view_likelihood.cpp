@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -145,6 +146,19 @@ GridCell ViewLikelihood::cell_of(Point2 position) const noexcept {
 
 Point2 ViewLikelihood::centre_of(GridCell cell) const noexcept {
   return {(cell.x + 0.5) * cell_m_, (cell.y + 0.5) * cell_m_};
+}
+
+bool ViewLikelihood::has_site_within(Point2 position, double reach_m) const {
+  return std::ranges::any_of(
+      sites_, [&](const Site& site) { return distance(site.position, position) <= reach_m; });
+}
+
+std::size_t ViewLikelihood::count_cells(double side_m) const {
+  std::set<std::pair<double, double>> cells;
+  for (const Site& site : sites_) {
+    cells.emplace(std::floor(site.position.x_m / side_m), std::floor(site.position.y_m / side_m));
+  }
+  return cells.size();
 }
 
 void ViewLikelihood::set_view(const PackedSignature& view) {

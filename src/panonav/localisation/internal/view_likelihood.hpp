@@ -10,6 +10,7 @@
 #include "panonav/kernels/similarity.hpp"
 #include "panonav/localisation/internal/cell_table.hpp"
 #include "panonav/localisation/internal/compared_views.hpp"
+#include "panonav/localisation/internal/pose_likelihood.hpp"
 #include "panonav/localisation/observation_model.hpp"
 #include "panonav/localisation/particles.hpp"
 
@@ -21,7 +22,7 @@ namespace panonav {
 /// exp(-distance / range), times a free amplitude. The fit explains (sum similarity expected)^2 /
 /// sum expected^2 of the squared similarity. The similarity of a reference is reduced if its
 /// heading differs from that of the pose. References that were not compared have similarity 0.
-class ViewLikelihood {
+class ViewLikelihood final : public PoseLikelihood {
  public:
   /// Covers the posed views of a memory. `compass`: headings affect the likelihood. Cost: linear in
   /// the views.
@@ -65,11 +66,16 @@ class ViewLikelihood {
 
   /// Computes the log-likelihood of the view at each pose relative to an unexplained view; >= 0.
   /// Cost: 15 ns a pose if particles are ordered by cell (`reorder_by_cell`).
-  void compute_log_ratios(const Particles& particles, std::span<double> ratios);
+  void compute_log_ratios(const Particles& particles, std::span<double> ratios) override;
   /// Reorders particles so that those of one cell are adjacent. Cost: 10 ns each.
   void reorder_by_cell(Particles& particles);
+  void reorder(Particles& particles) override { reorder_by_cell(particles); }
 
   [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
+  /// True if a site is within this distance. Cost: linear in the sites.
+  [[nodiscard]] bool has_site_within(Point2 position, double reach_m) const;
+  /// Returns the number of squares of this side that have sites in them.
+  [[nodiscard]] std::size_t count_cells(double side_m) const;
   /// Returns the sites nearest to a position, at most 12; none if all sites are far away.
   [[nodiscard]] std::span<const std::uint32_t> sites_near(Point2 position) const noexcept;
   /// Returns the sites around which the particles have a weight of at least `min_weight`, heaviest
