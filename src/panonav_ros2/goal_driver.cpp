@@ -40,6 +40,9 @@ void GoalDriver::start(const Mission& mission) {
   try {
     if (memory_ == nullptr)
       throw Error("the memory is being made; allowed: first finish, then this");
+    if (memory_->tracker.takes_narrow_pictures()) {
+      throw Error("the images are narrow ones; allowed for drives: images of all azimuths");
+    }
     end("another goal");
     route_driver_.reset();
     chain_driver_.reset();

@@ -122,8 +122,14 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
   Tracker& tracker = loaded().tracker;
   refresh_if_due();
   tracker.move_to(*observation.odometry);
-  const PackedSignature view = tracker.encoder().packed(observation);
-  MonteCarloEstimate estimate = tracker.observe(view);
+  std::optional<PackedSignature> view;  // nullopt: a narrow picture
+  std::optional<Place> place;           // of a narrow picture
+  if (tracker.takes_narrow_pictures()) {
+    place = tracker.localise(observation);
+  } else {
+    view = tracker.encoder().packed(observation);
+  }
+  MonteCarloEstimate estimate = view ? tracker.observe(*view) : tracker.observe(*place);
   if (tracker.floor() != published_floor_) publish_references();
   last_pose_ = estimate.pose;
   if (estimate.pose) estimate.pose = *estimate.pose * inverse(base_from_camera_);
@@ -133,7 +139,16 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
   if (last_pose_) correct_motion(*moment.pose, moved.path_from_base, moment);
   driver_.drive(observation, last_pose_);
   last_observation_ = std::move(observation);
-  publish_estimate(moment, stamp_ns, view);
+  publish_estimate(moment, stamp_ns);
+  if (best_matches_.subscribers() > 0) {
+    std::optional<ViewId> best;
+    if (place && !place->matches.empty()) best = place->matches.front().view;
+    if (view) {
+      const auto found = tracker.index()->search(*view, {.top = 1}, {});
+      if (!found.matches.empty()) best = found.matches.front().view;
+    }
+    if (best) publish_best_match(*best, stamp_ns);
+  }
   return moment;
 }
 
@@ -166,10 +181,8 @@ void MemoryLocaliser::correct_motion(const Pose2& map_from_base, const Pose2& pa
   moment.values.emplace_back("correction_rad", format_fixed(std::abs(turn_rad), 4));
 }
 
-/// Publishes the pose if the estimate is certain, and particles and the best match if there are
-/// subscribers.
-void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns,
-                                       const PackedSignature& view) const {
+/// Publishes the pose if the estimate is certain, and particles if there are subscribers.
+void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns) const {
   constexpr std::size_t max_shown_particles = 500;  // more would not show more
   const Tracker& tracker = memory_->tracker;
   if (last_pose_) poses_.publish(recordings::pose_message(moment, stamp_ns, setup_.frames.map));
@@ -178,18 +191,17 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
         recordings::resample_systematically(tracker.particles(), max_shown_particles);
     particles_.publish(recordings::poses_message(moment.particles, stamp_ns, setup_.frames.map));
   }
-  if (best_matches_.subscribers() > 0) {
-    const auto found = tracker.index()->search(view, {.top = 1}, {});
-    if (found.matches.empty()) return;
-    try {
-      const auto thumbnail = memory_->file.thumbnail(found.matches.front().view);
-      if (!thumbnail) return;
-      constexpr std::uint8_t first_byte_of_png = 0x89;
-      const bool is_png = !thumbnail->empty() && thumbnail->front() == first_byte_of_png;
-      best_matches_.publish({{stamp_ns, setup_.frames.base}, is_png ? "png" : "jpeg", *thumbnail});
-    } catch (const ContractError&) {
-      // Another program has removed this view from the memory since the memory was read.
-    }
+}
+
+void MemoryLocaliser::publish_best_match(ViewId view, std::int64_t stamp_ns) const {
+  try {
+    const auto thumbnail = memory_->file.thumbnail(view);
+    if (!thumbnail) return;
+    constexpr std::uint8_t first_byte_of_png = 0x89;
+    const bool is_png = !thumbnail->empty() && thumbnail->front() == first_byte_of_png;
+    best_matches_.publish({{stamp_ns, setup_.frames.base}, is_png ? "png" : "jpeg", *thumbnail});
+  } catch (const ContractError&) {
+    // Another program has removed this view from the memory since the memory was read.
   }
 }
 

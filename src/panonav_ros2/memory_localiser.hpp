@@ -52,8 +52,8 @@ class MemoryLocaliser {
   void resume(const Mission& mission, const RobotMotion::Motion& now);
   void correct_motion(const Pose2& map_from_base, const Pose2& path_from_base,
                       recordings::RunMoment& moment);
-  void publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns,
-                        const PackedSignature& view) const;
+  void publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns) const;
+  void publish_best_match(ViewId view, std::int64_t stamp_ns) const;
   void publish_references();
 
   const LocalisationNodeSetup& setup_;

@@ -4,6 +4,7 @@
 
 #include "panonav/geometry/angles.hpp"
 #include "ros2/node_on_the_wire.hpp"
+#include "support/patch_views.hpp"
 
 namespace panonav::ros2 {
 namespace {
@@ -78,6 +79,47 @@ TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
   }
   stop();
   EXPECT_TRUE(notes_.empty()) << notes_.front();
+}
+
+TEST_F(LocalisationNodeOnTheWire, TakesNarrowPictures) {
+  const fs::path path = *folder_ / "places.panonav";
+  MemoriserOptions options{.source = PictureSource{}, .narrow = true, .map = false, .left_out = {}};
+  options.source->layout.elevations = testing::patch_band;
+  Memoriser memoriser(path, options);
+  for (int i = 0; i < 9; ++i) {
+    Observation view(testing::make_patch_view(static_cast<std::uint64_t>(i)));
+    view.name = "place " + std::to_string(i);
+    view.pose = ReferencePose{0.5 * i, 0.0, 0.0};
+    memoriser.add(std::move(view));
+  }
+  memoriser.finish();
+  LocalisationNodeSetup setup{.memory = path};
+  setup.tracker.source =
+      PictureSource{.kind = PictureKind::pinhole, .field_of_view_rad = radians(70.0)};
+  start(setup);
+  auto& odom = peer_.talk<recordings::ros::Odometry>("odom");
+  auto& image = peer_.talk<recordings::ros::Image>("image", false);
+  auto& pose = peer_.listen<recordings::ros::PoseWithCovarianceStamped>("panonav/pose");
+  auto& best = peer_.listen<recordings::ros::CompressedImage>("panonav/best_match/compressed");
+  ASSERT_TRUE(peer_.all_matched(10s));
+  for (int i = 2; i < 7; ++i) {
+    const std::int64_t ns = now_ns();
+    FastPeer::write(odom, odometry_message(ns, {0.5 * i, 0.0, 0.0}));
+    const Image seen = testing::take_narrow_picture(
+        testing::make_patch_view(static_cast<std::uint64_t>(i)), 0.0, radians(70.0));
+    EXPECT_TRUE(FastPeer::write(image, image_message(ns, seen)));
+    ASSERT_TRUE(
+        comes_true([&] { return node_->counts().pictures >= static_cast<std::size_t>(i - 1); }));
+  }
+  FastPeer::Bytes last;
+  while (FastPeer::waiting(pose) > 0) last = FastPeer::next(pose, 1s);
+  ASSERT_FALSE(last.empty());
+  const Pose2 found =
+      recordings::ros::to_pose2(read<recordings::ros::PoseWithCovarianceStamped>(last).pose.pose);
+  EXPECT_LT(distance(found.position(), {3.0, 0.0}), 0.5);
+  EXPECT_LT(std::abs(found.heading_rad), 0.2);
+  EXPECT_FALSE(FastPeer::next(best, 1s).empty());
+  EXPECT_NE(ask("repeat somewhere").find("narrow"), std::string::npos);
 }
 
 TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClockAndAStart) {

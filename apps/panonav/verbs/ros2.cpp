@@ -115,6 +115,14 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
     arguments.teacher.pictures = *pictures;
     arguments.teacher.route = arguments.route;
   }
+  if (makes_memory && arguments.pictures.kind == "pinhole") {
+    throw UsageError(
+        "--kind pinhole cannot be used with --teach or --explore; a memory needs images of all "
+        "azimuths");
+  }
+  if (!makes_memory && arguments.pictures.kind) {
+    arguments.setup.tracker.source = make_picture_source(arguments.pictures, session);
+  }
   if (arguments.teach) arguments.setup.teacher = arguments.teacher;
   if (arguments.explore) {
     const auto& made = arguments.teacher;
@@ -170,6 +178,7 @@ Run declare_ros2(Arguments& arguments) {
   arguments.option("--base-frame NAME", setup.frames.base, "Name of the frame of the robot");
   arguments.allow_in_config_files(
       "ros2", {"--node-name", "--namespace", "--map-frame", "--odom-frame", "--base-frame"});
+  values->pictures.takes_narrow = true;
   declare_picture_layout(arguments, values->pictures);
   arguments.options("signature", values->teacher.signature);
   arguments.options("preprocessing", values->teacher.preprocessing);
@@ -179,9 +188,12 @@ Run declare_ros2(Arguments& arguments) {
   arguments.options("odometry", setup.tracker.odometry.emplace(), "odometry");
   arguments.options("base", setup.navigator.base);
   arguments.reject_options_unless(
-      {"--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg", "[signature]",
-       "[preprocessing]"},
+      {"--columns-run", "--forward-column", "--elevation-deg", "[signature]", "[preprocessing]"},
       [values] { return values->teach || values->explore; }, "without --teach or --explore");
+  arguments.reject_options_unless(
+      {"--kind", "--camera", "--field-of-view"},
+      [values] { return values->teach || values->explore || values->pictures.kind == "pinhole"; },
+      "without --teach or --explore, except --kind pinhole");
   arguments.reject_options_unless(
       {"--route"}, [values] { return values->teach; }, "without --teach");
   arguments.reject_options_unless(
@@ -191,8 +203,8 @@ Run declare_ros2(Arguments& arguments) {
       [values] { return values->explore || values->setup.node.camera_height_m > 0.0; },
       "without --explore or --camera-height-m");
   arguments.show_in_help({"--motion", "--pictures", "--use-sim-time"});
-  arguments.hide_from_help(
-      {"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
+  arguments.hide_from_help({"--node-name", "--domain-id", "--map-frame", "--odom-frame",
+                            "--base-frame", "--field-of-view"});
   return [values](Session& session) { return run_node(*values, session); };
 }
 
@@ -211,7 +223,8 @@ Verb ros2_verb() {
           "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
           "-25 35\n"
           "  panonav ros2 new.panonav --explore --kind mirror --camera mirror.toml\n"
-          "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
+          "  panonav ros2 office.panonav --pictures compressed --use-sim-time true\n"
+          "  panonav ros2 office.panonav --kind pinhole --camera camera_info.yaml",
           declare_ros2,
           {},
           translate_ros_arguments};
