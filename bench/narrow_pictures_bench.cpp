@@ -168,7 +168,7 @@ class Bench {
     };
     std::printf(
         "%-38s %4d pictures: right %.1f %%, of three %.1f %%, known %.1f %%, "
-        "heading %.2f degrees, position %.2f m, %.1f ms\n",
+        "heading %.2f degrees, position %.3f m, %.1f ms\n",
         name.c_str(), totals.pictures, percent(totals.right), percent(totals.right_of_three),
         percent(totals.known), degrees(middle(totals.heading_errors_rad)),
         middle(totals.position_errors_m), totals.time_ms / std::max(1, totals.pictures));

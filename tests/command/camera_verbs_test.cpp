@@ -138,7 +138,7 @@ TEST_F(CameraVerbs, ACalibrationOfAnotherProgramIsACameraFile) {
   write("narrow.yaml", "radtan");
   const std::string narrow = out_ / "narrow.yaml";
   expect_refusal({"unwrap", picture(0), "--camera", narrow, "-o", out_ / "no.png"},
-                 "narrow.yaml, a pinhole camera");
+                 "narrow.yaml, of the model pinhole");
   const auto converted = answer_of({"calibrate", narrow, "-o", out_ / "narrow.toml", "--json"});
   EXPECT_EQ(converted["format"], "Kalibr (pinhole-radtan) calibration");
   EXPECT_NEAR(converted["field_of_view_rad"].get<double>(),
