@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <set>
 
@@ -13,6 +14,8 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav_simulation/mirror.hpp"
 #include "support/command_runner.hpp"
+#include "support/patch_views.hpp"
+#include "support/test_cameras.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -148,6 +151,48 @@ TEST_F(CameraVerbs, ACalibrationOfAnotherProgramIsACameraFile) {
                  "pinhole");
   EXPECT_EQ(answer_of({"info", narrow, "--json"})["verbs"],
             json::array({"localise --kind pinhole --camera"}));
+}
+
+TEST_F(CameraVerbs, ARigIsOneCamera) {
+  const fs::path set = out_ / "rig_set";
+  const std::vector<std::string> folders{"front", "left", "back", "right"};
+  std::string list = "file\n";
+  for (int place = 0; place < 3; ++place) {
+    const Panorama view = make_patch_view(static_cast<std::uint64_t>(place));
+    for (std::size_t i = 0; i < folders.size(); ++i) {
+      fs::create_directories(set / folders[i]);
+      const Image seen = take_narrow_picture(view, static_cast<double>(i) * std::numbers::pi / 2,
+                                             std::numbers::pi / 2, {160, 120});
+      write_png(set / folders[i] / (std::to_string(place) + ".png"), seen.view());
+    }
+    list += "front/" + std::to_string(place) + ".png\n";
+  }
+  const std::string camera = set / "rig.toml";
+  write_camera(camera, {rig_camera(4), {}, {}});
+  std::ofstream(set / "list.csv") << list;
+  std::ofstream(set / "dataset.toml")
+      << "[images]\nkind = \"mirror\"\ncamera = \"rig.toml\"\n"
+         "folders = [\"front\", \"left\", \"back\", \"right\"]\n[list]\nfile = \"list.csv\"\n";
+  const std::string memory = out_ / "rig.panonav";
+  run_well({"memorise", memory, set});
+  std::vector<std::string> question{"localise", memory, "--camera", camera};
+  for (const std::string& name : folders) question.push_back(set / name / "1.png");
+  const auto answers = answers_of(with(question, {"--json"}));
+  ASSERT_EQ(answers.size(), 1U) << "one question of four images";
+  EXPECT_EQ(answers[0]["matches"][0]["file"], "front/1.png");
+  question.pop_back();
+  expect_refusal(question, "a multiple of its 4 cameras");
+  EXPECT_TRUE(contains(answer_of({"info", camera, "--json"})["verbs"].dump(), "memorise --camera"));
+
+  const std::string front = out_ / "front.toml";  // three of the four cameras
+  write_camera(front, {rig_camera(3), {}, {}});
+  EXPECT_EQ(answer_of({"info", front, "--json"})["verbs"],
+            json::array({"localise --kind pinhole --camera"}));
+  expect_refusal({"unwrap", picture(0), "--camera", front, "-o", out_ / "no.png"},
+                 "front.toml, of the model rig, which shows a part of the azimuth");
+  expect_refusal({"localise", memory, picture(0), "--kind", "pinhole", "--camera", front},
+                 "stores no features for narrow pictures");
+  expect_refusal({"calibrate", camera, "-o", out_ / "x.yaml", "--export", "kalibr"}, "rig");
 }
 
 TEST_F(CameraVerbs, CalibrateWithoutAMirrorIsNoAnswer) {

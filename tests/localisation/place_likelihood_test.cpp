@@ -55,7 +55,7 @@ TEST(PlaceLikelihood, AnswersLocaliseARobot) {
     return Pose2{first.x_m + 0.15 * i * std::cos(towards_rad),
                  first.y_m + 0.15 * i * std::sin(towards_rad), towards_rad};
   };
-  // Two places fit equally well, of which only one goes on as the robot does.
+  // Two places fit equally well, of which only one moves as the robot does.
   MonteCarloEstimate estimate =
       filter.observe(answer_at(on_way(0), 0.49, Pose2{last.x_m, last.y_m, towards_rad + 2.0}));
   EXPECT_NE(estimate.state, LocalisationState::localised);

@@ -44,7 +44,7 @@ constexpr std::array<Takers, 12> takers{{
      "evaluate"},
     {InputKind::dataset,
      "memorise localise track home map route_record route_follow unwrap convert catchment"},
-    {InputKind::narrow_dataset, "localise convert"},
+    {InputKind::narrow_dataset, "localise track convert"},
     {InputKind::pictures,
      "try memorise localise track map route_record route_follow unwrap calibrate convert "
      "catchment"},

@@ -103,7 +103,7 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
   if (source_.kind == PictureKind::pinhole) {
     throw ContractError("kind of the images", "pinhole",
                         "panorama, equirectangular or mirror, as all azimuths are needed; narrow "
-                        "pictures can only be localised");
+                        "pictures can only be localised and tracked");
   }
   if (source_.kind != PictureKind::mirror) return;
   require(source_.camera.has_value(), "camera of mirror images", 0.0, "one camera");

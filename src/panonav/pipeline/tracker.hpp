@@ -38,11 +38,10 @@ struct TrackerOptions {
 ///   const auto estimate = tracker.observe(observation);
 ///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
 /// The motion to an observation without odometry is read from the pictures (`VisualOdometry`); the
-/// next odometry, which is a cumulative pose, corrects it. It is not read from narrow pictures,
-/// each of which is localised by itself: without odometry they are taken one spacing of the
-/// memory's views apart, in any direction.
+/// next odometry, which is a cumulative pose, corrects it. Narrow pictures show no motion: without
+/// odometry each is one spacing of the views from the last.
 /// Uses the settings of the memory for signatures, and its stored observation model
-/// (`learn_and_store_models`), or learns a new one if the views have changed since. Holds the whole
+/// (`learn_and_store_models`), or learns a new one if the views have changed since. Holds the
 /// memory in RAM, unless it is on a server and larger than `max_held_views`; a file is not read
 /// after construction. Same views, options and observations: same bits.
 class Tracker {

@@ -117,7 +117,7 @@ SectorQuery SectorRecogniser::make_query(ImageView image, const Camera& camera,
         unwarp_sector(parts[i].picture, *parts[i].camera, shape, *header_.elevations, tilt);
     if (!sector) continue;
     const double share = 1.0 / static_cast<double>(parts.size());
-    // Of what several cameras see, the features of the camera that looks there count.
+    // Where several cameras see a corner, it counts once, in the picture of the nearest axis.
     append_features(
         extract_gradient_features(*sector, header_.preprocessing, share),
         [&](const GradientFeatures::Corner& corner) {
