@@ -114,7 +114,7 @@ TEST_F(Info, DataSetsOfNarrowPicturesSayWhatTheyAreFor) {
   std::ofstream(photos / "images.csv") << "file\na.png\n";
   const json said = describe(photos, "data set");
   EXPECT_EQ(said["summary"], "1 image of 96 x 48 px, pinhole, 70 degrees wide");
-  EXPECT_EQ(said["verbs"], json({"localise", "convert"})) << "others need all azimuths";
+  EXPECT_EQ(said["verbs"], json({"localise", "track", "convert"})) << "others need all azimuths";
   const json converted = answer_of({"convert", photos, folder / "photos.mcap", "--json"}, 0);
   EXPECT_EQ(converted["layout_flags"], json({"--kind", "pinhole", "--field-of-view", "70"}));
   EXPECT_EQ(last_line(photos), "Next: panonav localise MEMORY " + photos.string());
