@@ -46,8 +46,8 @@ TEST(RigModel, SeesAllAzimuthsOrSaysThatItDoesNot) {
   const Camera around = rig_camera(4);
   EXPECT_TRUE(shows_all_azimuths(around));
   EXPECT_NEAR(field_of_view(around), 2.0 * std::numbers::pi, 1e-9);
-  // The tangent of the elevation of a picture's upper edge falls with the cosine of the azimuth. The
-  // band is found at every other degree, so at 44 degrees beside the corner.
+  // The tangent of the elevation of a picture's upper edge falls with the cosine of the azimuth.
+  // The band is found at every other degree, so at 44 degrees beside the corner.
   const double corner_rad = std::atan(0.75 * std::cos(radians(44.0)));
   const ElevationBand band = visible_elevations(around);
   EXPECT_LE(band.top_rad, corner_rad + 1e-9);

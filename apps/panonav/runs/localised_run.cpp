@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <memory>
 #include <utility>
-#include <variant>
 
 #include "cli/json.hpp"
 #include "panonav/core/address.hpp"
@@ -15,7 +14,6 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/gpano.hpp"
-#include "panonav/io/image_file.hpp"
 #include "panonav/io/rig_pictures.hpp"
 #include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/pipeline/live_memory.hpp"
@@ -426,22 +424,6 @@ void require_components(const Arguments& declared, const LocaliseArguments& argu
   }
 }
 
-namespace {
-
-/// Joins images if they are those of the cameras of a rig, one after the other.
-void join_images_of_rig(Dataset& queries) {
-  const auto& camera = queries.source.camera;
-  const auto* const rig = camera ? std::get_if<RigModel>(&camera->model) : nullptr;
-  if (rig == nullptr || read_image_size(queries.entries.front().path) == camera->image_size) return;
-  try {
-    join_entries(queries, *rig);
-  } catch (const ContractError& error) {
-    throw UsageError(error.what());
-  }
-}
-
-}  // namespace
-
 Dataset open_queries(const LocaliseArguments& arguments,
                      const std::optional<PictureSource>& remembered, Session& session) {
   PictureArguments pictures = arguments.pictures;
@@ -478,7 +460,7 @@ Dataset open_queries(const LocaliseArguments& arguments,
     entry.path = input;
     queries->entries.push_back(std::move(entry));
   }
-  join_images_of_rig(*queries);
+  join_entries(*queries);
   if (!pictures.ignore_gpano) apply_gpano(*queries);
   note_unusable(*queries, session);
   return std::move(*queries);

@@ -3,6 +3,7 @@
 #include <memory>
 #include <system_error>
 #include <utility>
+#include <variant>
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
@@ -46,15 +47,18 @@ Image RigPictures::read(std::size_t index) const {
   }
 }
 
-void join_entries(Dataset& dataset, const RigModel& rig) {
+void join_entries(Dataset& dataset) {
+  const auto& camera = dataset.source.camera;
+  const auto* const rig = camera ? std::get_if<RigModel>(&camera->model) : nullptr;
+  if (rig == nullptr || read_image_size(dataset.entries.at(0).path) == camera->image_size) return;
   std::vector<fs::path> files;
   std::vector<DatasetEntry> joined;
   for (std::size_t i = 0; i < dataset.entries.size(); ++i) {
     files.push_back(dataset.entries[i].path);
-    if (i % rig.cameras.size() == 0) joined.push_back(std::move(dataset.entries[i]));
+    if (i % rig->cameras.size() == 0) joined.push_back(std::move(dataset.entries[i]));
   }
   dataset.entries = std::move(joined);
-  set_pictures(dataset, rig, std::move(files));
+  set_pictures(dataset, *rig, std::move(files));
 }
 
 void join_folders(Dataset& dataset, const RigModel& rig, std::span<const std::string> folders) {

@@ -26,10 +26,11 @@ class RigPictures : public PictureStore {
   std::vector<std::filesystem::path> files_;
 };
 
-/// Makes pictures of a rig from a data set's entries that name the files of its cameras one after
-/// the other: each `n` become one, with the name and path of the first. Throws ContractError unless
-/// their number is a multiple of n.
-void join_entries(Dataset& dataset, const RigModel& rig);
+/// Makes pictures of a rig from entries that name the files of its cameras one after the other:
+/// each `n` become one, with the name and path of the first. Changes nothing if the camera is no
+/// rig, or if the first file has the size of a joined picture. Throws ContractError unless their
+/// number is a multiple of n; FileError if the first file cannot be read.
+void join_entries(Dataset& dataset);
 /// Makes pictures of a rig from entries that name files in the folder of its first camera; the
 /// other cameras have files of the same name in theirs. Throws FileError with the name of a file
 /// that is missing or in none of these folders.
