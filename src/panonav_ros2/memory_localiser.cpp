@@ -123,7 +123,7 @@ recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::in
   refresh_if_due();
   tracker.move_to(*observation.odometry);
   std::optional<PackedSignature> view;  // nullopt: a narrow picture
-  std::optional<Place> place;           // of a narrow picture
+  std::optional<Place> place;           // answer to a narrow picture
   if (tracker.takes_narrow_pictures()) {
     place = tracker.localise(observation);
   } else {

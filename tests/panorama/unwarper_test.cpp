@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <numbers>
 #include <vector>
 
@@ -282,6 +283,24 @@ TEST(Unwarper, EquirectangularCamerasWrapRound) {
   EXPECT_LT(worst, 0.005);
 }
 
+/// Returns the largest difference between the unwarped picture of a world and the world times
+/// `brightness`. Every value must be seen.
+double find_worst_error(const Camera& camera, const Image& image, const UnwarperOptions& options,
+                        const std::function<double(double, double)>& world,
+                        double brightness = 1.0) {
+  const Unwarper unwarper(camera, options);
+  const Panorama view = unwarper.unwrap(image.view());
+  double worst = 0.0;
+  for (int y = 0; y < view.rows(); ++y) {
+    for (int c = 0; c < view.columns(); ++c) {
+      EXPECT_TRUE(unwarper.is_visible(y, c));
+      const double expected = brightness * world(view.azimuth_rad(c), view.elevation_rad(y));
+      worst = std::max(worst, std::abs(view.at(y, c) - expected));
+    }
+  }
+  return worst;
+}
+
 TEST(Unwarper, TwoLensesAreOnePictureWithoutASeam) {
   const Camera camera = dual_fisheye_camera();
   const auto world = [](double azimuth, double elevation) {  // smooth at the poles, too
@@ -292,19 +311,10 @@ TEST(Unwarper, TwoLensesAreOnePictureWithoutASeam) {
   for (const UnwarperOptions& options :
        {UnwarperOptions{.rows = 40, .columns = 128}, UnwarperOptions{.rows = 300, .columns = 1200},
         UnwarperOptions{.rows = 30, .columns = 256, .elevations = ElevationBand{-0.6, 0.7}}}) {
-    const Unwarper unwarper(camera, options);
-    const Panorama view = unwarper.unwrap(image.view());
-    double worst = 0.0;
-    for (int y = 0; y < view.rows(); ++y) {
-      for (int c = 0; c < view.columns(); ++c) {
-        EXPECT_TRUE(unwarper.is_visible(y, c));
-        // As bright as the darker lens, whichever of them sees it.
-        const double expected = 0.85 * world(view.azimuth_rad(c), view.elevation_rad(y));
-        worst = std::max(worst, std::abs(view.at(y, c) - expected));
-      }
-    }
-    // One grey level of the picture, and seven bits of weights.
-    EXPECT_LT(worst, 0.012) << options.rows << " rows";
+    // The darker lens gives the brightness, whichever of them sees it. Errors are one grey level of
+    // the picture, and seven bits of weights.
+    EXPECT_LT(find_worst_error(camera, image, options, world, 0.85), 0.012)
+        << options.rows << " rows";
   }
 }
 
@@ -314,17 +324,8 @@ TEST(Unwarper, PicturesOfARigAreOnePictureWithoutASeam) {
   for (const UnwarperOptions& options :
        {UnwarperOptions{.rows = 20, .columns = 128}, UnwarperOptions{.rows = 100, .columns = 900},
         UnwarperOptions{.rows = 30, .columns = 255, .elevations = ElevationBand{-0.4, 0.3}}}) {
-    const Unwarper unwarper(camera, options);
-    const Panorama view = unwarper.unwrap(image.view());
-    double worst = 0.0;
-    for (int y = 0; y < view.rows(); ++y) {
-      for (int c = 0; c < view.columns(); ++c) {
-        EXPECT_TRUE(unwarper.is_visible(y, c));
-        const double expected = smooth_world(view.azimuth_rad(c), view.elevation_rad(y));
-        worst = std::max(worst, std::abs(view.at(y, c) - expected));
-      }
-    }
-    EXPECT_LT(worst, 0.02) << options.rows << " rows";
+    EXPECT_LT(find_worst_error(camera, image, options, smooth_world), 0.02)
+        << options.rows << " rows";
   }
   EXPECT_THROW(Unwarper(rig_camera(3), {.elevations = ElevationBand{-0.2, 0.2}}), ContractError)
       << "a part of the azimuth is not seen";

@@ -224,10 +224,6 @@ void move(Tracker& tracker, const Dataset& run, std::size_t index, EncodedImage&
   if (is_by_images) image.moment->odometry = tracker.visual_odometry()->pose();
 }
 
-}  // namespace
-
-namespace {
-
 TrackedImage track_place(Tracker& tracker, const Place& place, const TrackSettings& settings) {
   TrackedImage image;
   image.estimate = tracker.observe(place);

@@ -109,18 +109,17 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
   }
   const bool makes_memory = arguments.teach || arguments.explore;
   if (makes_memory) {
+    if (arguments.pictures.kind == "pinhole") {
+      throw UsageError(
+          "--kind pinhole cannot be used with --teach or --explore; a memory needs images of all "
+          "azimuths");
+    }
     const auto pictures = make_picture_source(arguments.pictures, session);
     if (!pictures) throw UsageError("set --kind to the type of the images");
     note_default_band(*pictures, elevation_flag, session);
     arguments.teacher.pictures = *pictures;
     arguments.teacher.route = arguments.route;
-  }
-  if (makes_memory && arguments.pictures.kind == "pinhole") {
-    throw UsageError(
-        "--kind pinhole cannot be used with --teach or --explore; a memory needs images of all "
-        "azimuths");
-  }
-  if (!makes_memory && arguments.pictures.kind) {
+  } else if (arguments.pictures.kind) {
     arguments.setup.tracker.source = make_picture_source(arguments.pictures, session);
   }
   if (arguments.teach) arguments.setup.teacher = arguments.teacher;

@@ -19,22 +19,22 @@ struct PixelPoint;
 /// upper edges in one line (`join_pictures`). Where several see a direction, that whose optical
 /// axis is nearest counts. Projection assumes distant points.
 struct RigModel {
-  static constexpr std::size_t min_cameras = 2;  ///< of a rig
-  static constexpr std::size_t max_cameras = 8;  ///< of a rig
+  static constexpr std::size_t min_cameras = 2;  ///< smallest number
+  static constexpr std::size_t max_cameras = 8;  ///< largest number
 
   /// Part of the picture that one camera took.
   struct Tile {
     std::size_t camera = 0;  ///< index of `cameras`
     int left_px = 0;         ///< first column
-    ImageSize size;          ///< of this camera's pictures
+    ImageSize size;          ///< size of this camera's pictures
   };
 
   std::vector<Camera> cameras;  ///< pinhole cameras
   friend bool operator==(const RigModel& a, const RigModel& b);
 };
 
-/// Makes the camera whose pictures are those of these cameras, side by side. Throws ContractError
-/// as `validate`.
+/// Makes the camera whose pictures are those of these cameras, side by side. Throws like
+/// `validate`.
 [[nodiscard]] Camera make_rig(std::vector<Camera> cameras);
 
 /// Throws ContractError that names the camera, the field, its value and its range.

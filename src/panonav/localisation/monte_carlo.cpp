@@ -41,8 +41,8 @@ constexpr double min_followed_weight = 1e-3;
 constexpr double p_kidnap = 0.01;  ///< that the robot is carried elsewhere
 /// Probability at the first image that the robot is not near any particle.
 constexpr double p_elsewhere_at_start = 0.9;
-/// Limit of the evidence of one image for being in the memorised area by its difference alone: odds
-/// of 7, which a few images can refute (tests/localisation/monte_carlo_test.cpp).
+/// Limit of the evidence of one image for being in the memorised area by its difference alone. Odds
+/// are then 7, which a few images can refute (tests/localisation/monte_carlo_test.cpp).
 constexpr double max_log_ratio_of_difference = 2.0;
 /// Log-likelihood ratio of an explained difference against an unrelated one (the same tests).
 constexpr double log_ratio_per_margin = 4.0;

@@ -150,8 +150,8 @@ class MonteCarloLocaliser {
   /// cannot be read.
   MonteCarloEstimate observe(const PackedSignature& view);
   /// Weighs the particles by the answer of a localiser to an image (`SectorLocaliser`): its places
-  /// with their probabilities, positions and headings. Answers from nearly one position count less,
-  /// as views do. Differences of the estimate are those of views, so they stay empty.
+  /// with their probabilities, positions and headings. Answers from nearly one position count less
+  /// than others, like views. Differences of the estimate are those of views, so they stay empty.
   MonteCarloEstimate observe(const Place& place);
   /// Returns the present estimate, without a new image.
   [[nodiscard]] MonteCarloEstimate estimate() const;

@@ -33,14 +33,14 @@ class PlaceLikelihood final : public PoseLikelihood {
     double share;  // probability
     Point2 position;
     std::optional<double> heading_rad;
-    double deviation_m;  // of x and of y
+    double deviation_m;  // standard deviation of x, and that of y
   };
   void add(double share, const std::optional<PositionEstimate>& position,
            const std::optional<double>& heading_rad, double spacing_m);
 
   std::vector<Part> parts_;
   double unexplained_ = 1.0;  // probability of all other poses
-  double area_m2_;            // of all memorised places
+  double area_m2_;            // area of all memorised places
   bool compass_;
 };
 
